@@ -14,16 +14,15 @@ has_colours (const FusedView &view)
   return view.gains && view.image.colour.same_size (view.image.depth) && !view.image.depth.empty ();
 }
 
-/* Clipped, as colour balance clips it: what was white in both pictures stays equal. */
+/* A colour after colour balance, clipped alike: pixels that are white in both images stay equal. */
 std::array<float, 3>
-colour_of (const FusedView &view, int x, int y)
+balanced_colour (const FusedView &view, int x, int y)
 {
   const Rgbx c = view.image.colour.at (x, y);
   const auto &gains = *view.gains;
-  const auto level = [] (float gain, std::uint8_t value) {
-    return std::min (gain * static_cast<float> (value), 255.f);
-  };
-  return {level (gains[0], c.r), level (gains[1], c.g), level (gains[2], c.b)};
+  return {std::min (gains[0] * static_cast<float> (c.r), 255.f),
+      std::min (gains[1] * static_cast<float> (c.g), 255.f),
+      std::min (gains[2] * static_cast<float> (c.b), 255.f)};
 }
 
 /* Whether a view sees, in all of 3 x 3 pixels around (x, y), a farther surface of another colour.
@@ -36,7 +35,7 @@ sees_other (const FusedView &view, int x, int y, float beyond, const std::array<
     return false;
   for (int v = y - 1; v <= y + 1; v++)
     for (int u = x - 1; u <= x + 1; u++) {
-      const std::array<float, 3> other = colour_of (view, u, v);
+      const std::array<float, 3> other = balanced_colour (view, u, v);
       float difference = 0;
       for (std::size_t k = 0; k < 3; k++)
         difference = std::max (difference, std::abs (other[k] - colour[k]));
@@ -63,7 +62,7 @@ is_contradicted (
   const int column = static_cast<int> (u), row = static_cast<int> (v);
   const float beyond = (1 + ContradictedPoints::kMargin) * place[2];
   return static_cast<float> (to.at (column, row)) > beyond &&
-         sees_other (other, column, row, beyond, colour_of (own, x, y));
+         sees_other (other, column, row, beyond, balanced_colour (own, x, y));
 }
 
 } // namespace
@@ -98,7 +97,7 @@ ContradictedPoints::find (std::span<const FusedView> views, std::size_t which)
   if (!has_colours (own))
     return;
   for (std::size_t i = 0; i < views.size (); i++)
-    if (i != which && has_colours (views[i]) && may_share_surfaces (own, views[i]))
+    if (i != which && has_colours (views[i]) && may_share_surfaces (own.rays, views[i].rays))
       others_.push_back (
           {i, PixelTransfer (own.rays, own.image.roi, views[i].lookup, views[i].image.roi)});
   const auto pixels = static_cast<std::size_t> (own.image.depth.width) *

@@ -22,7 +22,7 @@ equal_colours (const ConstRangeImage &image, int ax, int ay, int bx, int by)
   return a.r == b.r && a.g == b.g && a.b == b.b;
 }
 
-/* Pixels of one row of a view in another view: the loops that compilers make vectors of. */
+/* Pixels of one row of a view in another view: loops that compilers vectorize. */
 struct RowInOther {
   const PixelTransfer &transfer;
   float ray[3]; /* of the row's first pixel, in the other's plane */
@@ -42,7 +42,7 @@ struct RowInOther {
     }
   }
 
-  /* The planes there; of weight 0 where there is none. */
+  /* The planes at those places; weight 0 where there is none. */
   void gather (const SurfacePlanes &planes, int begin, int end) const
   {
     const auto right = static_cast<float> (planes.width ()) - 0.5f,
@@ -62,7 +62,7 @@ struct RowInOther {
     }
   }
 
-  /* Adds where the rays meet the planes.
+  /* Adds the intersections of the rays with the planes.
    *  @param closeness  weights are multiplied by (closeness * depth / depth of the other)^4
    *  @param range  how far that may be from depth, as a share of it */
   void meet (const float *depth, int begin, int end, float closeness, float range, float *sum,
@@ -96,7 +96,7 @@ DepthAgreement::find_others (std::span<const FusedView> views, std::size_t which
   others_.clear ();
   for (std::size_t i = 0; i < views.size (); i++) {
     const FusedView &other = views[i];
-    if (i == which || other.planes->width () == 0 || !may_share_surfaces (own, other))
+    if (i == which || other.planes->width () == 0 || !may_share_surfaces (own.rays, other.rays))
       continue;
     others_.push_back (
         {other.planes, PixelTransfer (own.rays, own.image.roi, other.lookup, other.image.roi),
@@ -104,7 +104,7 @@ DepthAgreement::find_others (std::span<const FusedView> views, std::size_t which
   }
 }
 
-/* What other views say of a row. @return false if that is nothing */
+/* Adds up the changes of depth that the other views suggest for a row. @return false if none */
 bool
 DepthAgreement::sum_row (const FusedView &own, int y)
 {

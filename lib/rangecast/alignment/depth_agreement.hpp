@@ -14,10 +14,10 @@ namespace rangecast {
  *  A pixel is moved along its own ray, to the weighted mean of its own depth and of where the ray
  *  meets the tangent planes that the other views have at the place. A view's weight falls with the
  *  fourth power of depth (the square of the error of stereo, z^2 / (focal length * baseline)), with
- *  the slant of its surface and towards its depth edges (SurfacePlane::weight). What lies farther
- *  apart counts less and beyond some pixel footprints not at all (Tukey's biweight), so depth has
- * no step where views begin to disagree. Pixels that are copies of a neighbour (equal depth and
- *  colour, as the neighbour code makes them) stay copies. */
+ *  the slant of its surface and towards its depth edges (SurfacePlane::weight). The
+ *  weight also falls with the distance, to 0 beyond some pixel footprints (Tukey's biweight), so
+ *  depth has no step where views begin to disagree. Pixels that are copies of a neighbour (equal
+ * depth and colour, as the neighbour code makes them) stay copies. */
 class DepthAgreement {
 public:
   /** Changes the depth of one image. Planes are of all images' depth before any was changed, so

@@ -18,17 +18,16 @@ struct FusedView {
   PixelLookup lookup;
   float focal_px = 1; ///< pixels
   float unit_m = 1;   ///< metres per depth unit
-  /** What its colours are multiplied with; none: they are not compared with those of other views.
-   */
+  /** Factors of its colours; without, they are not compared with those of other views. */
   std::optional<std::array<float, 3>> gains;
 };
 
-/** Whether two views may see one surface well: they are at most 120 degrees apart. */
+/** Whether two cameras may see one surface well: they are at most 120 degrees apart. */
 inline bool
-may_share_surfaces (const FusedView &a, const FusedView &b)
+may_share_surfaces (const PixelRays &a, const PixelRays &b)
 {
   constexpr float kMinAxes = -0.5f;
-  const float *p = a.rays.optical_axis, *q = b.rays.optical_axis;
+  const float *p = a.optical_axis, *q = b.optical_axis;
   return p[0] * q[0] + p[1] * q[1] + p[2] * q[2] >= kMinAxes;
 }
 

@@ -8,32 +8,33 @@
 #include "../base/cholesky.hpp"
 #include "../geometry/pixel_transfer.hpp"
 #include "../geometry/world_points.hpp"
+#include "fused_view.hpp"
 
 namespace rangecast {
 
 namespace {
 
 constexpr int kSamples = 1500;      ///< grid pixels of each view in a frame
-constexpr int kFirstSamples = 6000; ///< in the first frame,
-constexpr int kFirstRounds = 6;     ///< which is compared so often
-constexpr double kKept = 0.85;      ///< share of what older frames told that counts in the next one
-constexpr float kSeenThrough = 10;  ///< in footprints: farther before a surface is before it
-constexpr float kMinWeight = 0.1f;  ///< SurfacePlane::weight of points that are compared
-constexpr float kMinNormals = 0.7f; ///< cosine between the normals of one surface
-/* Views more than 120 degrees apart see no surface well together. */
-constexpr double kMinAxes = -0.5;
+constexpr int kFirstSamples = 6000; ///< of the first frame,
+constexpr int kFirstRounds = 6;     ///< which is compared this many times
+constexpr double kKept = 0.85;      ///< weight of older frames in the next one
+constexpr float kSeenThrough =
+    10; ///< footprints: distance at which a point is in front of a surface
+constexpr float kMinWeight = 0.1f;        ///< SurfacePlane::weight of points that are compared
+constexpr float kMinNormals = 0.7f;       ///< cosine between the normals of one surface
 constexpr float kFar = 2 * kMaxImageSide; ///< pixels: no view sees as far aside
-constexpr double kEnough = 100;           ///< points that say all there is to say of a pair
+constexpr double kEnough = 100;           ///< points; more do not add weight to a pair
 /* A pose is expected to be off by this, metres; the prior of no motion follows from it. */
 constexpr double kExpected = 0.003;
-/* Errors of depth are alike over large parts of a surface: so many of a pair's are independent. */
+/* Number of independent errors of a pair: they are alike over large parts of a surface. */
 constexpr double kIndependent = 8;
 constexpr double kMinError = 0.0003; ///< of depth, metres
-constexpr double kRadius = 0.15;     ///< metres: a turn moves the surface that much
+constexpr double kRadius = 0.15;     ///< metres: distance of the surface from the centre of turns
 constexpr double kMinPairWeight = 1; ///< of a pair that counts, points
-constexpr double kForgotten = 1e-6;  ///< points: what has faded to this is nothing
+constexpr double kFaded = 1e-6;      ///< points: less counts as 0
 constexpr double kMinAgreement = 0.3, kFullAgreement = 0.6; ///< of pairs that count
 
+/* Metres: rotations as the distance that they move the surface. */
 std::array<double, 6>
 as_array (const PoseCorrection &c)
 {
@@ -41,17 +42,11 @@ as_array (const PoseCorrection &c)
       kRadius * c.rotation.y, kRadius * c.rotation.z};
 }
 
-PoseCorrection
-as_correction (const std::array<double, 6> &v)
-{
-  return {{v[0], v[1], v[2]}, 1 / kRadius * Vec3{v[3], v[4], v[5]}};
-}
-
 Vec3
-limited (Vec3 v, double most)
+limited (Vec3 v, double max)
 {
   const double length = norm (v);
-  return length > most ? most / length * v : v;
+  return length > max ? max / length * v : v;
 }
 
 /* Rodrigues' formula. */
@@ -80,13 +75,13 @@ orthonormal (const Mat3 &m)
   return {a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z};
 }
 
-/* A camera with its pose corrected, for looking up points both ways. */
-struct Eye {
+/* A camera with its corrected pose, to map points both ways. */
+struct CameraLookup {
   PixelRays rays;
   PixelLookup lookup;
   float footprint; /* metres, of a pixel at depth 1 */
 
-  explicit Eye (const View &view)
+  explicit CameraLookup (const View &view)
       : rays (view), lookup (view),
         footprint (static_cast<float> (view.depth_unit_m / view.intrinsics.fx))
   {
@@ -107,27 +102,27 @@ length_of (const float v[3])
   return std::sqrt (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/* Whether a view sees background at a place and round it: no pixel has depth, but others of the row
- * have (rows of a lost slice say nothing). What another view sees there cannot be. @param u, v  of
- * the image's plane, which may be smaller than the picture */
+/* Whether a view sees background at a place and around it: no pixel has depth, but others of the
+ * row have (a row of a lost slice has none). Then the point of the other view is wrong.
+ * @param u, v  of the image's plane, which may be smaller than the image */
 bool
 is_background (const AlignedView &view, const View &camera, float u, float v, float z)
 {
   /* Pixels: an angle that most holes of stereo are smaller than. */
-  const int round = std::max (4, static_cast<int> (camera.intrinsics.fx / 50));
+  const int around = std::max (4, static_cast<int> (camera.intrinsics.fx / 50));
   const RangeImage &image = view.image;
   const float metres = z * static_cast<float> (camera.depth_unit_m);
   const int x = static_cast<int> (u + 0.5f) + image.roi.x,
             y = static_cast<int> (v + 0.5f) + image.roi.y;
-  if (image.depth.empty () || x < round || y < round || x + round >= camera.width ||
-      y + round >= camera.height || metres < static_cast<float> (camera.near_m) ||
+  if (image.depth.empty () || x < around || y < around || x + around >= camera.width ||
+      y + around >= camera.height || metres < static_cast<float> (camera.near_m) ||
       metres > static_cast<float> (camera.far_m))
     return false;
   const int own_row = y - image.roi.y;
   if (own_row < 0 || own_row >= view.planes->height () || !view.planes->is_used (own_row))
     return false;
-  for (int b = -round; b <= round; b += round / 4)
-    for (int a = -round; a <= round; a += round / 4) {
+  for (int b = -around; b <= around; b += around / 4)
+    for (int a = -around; a <= around; a += around / 4) {
       const int column = x + a - image.roi.x, row = y + b - image.roi.y;
       if (column >= 0 && row >= 0 && column < image.depth.width && row < image.depth.height &&
           image.depth.at (column, row) != kInvalidDepth)
@@ -214,7 +209,7 @@ PoseAlignment::find_centre (std::span<const AlignedView> views)
 struct PoseAlignment::Comparison {
   const AlignedView &from, &to;
   const View &camera; /* of `to` */
-  const Eye own, other;
+  const CameraLookup own, other;
   const PixelTransfer transfer;
   const Vec3 centre;
   Pair &pair;
@@ -234,13 +229,7 @@ struct PoseAlignment::Comparison {
       now[k] -= second[k];
   }
 
-  [[nodiscard]] bool may_overlap () const
-  {
-    const float *a = own.rays.optical_axis, *b = other.rays.optical_axis;
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] >= static_cast<float> (kMinAxes);
-  }
-
-  /* Looks a pixel up in the other view and counts what it finds there. */
+  /* Looks a pixel up in the other view and compares it with what is seen there. */
   void look_up (int x, int y)
   {
     const SurfacePlane &mine = from.planes->at (x, y);
@@ -262,7 +251,7 @@ struct PoseAlignment::Comparison {
       compare (x, y, h, static_cast<int> (column + 0.5f), static_cast<int> (row + 0.5f));
   }
 
-  /* A pixel with the other view's pixel u, v, where it is seen at h. */
+  /* Compares a pixel with pixel u, v of the other view, where it is seen at h. */
   void compare (int x, int y, const float (&h)[3], int u, int v)
   {
     const SurfacePlane &mine = from.planes->at (x, y), &theirs = to.planes->at (u, v);
@@ -279,7 +268,7 @@ struct PoseAlignment::Comparison {
                 off = distance / (kSurfaceFootprints * footprint);
     if (distance < -kSeenThrough * footprint)
       pair.through++;
-    if (std::abs (off) >= 1) /* behind: hidden, which says nothing */
+    if (std::abs (off) >= 1) /* behind: hidden, not a contradiction */
       return;
     const float full_x = static_cast<float> (from.image.roi.x + x),
                 full_y = static_cast<float> (from.image.roi.y + y);
@@ -295,7 +284,7 @@ struct PoseAlignment::Comparison {
         double{biweight} * biweight * std::sqrt (mine.weight * theirs.weight));
   }
 
-  /* To the pair's normal equations. */
+  /* Adds an observation to the pair's normal equations. */
   void add (Vec3 normal, Vec3 point, double distance, double weight)
   {
     const Vec3 arm = 1 / kRadius * cross (point - centre, normal);
@@ -317,7 +306,7 @@ void
 PoseAlignment::compare_pair (const AlignedView &from, const AlignedView &to, int samples)
 {
   Comparison comparison (*this, from, to);
-  if (!comparison.may_overlap ())
+  if (!may_share_surfaces (comparison.own.rays, comparison.other.rays))
     return;
   const int width = from.planes->width (), height = from.planes->height ();
   const double share = double (width) * height / samples;
@@ -330,18 +319,6 @@ PoseAlignment::compare_pair (const AlignedView &from, const AlignedView &to, int
       comparison.look_up (x, y);
 }
 
-void
-PoseAlignment::compare (std::span<const AlignedView> views, int samples)
-{
-  for (std::size_t i = 0; i < rig_.views.size (); i++)
-    now_.views[i].world_from_view =
-        corrected (rig_.views[i].world_from_view, correction (rig_.views[i].id));
-  for (const AlignedView &from : views)
-    for (const AlignedView &to : views)
-      if (from.image.view_id != to.image.view_id)
-        compare_pair (from, to, samples);
-}
-
 PairAgreement
 PoseAlignment::agreement (int first, int second) const
 {
@@ -351,7 +328,7 @@ PoseAlignment::agreement (int first, int second) const
   return {pair->points, pair->same + pair->through + pair->other_colour, pair->same};
 }
 
-/* Mean square of what the corrections leave of a pair's errors, square metres. */
+/* Mean square of a pair's errors after correction, square metres. */
 double
 PoseAlignment::variance (const Pair &pair) const
 {
@@ -415,8 +392,8 @@ PoseAlignment::solve ()
   set_gauge (views, linked);
 }
 
-/* Moves all views that share a surface with another one alike, until the median of each component
- * is 0. Of the others nothing is known. */
+/* Moves all views that share a surface with another one together, so that the median of each
+ * component is 0. The others have no correction. */
 void
 PoseAlignment::set_gauge (std::uint64_t views, std::uint64_t linked)
 {
@@ -436,18 +413,17 @@ PoseAlignment::set_gauge (std::uint64_t views, std::uint64_t linked)
     const int id = std::countr_zero (rest);
     const double *v = &right_[6 * number_among (views, id)];
     PoseCorrection &to = corrections_[static_cast<std::size_t> (id)];
-    to = as_correction ({v[0], v[1], v[2], v[3], v[4], v[5]});
-    to.translation = limited (to.translation, kMaxTranslation);
-    to.rotation = limited (to.rotation, kMaxRotation);
+    to.translation = limited ({v[0], v[1], v[2]}, kMaxTranslation);
+    to.rotation = limited (1 / kRadius * Vec3{v[3], v[4], v[5]}, kMaxRotation);
   }
 }
 
-/* Sums never reach 0 by themselves, but lose all meaning on their way. */
+/* Reduces the weight of older frames. Sums never reach 0 by themselves, but lose their meaning. */
 void
 PoseAlignment::fade (Pair &pair, double kept)
 {
-  const double counts = pair.points * kept < kForgotten ? 0 : kept,
-               sums = pair.weight * kept < kForgotten ? 0 : kept;
+  const double counts = pair.points * kept < kFaded ? 0 : kept,
+               sums = pair.weight * kept < kFaded ? 0 : kept;
   for (double *value : {&pair.points, &pair.same, &pair.through, &pair.other_colour})
     *value *= counts;
   for (double *value : {&pair.weight, &pair.square})
@@ -471,11 +447,15 @@ PoseAlignment::learn (std::span<const AlignedView> views)
     const double kept = first ? 0 : kKept;
     for (const AlignedView &a : views)
       for (const AlignedView &b : views)
-        if (a.image.view_id < b.image.view_id) {
-          Pair &pair = pairs_.get (a.image.view_id, b.image.view_id);
-          fade (pair, kept);
-        }
-    compare (views, first ? kFirstSamples : kSamples);
+        if (a.image.view_id < b.image.view_id)
+          fade (pairs_.get (a.image.view_id, b.image.view_id), kept);
+    for (std::size_t i = 0; i < rig_.views.size (); i++)
+      now_.views[i].world_from_view =
+          corrected (rig_.views[i].world_from_view, correction (rig_.views[i].id));
+    for (const AlignedView &from : views)
+      for (const AlignedView &to : views)
+        if (from.image.view_id != to.image.view_id)
+          compare_pair (from, to, first ? kFirstSamples : kSamples);
     solve ();
   }
 }

@@ -14,11 +14,11 @@
 
 namespace rangecast {
 
-/** One view of a frame set as alignment sees it. */
+/** One view of a frame set, to be aligned. */
 struct AlignedView {
   RangeImage image;
   const SurfacePlanes *planes = nullptr;
-  /** What its colours are multiplied with before they are compared; without, they are not. */
+  /** Factors of its colours in comparisons; without, they are not compared. */
   std::optional<std::array<float, 3>> gains;
 };
 
@@ -32,9 +32,9 @@ struct PoseCorrection {
   [[nodiscard]] double size () const;
 };
 
-/** How two views agree; older frames count less. */
+/** Statistics of two views' agreement; older frames count less. */
 struct PairAgreement {
-  double points = 0; ///< of one that were looked for in the other
+  double points = 0; ///< of one that were projected into the other
   /** Those that can be compared: the other one sees the same surface, or sees through them, to a
    *  farther surface or to the background. */
   double comparable = 0;
@@ -51,7 +51,7 @@ struct PairAgreement {
   }
 };
 
-/** Finds out how far the poses of a rig are off, from surfaces that several views see.
+/** Estimates the errors of a rig's poses from surfaces that several views see.
  *
  *  A grid of pixels of each view (another grid in each frame) is projected into the other views
  *  (projective data association, Blais and Levine 1995); where both see the same surface, the
@@ -64,32 +64,33 @@ struct PairAgreement {
  *  component: the world stays, and one view that is off is the one that moves. A view that shares
  *  none has no correction.
  *
- *  The same comparison tells how consistent views are: see agreement(). */
+ *  The same comparison measures how consistent views are: see agreement(). */
 class PoseAlignment {
 public:
   /** Limits, each for itself, of a correction's translation, metres, and rotation, radians. */
   static constexpr double kMaxTranslation = 0.012, kMaxRotation = 0.012;
 
-  /** Takes the cameras and forgets the stream. */
+  /** Sets the cameras and resets. */
   void set_rig (const Rig &rig);
+  /** Discards the corrections and all comparisons. */
   void reset ();
 
   /** Compares the views, and improves the corrections. Nothing is allocated once all views have
    *  been seen together. @param views  of known cameras, view-ids different */
   void learn (std::span<const AlignedView> views);
 
-  /** What to move a view by; nothing as long as it is unknown. */
+  /** Correction of a view; none as long as it is unknown. */
   [[nodiscard]] PoseCorrection correction (int view_id) const
   {
     return corrections_[static_cast<std::size_t> (view_id)];
   }
-  /** What corrections leave of the distances between views, metres (root mean square, weighted by
-   *  points): the error of depth. */
+  /** Error of depth: the distances between views after correction, metres (root mean square,
+   *  weighted by points). */
   [[nodiscard]] double depth_error () const { return depth_error_; }
   /** The pose of a view with a correction. */
   [[nodiscard]] Pose corrected (const Pose &world_from_view, const PoseCorrection &by) const;
 
-  /** What a pair of views has of each other's points. */
+  /** How two views see each other's points. */
   [[nodiscard]] PairAgreement agreement (int first, int second) const;
 
 private:
@@ -108,7 +109,6 @@ private:
   {
     return now_.views[static_cast<std::size_t> (index_[static_cast<std::size_t> (view_id)])];
   }
-  void compare (std::span<const AlignedView> views, int samples);
   void compare_pair (const AlignedView &from, const AlignedView &to, int samples);
   void solve ();
   [[nodiscard]] double variance (const Pair &pair) const;

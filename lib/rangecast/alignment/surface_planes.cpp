@@ -10,8 +10,8 @@ namespace rangecast {
 
 namespace {
 
-/* A plane is laid through neighbours at a distance of so many pixels: of 2 at a focal length of 400
- * pixels, so the same angle in all cameras. */
+/* A plane passes through neighbours at a distance of focal length / kFocalPerReach pixels, so at
+ * the same angle in all cameras. */
 constexpr float kFocalPerReach = 200;
 constexpr int kMinReach = 2, kMaxReach = 7;
 constexpr float kMinCosine2 = 0.14f; ///< squared, of 68 degrees
@@ -21,7 +21,7 @@ constexpr float kMaxBend = 1;
 
 } // namespace
 
-/* Branchless: compilers make vectors of it. */
+/* Branchless, so that compilers vectorize it. */
 void
 SurfacePlanes::make_row (const ConstRangeImage &image, int y, float focal_px)
 {
@@ -103,16 +103,13 @@ SurfacePlanes::make (const ConstRangeImage &image, float focal_px)
   if (sums_.size () < width)
     sums_.resize (width);
   std::fill_n (smooth_.begin (), size, std::uint8_t{0});
-  const auto clear_row = [&] (int y) {
-    std::fill_n (planes_.begin () + static_cast<std::ptrdiff_t> (y) * width_, width,
-        SurfacePlane{0, 0, 0, 0});
-  };
   for_this_cpu ([&] {
     for (int y = 0; y < height_; y++)
       if (y >= reach_ && y < height_ - reach_ && width_ > 2 * reach_)
         make_row (image, y, focal_px);
       else
-        clear_row (y);
+        std::fill_n (planes_.begin () + static_cast<std::ptrdiff_t> (y) * width_, width,
+            SurfacePlane{0, 0, 0, 0});
     for (int y = 0; y < height_; y++)
       fade_row (y);
   });

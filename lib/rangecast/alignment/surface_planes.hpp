@@ -9,7 +9,7 @@
 
 namespace rangecast {
 
-/** What two views see of one surface lies no further apart than this, in footprints of a pixel. A
+/** Maximum distance between what two views see of one surface, in footprints of a pixel. A
  *  footprint grows with z as the error of stereo does with z^2 / (focal length * baseline). */
 inline constexpr float kSurfaceFootprints = 6;
 /** Two pixels of one surface differ by less in R, G and B, grey levels: beside an edge they mix
@@ -26,7 +26,7 @@ inline constexpr float kMinPatchDifference = 40;
 struct SurfacePlane {
   float depth;        ///< mean of the pixels round it, depth units
   float across, down; ///< minus the change of depth from pixel to pixel, depth units
-  float weight;       ///< how sure the view is of its surface there, 0 .. 1; 0: no plane
+  float weight;       ///< confidence, 0 .. 1; 0: no plane
 
   [[nodiscard]] float constant (float x, float y) const { return depth - across * x - down * y; }
 };
@@ -40,7 +40,7 @@ public:
    * than all before.
    *  @param focal_px  focal length, pixels */
   void make (const ConstRangeImage &image, float focal_px);
-  /** Makes a pixel one without a plane. Does nothing outside the image. */
+  /** Removes the plane of a pixel. Does nothing outside of the image. */
   void clear (int x, int y)
   {
     if (x < width_ && y < height_)
@@ -48,7 +48,7 @@ public:
               static_cast<std::size_t> (x)]
           .weight = 0;
   }
-  /** Forgets them: an image without pixels. */
+  /** Removes all planes, as of an image without pixels. */
   void clear () { width_ = height_ = 0; }
 
   [[nodiscard]] int width () const { return width_; }

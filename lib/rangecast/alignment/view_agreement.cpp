@@ -13,17 +13,26 @@ namespace rangecast {
 namespace {
 
 constexpr std::uint32_t kLearnEvery = 3; ///< frame sets
-/* Stereo errs alike in large parts of a picture, so a pose may seem off by as much as depth is: a
- * rig stays as it is until a view needs more than this, metres, and so many standard errors of
- * depth. */
+/* Errors of stereo are alike in large parts of an image, so a pose may seem wrong by as much as
+ * depth is: a rig is not corrected until a view needs more than this, metres, and this many
+ * standard errors of depth. */
 constexpr double kNeedsCorrection = 0.001, kErrorsOff = 3;
 constexpr double kStaysCorrected = 0.6; ///< share of that
-/* A new rig makes everybody downstream negotiate again: not for less than this, metres, nor more
- * often than every so many frame sets. */
+/* A new rig makes downstream renegotiate: not for a smaller change than this, metres, nor more
+ * often than once in this many frame sets. */
 constexpr double kMinChange = 0.0004;
 constexpr std::uint32_t kChangeEvery = 15;
 constexpr double kConfirmed = 30; ///< points of a pair that confirm both views
 constexpr double kMaxContradictedAgain = 0.04;
+
+/* Whether a view contradicts those that it is compared with. */
+bool
+contradicts (const PairAgreement &sum, bool left_out)
+{
+  const double max = left_out ? kMaxContradictedAgain : ViewAgreement::kMaxContradicted,
+               min = left_out ? ViewAgreement::kConsistentAgain : ViewAgreement::kMinConsistency;
+  return sum.comparable - sum.same > max * sum.points && sum.share () < min;
+}
 
 } // namespace
 
@@ -61,19 +70,7 @@ ViewAgreement::view_of (const RangeImage &image) const
   return rig_.views[static_cast<std::size_t> (index)];
 }
 
-void
-ViewAgreement::prepare (std::span<const RangeImage> images, int threads)
-{
-  in_parallel (images.size (), threads, [&] (std::size_t i) {
-    planes_[i].make (images[i], static_cast<float> (view_of (images[i]).intrinsics.fx));
-  });
-  aligned_.clear ();
-  for (std::size_t i = 0; i < images.size (); i++)
-    aligned_.push_back (
-        {images[i], &planes_[i], gains_[static_cast<std::size_t> (images[i].view_id)]});
-}
-
-/* Takes what is known of the poses into use, if that matters. */
+/* Corrects the rig by the poses that are known, if that makes a difference. */
 void
 ViewAgreement::correct_rig (bool poses)
 {
@@ -126,15 +123,6 @@ ViewAgreement::contradictions_of (std::uint64_t views) const
   return sum;
 }
 
-/* Whether a view contradicts those that it is compared with. */
-static bool
-contradicts (const PairAgreement &sum, bool left_out)
-{
-  const double most = left_out ? kMaxContradictedAgain : ViewAgreement::kMaxContradicted,
-               least = left_out ? ViewAgreement::kConsistentAgain : ViewAgreement::kMinConsistency;
-  return sum.comparable - sum.same > most * sum.points && sum.share () < least;
-}
-
 /* Whether two of these views confirm each other. */
 bool
 ViewAgreement::has_good_pair (std::uint64_t trusted) const
@@ -148,8 +136,8 @@ ViewAgreement::has_good_pair (std::uint64_t trusted) const
   return false;
 }
 
-/* Of the views that are contradicted the one goes first without which the others contradict each
- * other least. */
+/* Finds the views to leave out: of those that are contradicted, first the one without which the
+ * others contradict each other least. */
 void
 ViewAgreement::evaluate_views (std::span<const RangeImage> images)
 {
@@ -172,7 +160,7 @@ ViewAgreement::evaluate_views (std::span<const RangeImage> images)
       break;
     trusted = rest_of_best;
   }
-  /* Who agreed with none but a bad view is no worse for it. */
+  /* A view whose only disagreement was with a bad one is kept. */
   for (std::uint64_t rest = all & ~trusted; rest; rest &= rest - 1) {
     const int id = std::countr_zero (rest);
     if (!contradicts (agreement_among (id, trusted), of_[static_cast<std::size_t> (id)].left_out))
@@ -186,21 +174,7 @@ ViewAgreement::evaluate_views (std::span<const RangeImage> images)
   }
 }
 
-static void
-clear_depth (const RangeImage &image)
-{
-  for (int y = 0; y < image.depth.height; y++)
-    std::fill_n (image.depth.row (y), image.depth.width, kInvalidDepth);
-}
-
-void
-ViewAgreement::clear_contradicted (std::span<const RangeImage> images, int threads)
-{
-  in_parallel (images.size (), threads, [&] (std::size_t i) { contradicted_[i].find (fused_, i); });
-  for (std::size_t i = 0; i < images.size (); i++)
-    contradicted_points_ += contradicted_[i].clear (images[i], planes_[i]);
-}
-
+/* Clears contradicted points, and moves depth of one surface together. */
 void
 ViewAgreement::fuse (std::span<const RangeImage> images, const AgreementSettings &settings)
 {
@@ -211,8 +185,12 @@ ViewAgreement::fuse (std::span<const RangeImage> images, const AgreementSettings
         static_cast<float> (view.intrinsics.fx), static_cast<float> (view.depth_unit_m),
         gains_[static_cast<std::size_t> (images[i].view_id)]});
   }
-  if (settings.points)
-    clear_contradicted (images, settings.threads);
+  if (settings.points) {
+    in_parallel (images.size (), settings.threads,
+        [&] (std::size_t i) { contradicted_[i].find (fused_, i); });
+    for (std::size_t i = 0; i < images.size (); i++)
+      contradicted_points_ += contradicted_[i].clear (images[i], planes_[i]);
+  }
   if (!settings.depth)
     return;
   workers_.reserve (workers_for (images.size (), settings.threads));
@@ -226,8 +204,14 @@ ViewAgreement::work (std::span<const RangeImage> images, const AgreementSettings
   const bool several = images.size () > 1,
              learns = several && (settings.poses || settings.views) && frame_ % kLearnEvery == 0;
   if (learns || (several && settings.depth))
-    prepare (images, settings.threads);
+    in_parallel (images.size (), settings.threads, [&] (std::size_t i) {
+      planes_[i].make (images[i], static_cast<float> (view_of (images[i]).intrinsics.fx));
+    });
   if (learns) {
+    aligned_.clear ();
+    for (std::size_t i = 0; i < images.size (); i++)
+      aligned_.push_back (
+          {images[i], &planes_[i], gains_[static_cast<std::size_t> (images[i].view_id)]});
     poses_.learn (aligned_);
     evaluate_views (images);
   }
@@ -240,7 +224,8 @@ ViewAgreement::work (std::span<const RangeImage> images, const AgreementSettings
   for (std::size_t i = 0; i < images.size (); i++) {
     if (!of_[static_cast<std::size_t> (images[i].view_id)].left_out)
       continue;
-    clear_depth (images[i]);
+    for (int y = 0; y < images[i].depth.height; y++)
+      std::fill_n (images[i].depth.row (y), images[i].depth.width, kInvalidDepth);
     planes_[i].clear ();
   }
   if (several && (settings.points || settings.depth))

@@ -23,7 +23,7 @@ struct AgreementSettings {
   int threads = 1;    ///< views at a time; 0 = number of cores
 };
 
-/** What is known of one view. */
+/** Result for one view. */
 struct ViewConsistency {
   PoseCorrection correction; ///< in use
   double consistency = 1;    ///< share of its comparable points that agree with the others, 0 .. 1
@@ -36,21 +36,21 @@ struct ViewConsistency {
  *
  *  A view is left out if other views contradict more than kMaxContradicted of its points, if less
  *  than kMinConsistency of its comparable points agree with theirs, and if some of the others
- *  confirm each other (kGoodPair); it is back at half of that, or at kConsistentAgain. Comparisons
- *  of about 20 frame sets count, so views do not come and go. Of two views nobody knows which is
- *  wrong: both stay. */
+ *  confirm each other (kGoodPair); it returns at half of that, or at kConsistentAgain. Comparisons
+ *  of about 20 frame sets count, so views do not come and go. Of two views that contradict each
+ *  other both stay. */
 class ViewAgreement {
 public:
   static constexpr double kMaxContradicted = 0.08, kMinConsistency = 0.35, kConsistentAgain = 0.55,
                           kGoodPair = 0.6;
 
-  /** Takes the cameras, and forgets the stream. */
+  /** Sets the cameras and resets. */
   Status set_rig (const Rig &rig);
-  /** Forgets the stream; corrections go. */
+  /** Discards the corrections and all comparisons, and brings views back that were left out. */
   void reset ();
 
-  /** What a view's colours are multiplied with afterwards. Those of two views are compared only if
-   *  both have gains: nobody knows what unlike cameras make of one colour. */
+  /** Sets the factors that a view's colours are multiplied with afterwards. Those of two views are
+   *  compared only if both have gains: cameras that are not balanced see one colour differently. */
   void set_gains (int view_id, const std::optional<std::array<float, 3>> &gains)
   {
     gains_[static_cast<std::size_t> (view_id)] = gains;
@@ -65,7 +65,7 @@ public:
 
   /** The rig of set_rig(), uncorrected. */
   [[nodiscard]] const Rig &nominal_rig () const { return nominal_; }
-  /** The rig as it is now believed to be. */
+  /** The rig with the present corrections. */
   [[nodiscard]] const Rig &rig () const { return rig_; }
   /** Whether process() changed it in the last call. */
   [[nodiscard]] bool rig_changed () const { return rig_changed_; }
@@ -78,14 +78,12 @@ public:
   }
 
 private:
-  void prepare (std::span<const RangeImage> images, int threads);
   void correct_rig (bool poses);
   void evaluate_views (std::span<const RangeImage> images);
   [[nodiscard]] PairAgreement agreement_among (int id, std::uint64_t trusted) const;
   [[nodiscard]] double contradictions_of (std::uint64_t views) const;
   [[nodiscard]] bool has_good_pair (std::uint64_t trusted) const;
   [[nodiscard]] const View &view_of (const RangeImage &image) const;
-  void clear_contradicted (std::span<const RangeImage> images, int threads);
   void fuse (std::span<const RangeImage> images, const AgreementSettings &settings);
   void work (std::span<const RangeImage> images, const AgreementSettings &settings);
 

@@ -11,7 +11,7 @@
 namespace rangecast {
 namespace {
 
-constexpr int kFewestCharucoCorners = 6;
+constexpr int kMinCharucoCorners = 6;
 /* Chessboards are searched in images scaled down to this size, pixels; corners are refined at full
  * size. */
 constexpr int kSearchSide = 1024;
@@ -230,7 +230,7 @@ struct BoardDetector::Charuco {
   void detect (const cv::Mat &picture, std::vector<BoardCorner> &corners) const
   {
     find_corners (picture, corners);
-    if (corners.size () < kFewestCharucoCorners ||
+    if (corners.size () < kMinCharucoCorners ||
         !spans_a_plane (corners, board->getChessboardSize ().width - 1))
       corners.clear ();
   }

@@ -61,9 +61,9 @@ struct CornerError {
 };
 
 /* Ends the adjustment when the token requests it. */
-class StopWhenAsked : public ceres::IterationCallback {
+class StopCallback : public ceres::IterationCallback {
 public:
-  explicit StopWhenAsked (std::stop_token stop) : stop_ (std::move (stop)) {}
+  explicit StopCallback (std::stop_token stop) : stop_ (std::move (stop)) {}
   ceres::CallbackReturnType operator() (const ceres::IterationSummary &) override
   {
     return stop_.stop_requested () ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
@@ -115,7 +115,7 @@ public:
     options.parameter_tolerance = 1e-10;
     options.num_threads = std::clamp (int (std::thread::hardware_concurrency ()), 1, kMaxThreads);
     options.logging_type = ceres::SILENT;
-    StopWhenAsked callback (stop);
+    StopCallback callback (stop);
     options.callbacks.push_back (&callback);
     ceres::Solver::Summary summary;
     ceres::Solve (options, &problem_, &summary);

@@ -6,7 +6,7 @@
 namespace rangecast {
 namespace {
 
-constexpr int kFewestCommonCorners = 4;
+constexpr int kMinCommonCorners = 4;
 
 int
 common_corners (const Sighting &a, const Sighting &b)
@@ -57,7 +57,7 @@ shared_frames (const std::vector<CalibrationFrame> &frames, int a, int b)
 {
   return int (std::ranges::count_if (frames, [&] (const CalibrationFrame &frame) {
     const Sighting *first = frame.find (a), *second = frame.find (b);
-    return first && second && common_corners (*first, *second) >= kFewestCommonCorners;
+    return first && second && common_corners (*first, *second) >= kMinCommonCorners;
   }));
 }
 

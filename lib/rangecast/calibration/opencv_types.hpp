@@ -29,12 +29,6 @@ pose_from_opencv (const cv::Mat &rotation, const cv::Mat &translation)
 }
 
 inline cv::Matx33d
-opencv_matrix (const Mat3 &m)
-{
-  return cv::Matx33d (m.data ());
-}
-
-inline cv::Matx33d
 camera_matrix (const LensParameters &lens)
 {
   return {lens[0], 0, lens[2], 0, lens[1], lens[3], 0, 0, 1};

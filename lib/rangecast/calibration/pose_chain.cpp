@@ -110,8 +110,7 @@ Status
 check_linked (
     const std::vector<CalibrationCamera> &cameras, const std::vector<CalibrationFrame> &frames)
 {
-  const std::vector<int> groups =
-      linked_groups (int (cameras.size ()), frames, kFewestSharedFrames);
+  const std::vector<int> groups = linked_groups (int (cameras.size ()), frames, kMinSharedFrames);
   const int count = cameras.empty () ? 0 : *std::ranges::max_element (groups) + 1;
   if (count <= 1)
     return {};
@@ -126,7 +125,7 @@ check_linked (
       }
   }
   return {StatusCode::kNotFound,
-      text + "; expected at least " + std::to_string (kFewestSharedFrames) +
+      text + "; expected at least " + std::to_string (kMinSharedFrames) +
           " frames in which a camera of each group sees the board at the same time"};
 }
 

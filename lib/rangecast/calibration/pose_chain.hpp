@@ -14,7 +14,7 @@ struct CameraLink {
 };
 
 /** Minimum number of common frames of two linked cameras. */
-inline constexpr int kFewestSharedFrames = 3;
+inline constexpr int kMinSharedFrames = 3;
 
 /** Estimates initial poses of all cameras and boards from known lenses. Cameras are linked along a
  *  maximum spanning tree, weighted by the number of common boards. Method for a link:

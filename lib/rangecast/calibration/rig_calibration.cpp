@@ -48,21 +48,14 @@ find_camera (const std::vector<CalibrationCamera> &cameras, int view_id, CameraR
   return -1;
 }
 
-/* Relative rotation about the optical axis, degrees, -180 .. 180. */
-double
-roll_deg (const Pose &right_from_left)
-{
-  const Vec3 x = right_from_left.rotation * Vec3{1, 0, 0};
-  return std::atan2 (x.y, x.x) * 180 / M_PI;
-}
-
 /* Checks that both cameras are the same way up, and the right one is on the left one's +x side. */
 Status
 check_pair (
     const CalibrationCamera &left, const CalibrationCamera &right, const Pose &right_from_left)
 {
   const std::string view = "view " + std::to_string (left.view_id) + ": ";
-  const double roll = roll_deg (right_from_left);
+  const Vec3 x = right_from_left.rotation * Vec3{1, 0, 0};
+  const double roll = std::atan2 (x.y, x.x) * 180 / M_PI; /* about the optical axis, degrees */
   char text[64];
   if (std::abs (roll) > kMaxRollDeg) {
     std::snprintf (text, sizeof text, "%.0f degrees", roll);
@@ -330,7 +323,7 @@ Calibration::row_error (int left, int right) const
   cv::Mat r1, r2, p1, p2, q;
   std::vector<double> errors;
   cv::stereoRectify (camera_matrix (l), coefficients (l), camera_matrix (r), coefficients (r),
-      {cameras_[left].width, cameras_[left].height}, opencv_matrix (right_from_left.rotation),
+      {cameras_[left].width, cameras_[left].height}, cv::Matx33d (right_from_left.rotation.data ()),
       cv::Vec3d (t.x, t.y, t.z), r1, r2, p1, p2, q, cv::CALIB_ZERO_DISPARITY, 0);
   for (const CalibrationFrame &frame : frames_) {
     const Sighting *a = frame.find (left), *b = frame.find (right);

@@ -27,7 +27,7 @@ struct BoardPlace {
 struct CameraCoverage {
   static constexpr int kColumns = 4, kRows = 3;
 
-  int frames = 0;                             ///< taken frames in which this camera saw the board
+  int frames = 0;                             ///< frames kept in which this camera saw the board
   std::array<bool, kColumns * kRows> cells{}; ///< cells of the image with a corner, row-major
   bool tilted_left = false, tilted_right = false, tilted_up = false, tilted_down = false;
   bool distances = false; ///< boards of clearly different sizes

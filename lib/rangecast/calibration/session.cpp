@@ -23,7 +23,7 @@ CalibrationSession::set (const SessionSettings &settings)
         "max-frames is " + std::to_string (settings.selection.max_frames) +
             "; expected at least min-frames, " + std::to_string (c.min_frames)};
   settings_ = settings;
-  eyes_.clear ();
+  states_.clear ();
   cameras_.clear ();
   selector_.set (settings.calibration.board, settings.selection);
   verdict_ = FrameVerdict::kNoBoard;
@@ -34,7 +34,7 @@ void
 CalibrationSession::clear ()
 {
   selector_.clear ();
-  eyes_.clear ();
+  states_.clear ();
   cameras_.clear ();
   verdict_ = FrameVerdict::kNoBoard;
 }
@@ -47,40 +47,40 @@ CalibrationSession::examine (const std::vector<CalibrationCamera> &cameras,
       !std::equal (cameras_.begin (), cameras_.end (), cameras.begin ()))
     clear (); /* one was removed or replaced */
   cameras_ = cameras;
-  while (eyes_.size () < cameras.size ()) {
-    eyes_.push_back (std::make_unique<Eye> ());
-    if (Status s = eyes_.back ()->detector.set (settings_.calibration.board, settings_.thorough);
+  while (states_.size () < cameras.size ()) {
+    states_.push_back (std::make_unique<CameraState> ());
+    if (Status s = states_.back ()->detector.set (settings_.calibration.board, settings_.thorough);
         !s.ok ())
       return s;
   }
   in_parallel_with_opencv (cameras.size (), 0, [&] (std::size_t i) {
-    Eye &eye = *eyes_[i];
-    eye.corners.clear ();
-    eye.status = {};
+    CameraState &state = *states_[i];
+    state.corners.clear ();
+    state.status = {};
     if (!pictures[i].empty ())
-      eye.status = eye.detector.detect (pictures[i], eye.corners, eye.edge_width);
+      state.status = state.detector.detect (pictures[i], state.corners, state.edge_width);
   });
   CalibrationFrame frame;
   frame.number = number;
   std::vector<double> edge_widths;
   for (std::size_t i = 0; i < cameras.size (); i++) {
-    if (!eyes_[i]->status.ok ())
-      return eyes_[i]->status;
-    if (eyes_[i]->corners.empty ())
+    if (!states_[i]->status.ok ())
+      return states_[i]->status;
+    if (states_[i]->corners.empty ())
       continue;
-    frame.sightings.push_back ({int (i), eyes_[i]->corners});
-    edge_widths.push_back (eyes_[i]->edge_width);
+    frame.sightings.push_back ({int (i), states_[i]->corners});
+    edge_widths.push_back (states_[i]->edge_width);
   }
   verdict_ = selector_.offer (cameras, std::move (frame), edge_widths, time_ns);
-  for (const auto &eye : eyes_)
-    eye->seen[int (verdict_)] += !eye->corners.empty ();
+  for (const auto &state : states_)
+    state->seen[int (verdict_)] += !state->corners.empty ();
   return {};
 }
 
 std::vector<int>
 CalibrationSession::groups () const
 {
-  return linked_groups (int (cameras_.size ()), selector_.frames (), kFewestSharedFrames);
+  return linked_groups (int (cameras_.size ()), selector_.frames (), kMinSharedFrames);
 }
 
 bool
@@ -108,10 +108,10 @@ CalibrationSession::draw (
     TileContents contents;
     if (i < int (cameras_.size ())) {
       contents.picture = pictures[i];
-      contents.corners = eyes_[i]->corners;
+      contents.corners = states_[i]->corners;
       contents.columns = settings_.calibration.board.columns;
       contents.coverage = coverage (i);
-      contents.taken = verdict_ == FrameVerdict::kTaken && !eyes_[i]->corners.empty ();
+      contents.taken = verdict_ == FrameVerdict::kTaken && !states_[i]->corners.empty ();
     }
     draw_tile (contents,
         out.crop (i % layout.columns * layout.tile_width, i / layout.columns * layout.tile_height,
@@ -124,10 +124,10 @@ Status
 CalibrationSession::check_kept () const
 {
   for (std::size_t i = 0; i < cameras_.size (); i++) {
-    const auto &seen = eyes_[i]->seen;
+    const auto &seen = states_[i]->seen;
     const int all = std::reduce (seen.begin (), seen.end ());
     const int kept = coverage (int (i)).frames, wanted = settings_.calibration.min_frames;
-    if (eyes_[i]->detector.is_mirrored ())
+    if (states_[i]->detector.is_mirrored ())
       return {StatusCode::kBadValue,
           text_of (cameras_[i]) +
               ": its images are mirrored; switch off the camera's mirror mode, or use videoflip"};

@@ -38,7 +38,7 @@ public:
   [[nodiscard]] FrameVerdict verdict () const { return verdict_; }
   [[nodiscard]] const std::vector<BoardCorner> &corners (int camera) const
   {
-    return eyes_[camera]->corners;
+    return states_[camera]->corners;
   }
   /** @} */
 
@@ -61,7 +61,7 @@ public:
   Status calibrate (CalibrationResult &result, std::stop_token stop = {}) const;
 
 private:
-  struct Eye {
+  struct CameraState {
     BoardDetector detector;
     std::vector<BoardCorner> corners;
     double edge_width = 0;
@@ -72,7 +72,7 @@ private:
 
   SessionSettings settings_;
   std::vector<CalibrationCamera> cameras_;
-  std::vector<std::unique_ptr<Eye>> eyes_; // by camera
+  std::vector<std::unique_ptr<CameraState>> states_; // by camera
   FrameSelector selector_;
   FrameVerdict verdict_ = FrameVerdict::kNoBoard;
 };

@@ -29,7 +29,7 @@ struct TileContents {
   std::span<const BoardCorner> corners;
   int columns = 0;         ///< of the board, for the colours of its rows
   CameraCoverage coverage; ///< cells without a corner are framed
-  bool taken = false;      ///< the set was taken: green frame
+  bool taken = false;      ///< the frame was kept: green border
 };
 
 /** Draws a tile, unless it is empty. */

@@ -8,16 +8,17 @@
 #include "../base/simd.hpp"
 
 namespace rangecast {
+namespace {
 
 /* Below this ratio of the two largest variances the points are as good as round. */
 constexpr double kMinSpreadRatio = 1.3;
-/* Share of the new frame's axis: little where it is nearly the same, which is noise, and most of it
- * where it is that far off, which is motion. Three frames after a step a tenth of it is left. */
+/* Weight of the new frame's axis, from `min` where it is nearly the same, which is noise, to `max`
+ * where it is `far` off, which is motion. Three frames after a step a tenth of it is left. */
 struct Follow {
-  double least, most, far;
+  double min, max, far;
   [[nodiscard]] double share (double off) const
   {
-    return least + (most - least) * std::min (1.0, off / far);
+    return min + (max - min) * std::min (1.0, off / far);
   }
 };
 constexpr Follow kFollowPosition{0.2, 0.8, 0.02};             /* metres */
@@ -56,6 +57,38 @@ struct MomentsLoop {
   }
 };
 
+/* One Jacobi rotation that makes a[p][q] zero; v collects the eigenvectors in its columns. */
+void
+rotate (double (&a)[3][3], double (&v)[3][3], int p, int q)
+{
+  if (a[p][q] == 0)
+    return;
+  const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+  const double t = (theta >= 0 ? 1 : -1) / (std::abs (theta) + std::sqrt (theta * theta + 1));
+  const double c = 1 / std::sqrt (t * t + 1), s = t * c;
+  for (auto &row : a)
+    std::tie (row[p], row[q]) = std::pair (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+  for (int k = 0; k < 3; k++)
+    std::tie (a[p][k], a[q][k]) = std::pair (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
+  for (auto &row : v)
+    std::tie (row[p], row[q]) = std::pair (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+}
+
+/* The largest |cosine| between a direction and a camera's optical axis: 1 = some camera looks along
+ * it. */
+double
+max_cosine (Vec3 direction, std::span<const PixelRays> cameras)
+{
+  double max = 0;
+  for (const PixelRays &camera : cameras) {
+    const float *a = camera.optical_axis;
+    max = std::max (max, std::abs (dot (direction, {a[0], a[1], a[2]})));
+  }
+  return max;
+}
+
+} // namespace
+
 void
 Moments::add (const WorldPoints &points, WorldPoints::Part part)
 {
@@ -85,23 +118,6 @@ Moments::centroid () const
   return n > 0 ? Vec3{sum[0] / n, sum[1] / n, sum[2] / n} : Vec3{};
 }
 
-/* One Jacobi rotation that makes a[p][q] zero; v collects the eigenvectors in its columns. */
-static void
-rotate (double (&a)[3][3], double (&v)[3][3], int p, int q)
-{
-  if (a[p][q] == 0)
-    return;
-  const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-  const double t = (theta >= 0 ? 1 : -1) / (std::abs (theta) + std::sqrt (theta * theta + 1));
-  const double c = 1 / std::sqrt (t * t + 1), s = t * c;
-  for (auto &row : a)
-    std::tie (row[p], row[q]) = std::pair (c * row[p] - s * row[q], s * row[p] + c * row[q]);
-  for (int k = 0; k < 3; k++)
-    std::tie (a[p][k], a[q][k]) = std::pair (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
-  for (auto &row : v)
-    std::tie (row[p], row[q]) = std::pair (c * row[p] - s * row[q], s * row[p] + c * row[q]);
-}
-
 void
 eigen_symmetric (const double (&m)[6], double (&values)[3], Vec3 (&vectors)[3])
 {
@@ -116,18 +132,6 @@ eigen_symmetric (const double (&m)[6], double (&values)[3], Vec3 (&vectors)[3])
     values[k] = a[order[k]][order[k]];
     vectors[k] = {v[0][order[k]], v[1][order[k]], v[2][order[k]]};
   }
-}
-
-/* How nearly a camera looks along that direction: the largest |cosine| of all. */
-static double
-end_on (Vec3 direction, std::span<const PixelRays> cameras)
-{
-  double most = 0;
-  for (const PixelRays &camera : cameras) {
-    const float *a = camera.optical_axis;
-    most = std::max (most, std::abs (dot (direction, {a[0], a[1], a[2]})));
-  }
-  return most;
 }
 
 Axis
@@ -147,8 +151,8 @@ axis_of_points (AxisMode mode, const Moments &moments, std::span<const PixelRays
   if (!(values[0] > kMinSpreadRatio * values[1]) || !(values[0] > 1e-12))
     return axis;
   const Vec3 direction = vectors[0].y < 0 ? -1.0 * vectors[0] : vectors[0];
-  const double along = end_on (direction, cameras);
-  if (along > 0.8 && along > end_on (axis.direction, cameras))
+  const double along = max_cosine (direction, cameras);
+  if (along > 0.8 && along > max_cosine (axis.direction, cameras))
     return axis;
   axis.direction = direction;
   return axis;

@@ -36,17 +36,17 @@ struct Moments {
  *  cyclic Jacobi rotations. */
 void eigen_symmetric (const double (&matrix)[6], double (&values)[3], Vec3 (&vectors)[3]);
 
-/** The axis of this frame's points alone: the principal axis, or world y where the points have no
- *  direction of largest spread (its variance is under 1.3 times the next one's), or where some
- * camera looks along that direction more than any looks along y: a camera sees no slices end on. */
+/** The axis of one frame's points: the principal axis; world y where the points have no direction
+ * of largest spread (its variance is less than 1.3 times the next one's), or where a camera looks
+ *  along it more nearly than any camera looks along y: a camera cannot see slices along the axis.
+ */
 [[nodiscard]] Axis axis_of_points (
     AxisMode mode, const Moments &moments, std::span<const PixelRays> cameras);
 
-/** Follows the axis from frame to frame, so that neither noise nor a raised arm makes cells jump.
- */
+/** Smooths the axis over time, so that neither noise nor a raised arm makes cells jump. */
 class AxisTracker {
 public:
-  /** Takes in one frame's axis; the first is taken as it is. */
+  /** Updates the axis with that of a new frame; the first one is used unchanged. */
   const Axis &follow (const Axis &measured);
   void reset () { started_ = false; }
   [[nodiscard]] bool started () const { return started_; }

@@ -22,7 +22,7 @@ template <typename L> struct CellRows::RowLoops {
   CellRows &rows;
   const RowRules &rules;
 
-  /* What a row's block adds up of another row of its slice. */
+  /* Tangents, and views left and right of a block of a row. */
   struct Sum {
     F x, z;
     U left[2], right[2];
@@ -47,9 +47,9 @@ template <typename L> struct CellRows::RowLoops {
       const F radius = L::at (&rows.radius_[here]);
       Sum sum = {L::at (&rows.tangent_[0][here]), L::at (&rows.tangent_[1][here]), {}, {}};
       if (L::any (radius < kNoRadius)) {
-        const F least = 1e-6f + F{};
-        const F reach = rules.smoothing_columns / (radius > least ? radius : least);
-        for (int d = 1; static_cast<float> (d) <= rules.most_columns; d++) {
+        const F tiny = 1e-6f + F{};
+        const F reach = rules.smoothing_columns / (radius > tiny ? radius : tiny);
+        for (int d = 1; static_cast<float> (d) <= rules.max_columns; d++) {
           const I near = reach >= static_cast<float> (d);
           if (!L::any (near))
             break;
@@ -105,7 +105,7 @@ template <typename L> struct CellRows::RowLoops {
     for (int c = 0; c < rows.columns_; c += kLanes) {
       const std::size_t here = std::size_t{row} * rows.width_ + kPad + c;
       const F radius = L::at (&rows.radius_[here]);
-      if (!L::any (radius < kNoRadius)) /* nobody looks at what is in an empty node */
+      if (!L::any (radius < kNoRadius)) /* empty nodes are not read */
         continue;
       F x = L::at (&rows.sum_[0][here]), z = L::at (&rows.sum_[1][here]);
       U below[2] = {}, above[2] = {};
@@ -124,7 +124,7 @@ template <typename L> struct CellRows::RowLoops {
     }
   }
 
-  /* Where no tangent is known the circle's takes its place. */
+  /* Scales a tangent to unit length; the circle's where it is not known. */
   void normalise (F &x, F &z, int column) const
   {
     F length = x * x + z * z;
@@ -137,7 +137,7 @@ template <typename L> struct CellRows::RowLoops {
 
   /* ---- decisions ---- */
 
-  /* Who held each node of a row: the winner of the layer whose radius was nearest. */
+  /* The previous winner of each node of a row: that of the layer whose radius was nearest. */
   void find_held (std::uint32_t row, const Slice &slice) const
   {
     const Slice *old = rows.old_slice (slice);
@@ -239,7 +239,7 @@ template <typename L> struct CellRows::RowLoops {
     std::uint64_t views = 0;
     for (int w = 0; w < rows.words_; w++)
       views |= std::uint64_t{L::any_of (L::at (&rows.covering_[w][here]))} << (32 * w);
-    if (std::has_single_bit (views)) { /* nobody else sees this */
+    if (std::has_single_bit (views)) { /* one view covers the block */
       const int view = std::countr_zero (views);
       I in;
       covers (in, here, view);
@@ -251,11 +251,10 @@ template <typename L> struct CellRows::RowLoops {
       const int view = std::countr_zero (rest);
       compare_view (best, here, view, rules.optical[slice.cluster][view], around);
     }
-    L::at (&rows.next_[here]) = best.view; /* not yet: the next columns ask for this one's */
+    L::at (&rows.next_[here]) = best.view; /* not first_, which the next columns read */
   }
 
-  /* Whether some of a block's neighbours have another winner. If not, asking them changes nothing.
-   */
+  /* Whether some of a block's neighbours have another winner. */
   bool differ (std::size_t here, const Neighbours &around) const
   {
     const I &own = L::at (&rows.first_[here]);
@@ -275,10 +274,10 @@ template <typename L> struct CellRows::RowLoops {
         L::at (&rows.next_[here]) = I{} - 1;
         continue;
       }
-      if (pass == Pass::kAskNeighbours) {
+      if (pass == Pass::kWithNeighbours) {
         around.count = 0;
         find_neighbours (around, number, c, radius);
-        if (!differ (here, around)) {
+        if (!differ (here, around)) { /* then they do not change the winners */
           L::at (&rows.next_[here]) = L::at (&rows.first_[here]);
           continue;
         }

@@ -9,12 +9,24 @@
 #include "cell_row_loops.hpp"
 
 namespace rangecast {
+namespace {
+
+/* Grows in large steps: how many planes slices need changes a little from frame to frame. */
+template <typename Vector>
+void
+grow (Vector &vector, std::size_t size)
+{
+  if (vector.size () < size)
+    vector.resize (size + size / 4);
+}
+
+} // namespace
 
 void
 CellRows::begin (int columns, double slice_height_m, int images, std::size_t slices)
 {
   slice_height_m_ = slice_height_m;
-  /* This frame's memory is the next one's for what was: both have to be large enough. */
+  /* They are swapped after each frame. */
   slices_.reserve (slices);
   old_slices_.reserve (slices);
   const int rounded = (columns + kMaxLanes - 1) / kMaxLanes * kMaxLanes;
@@ -39,15 +51,6 @@ CellRows::add_slice (int cluster, int number, int planes)
 {
   slices_.push_back ({rows_, planes, cluster, number});
   rows_ += static_cast<std::uint32_t> (planes);
-}
-
-/* Grows in large steps: how many planes slices need changes a little from frame to frame. */
-template <typename Vector>
-static void
-grow (Vector &vector, std::size_t size)
-{
-  if (vector.size () < size)
-    vector.resize (size + size / 4);
 }
 
 void
@@ -136,8 +139,8 @@ CellRows::decide_slice (const RowRules &rules, std::size_t number, Pass pass)
   }
 }
 
-/* In a sweep every other slice is decided anew, then the rest: what a slice asks is then at rest
- * while it asks, with any number of threads, and two neighbours cannot swap for ever. */
+/* A sweep decides every other slice, then the rest: so the neighbours that a slice reads do not
+ * change meanwhile, with any number of threads, and two neighbours cannot swap for ever. */
 RowCounts
 CellRows::decide (const RowRules &rules, int threads)
 {
@@ -146,11 +149,22 @@ CellRows::decide (const RowRules &rules, int threads)
   for (int sweep = 0; sweep < kSweeps && rules.agreement > 0; sweep++)
     for (std::size_t odd : {0, 1})
       in_parallel ((count + 1 - odd) / 2, threads,
-          [&] (std::size_t s) { decide_slice (rules, 2 * s + odd, Pass::kAskNeighbours); });
-  RowCounts all;
+          [&] (std::size_t s) { decide_slice (rules, 2 * s + odd, Pass::kWithNeighbours); });
+  RowCounts counts;
   for (const Slice &slice : slices_)
-    count_slice (slice, all);
-  return all;
+    for (int p = 0; p < slice.planes; p++) {
+      const std::size_t row = std::size_t{slice.first_row + p} * width_ + kPad;
+      const std::int32_t *first = &first_[row], *held = &held_[row];
+      std::uint32_t both = 0, changed = 0;
+      for (int c = 0; c < columns_; c++) {
+        const bool known = (first[c] >= 0) & (held[c] >= 0);
+        both += known;
+        changed += known & (first[c] != held[c]);
+      }
+      counts.held += both;
+      counts.changed += changed;
+    }
+  return counts;
 }
 
 /* The slice of the frame before that has the same place; null if there is none. */
@@ -164,29 +178,12 @@ CellRows::old_slice (const Slice &slice) const
   return at < 0 || at >= std::int64_t{end} - begin ? nullptr : &old_slices_[begin + at];
 }
 
-void
-CellRows::count_slice (const Slice &slice, RowCounts &counts) const
-{
-  for (int p = 0; p < slice.planes; p++) {
-    const std::size_t row = std::size_t{slice.first_row + p} * width_ + kPad;
-    const std::int32_t *first = &first_[row], *held = &held_[row];
-    std::uint32_t both = 0, changed = 0;
-    for (int c = 0; c < columns_; c++) {
-      const bool known = (first[c] >= 0) & (held[c] >= 0);
-      both += known;
-      changed += known & (first[c] != held[c]);
-    }
-    counts.held += both;
-    counts.changed += changed;
-  }
-}
-
 /* ---- from frame to frame ---- */
 
-/* A cell that has no point for a frame keeps its winner. */
 void
-CellRows::carry_over (const RowRules &rules)
+CellRows::keep_winners (const RowRules &rules, const std::array<int, kMaxViews> &ids)
 {
+  /* A cell without points in one frame keeps its winner. */
   for (const Slice &slice : slices_) {
     const Slice *old = old_slice (slice);
     const int planes = old ? std::min (slice.planes, old->planes) : 0;
@@ -196,12 +193,6 @@ CellRows::carry_over (const RowRules &rules)
             old->first_row + static_cast<std::uint32_t> (p));
     });
   }
-}
-
-void
-CellRows::keep_winners (const RowRules &rules, const std::array<int, kMaxViews> &ids)
-{
-  carry_over (rules);
   std::swap (radius_, old_radius_);
   std::swap (first_, old_first_);
   std::swap (slices_, old_slices_);

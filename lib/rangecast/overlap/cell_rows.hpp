@@ -18,7 +18,7 @@ inline constexpr int kMaxClusters = 8;
 struct RowRules {
   float layer_gap = 0;
   float smoothing_columns = 0; ///< columns at a radius of 1 m; at radius r this divided by r
-  float most_columns = 0;      ///< maximum number of columns, 0 .. CellRows::kPad
+  float max_columns = 0;       ///< maximum number of columns, 0 .. CellRows::kPad
   int smoothing_slices = 0;
   float hysteresis = 0; ///< bonus of the previous frame's winner, 0 .. 2 (a cosine)
   float agreement = 0;  ///< bonus of a view that won all neighbours, 0 .. 2 (a cosine)
@@ -27,10 +27,10 @@ struct RowRules {
   std::array<std::array<std::array<float, 2>, kMaxViews>, kMaxClusters> optical;
 };
 
-/** What decide() counted. */
+/** Statistics of decide(). */
 struct RowCounts {
   std::uint64_t held = 0;    ///< layers that had a winner in the frame before
-  std::uint64_t changed = 0; ///< of those, layers that have another one now
+  std::uint64_t changed = 0; ///< those of them that have another one now
 };
 
 /** The layers of all cells as a grid of nodes, one node for each layer of each cell, in rows so
@@ -61,11 +61,12 @@ public:
   };
 
   void begin (int columns, double slice_height_m, int images, std::size_t slices);
-  /** Appends a slice with room for so many planes; slices of a cluster are consecutive. */
+  /** Appends a slice; slices of a cluster are consecutive. @param planes  number of its rows */
   void add_slice (int cluster, int number, int planes);
   /** Makes room for the slices' rows, and empties them. */
   void make_room ();
 
+  /** Index of the node of a layer. */
   [[nodiscard]] std::uint32_t node (int slice, int plane, int column) const
   {
     return (slices_[slice].first_row + static_cast<std::uint32_t> (plane)) * width_ + kPad +
@@ -92,15 +93,16 @@ public:
   void sum_along (const RowRules &rules, int slice);
   void sum_across (const RowRules &rules, int slice);
 
-  /** Chooses winners, with a word from last frame's and, in kSweeps sweeps, from neighbours'. */
+  /** Chooses winners, with a bonus for the previous frame's and, in kSweeps sweeps, for those of
+   * neighbours. */
   RowCounts decide (const RowRules &rules, int threads);
   static constexpr int kSweeps = 2;
 
   /** Keeps the winners for the next frame's hysteresis.
    *  @param ids  view-id of each image */
   void keep_winners (const RowRules &rules, const std::array<int, kMaxViews> &ids);
-  /** Before the next decide(): what images the winners kept have now. Cells of another size are
-   *  other cells: what was kept of them is not used. */
+  /** Before the next decide(): maps the winners kept to the numbers of this frame's images. Winners
+   *  of cells of another size are not used. */
   void renumber_winners (const std::array<int, kMaxViews> &ids, int images);
   void reset ();
 
@@ -111,12 +113,10 @@ public:
 
 private:
   template <typename L> struct RowLoops; /* cell_row_loops.hpp */
-  enum class Pass { kAlone, kAskNeighbours };
+  enum class Pass { kAlone, kWithNeighbours };
 
   void decide_slice (const RowRules &rules, std::size_t number, Pass pass);
-  void carry_over (const RowRules &rules);
   [[nodiscard]] const Slice *old_slice (const Slice &slice) const;
-  void count_slice (const Slice &slice, RowCounts &counts) const;
 
   template <typename Number> using Plane = std::vector<Number>;
   template <typename Number> void wrap (Plane<Number> &plane, std::uint32_t row) const;
@@ -129,7 +129,7 @@ private:
   std::array<Plane<float>, 2> tangent_, sum_;
   std::array<Plane<std::uint32_t>, 2> views_, covering_;
   Plane<std::int32_t> first_, held_;
-  Plane<std::int32_t> next_; /* after decide(): as first_, and carry_over() leaves it alone */
+  Plane<std::int32_t> next_; /* after decide(): as first_ before keep_winners() */
   std::array<std::vector<float>, 2> circle_tangent_; /* x, z in each column */
 
   /* Of the frame before. */

@@ -52,7 +52,7 @@ struct CellLayer {
   int plane = 0;         ///< number of the layer in its cell, from the axis outwards
   float radius = 0;      ///< mean of the points, metres
   float tangent[2] = {}; ///< x, z; sum of the entries' tangents, weighted by their points
-  /** In Cells::points; not known where the slice is plain. */
+  /** In Cells::points; not set in slices with one layer in each cell. */
   std::uint32_t first_point = 0, point_count = 0;
 };
 
@@ -88,7 +88,7 @@ public:
   /** Columns over which a view's points are still successive. */
   static constexpr int kReach = 6;
 
-  /** A slice's part of the lists below. Elements between the parts mean nothing. */
+  /** A slice's part of the lists below. Elements between the parts are unused. */
   struct Slice {
     std::uint32_t begin = 0; ///< its first point; its layers begin there, too
     std::uint32_t layer_count = 0;
@@ -100,18 +100,6 @@ public:
   {
     return {layers.data () + slice.begin, slice.layer_count};
   }
-  /** Whether a layer is in the rows: the fifth and further ones of a cell are not. */
-  [[nodiscard]] bool has_node (int slice, const CellLayer &layer) const
-  {
-    return layer.plane < rows.slices ()[slice].planes;
-  }
-
-  /** Whether a slice has one layer in each cell, all of them in the rows. */
-  [[nodiscard]] bool is_plain (std::uint32_t slice) const
-  {
-    return slices[slice].planes == 1 && rows.slices ()[slice].planes == 1;
-  }
-
   std::vector<Point> points;
   std::vector<std::uint32_t> slice_of; ///< of each point of the cloud
   std::vector<CellLayer> layers;

@@ -6,12 +6,27 @@
 #include <limits>
 
 namespace rangecast {
+namespace {
 
-/* One point in so many is enough to find the clusters. */
+/* Every fourth point is enough to find the clusters. */
 constexpr std::size_t kStep = 4;
 
+/* Calls work for a place and the places beside it. */
+template <typename Work>
 void
-Clusters::lay_grid (const WorldPoints &cloud)
+for_neighbours (int place, int side, const Work &work)
+{
+  const int column = place % side, row = place / side;
+  for (int r = std::max (row - 1, 0); r <= std::min (row + 1, side - 1); r++)
+    for (int c = std::max (column - 1, 0); c <= std::min (column + 1, side - 1); c++)
+      work (r * side + c);
+}
+
+} // namespace
+
+/* Lays the grid over the points, and counts those of each place. */
+void
+Clusters::count_points (const WorldPoints &cloud)
 {
   constexpr float kHuge = std::numeric_limits<float>::max ();
   float x_max = -kHuge, z_max = -kHuge;
@@ -25,11 +40,6 @@ Clusters::lay_grid (const WorldPoints &cloud)
     }
   const float side = std::max ({x_max - x_min_, z_max - z_min_, 0.f});
   places_per_metre_ = 1 / std::max (kPlace, side / (kSide - 1));
-}
-
-void
-Clusters::count_points (const WorldPoints &cloud)
-{
   points_.assign (kSide * kSide, 0);
   counted_ = 0;
   for (const WorldPoints::Part &part : cloud.parts ())
@@ -37,18 +47,7 @@ Clusters::count_points (const WorldPoints &cloud)
       points_[place_of (cloud.x[i], cloud.z[i])]++;
 }
 
-/* Calls work for the places beside a place. */
-template <typename Work>
-static void
-for_neighbours (int place, int side, const Work &work)
-{
-  const int column = place % side, row = place / side;
-  for (int r = std::max (row - 1, 0); r <= std::min (row + 1, side - 1); r++)
-    for (int c = std::max (column - 1, 0); c <= std::min (column + 1, side - 1); c++)
-      work (r * side + c);
-}
-
-/* Labels all that is connected with a place. @return its points */
+/* Labels the component of a place. @return the number of its points */
 std::uint32_t
 Clusters::fill_cluster (std::uint16_t place, std::uint16_t label)
 {
@@ -68,7 +67,7 @@ Clusters::fill_cluster (std::uint16_t place, std::uint16_t label)
   return points;
 }
 
-/* Places of nobody go to the nearest cluster. */
+/* Assigns all other places to the nearest cluster. */
 void
 Clusters::spread ()
 {
@@ -87,7 +86,7 @@ Clusters::spread ()
 
 /* Labels connected places, and lists the largest. @return how many are listed */
 int
-Clusters::label_places (int most, std::array<Found, kMaxClusters + 1> &found)
+Clusters::label_places (int max_clusters, std::array<Found, kMaxClusters + 1> &found)
 {
   /* A place with a point or two is noise between clusters, not a bridge. */
   const std::uint32_t least = 1 + counted_ / 5000;
@@ -105,25 +104,24 @@ Clusters::label_places (int most, std::array<Found, kMaxClusters + 1> &found)
     if (points <= enough)
       continue;
     found[count] = {points, label};
-    count = std::min (count + 1, most);
+    count = std::min (count + 1, max_clusters);
     std::sort (found.begin (), found.end (), [] (const Found &a, const Found &b) {
       return a.points != b.points ? a.points > b.points : a.label < b.label;
     });
-    found[most] = {};
+    found[max_clusters] = {};
   }
   return count;
 }
 
 int
-Clusters::find (const WorldPoints &cloud, int most)
+Clusters::find (const WorldPoints &cloud, int max_clusters)
 {
   count_ = 1;
-  if (most <= 1 || cloud.size () == 0)
+  if (max_clusters <= 1 || cloud.size () == 0)
     return 1;
-  lay_grid (cloud);
   count_points (cloud);
   std::array<Found, kMaxClusters + 1> found{};
-  count_ = std::max (1, label_places (most, found));
+  count_ = std::max (1, label_places (max_clusters, found));
   if (count_ == 1)
     return 1;
   cluster_.assign (kSide * kSide, kNoCluster);

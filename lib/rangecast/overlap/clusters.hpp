@@ -23,11 +23,11 @@ public:
   static constexpr double kMinShare = 0.05;
 
   /** Finds the clusters.
-   *  @param most  clusters, 1 .. kMaxClusters; of more the largest are taken
+   *  @param max_clusters  1 .. kMaxClusters; of more the largest are used
    *  @return how many there are, at least 1 */
-  int find (const WorldPoints &cloud, int most);
+  int find (const WorldPoints &cloud, int max_clusters);
 
-  /** Brings the points of each cluster together in a part.
+  /** Sorts the points of a part by cluster.
    *  @param[out] ends  end of each cluster in the part; the first one begins with it. Parts may be
    *                    sorted at the same time */
   void sort_part (
@@ -37,13 +37,12 @@ private:
   static constexpr int kSide = 128; /* places each way */
   static constexpr std::uint8_t kNoCluster = 255;
 
-  void lay_grid (const WorldPoints &cloud);
   void count_points (const WorldPoints &cloud);
   struct Found {
     std::uint32_t points = 0;
     std::uint16_t label = 0;
   };
-  int label_places (int most, std::array<Found, kMaxClusters + 1> &found);
+  int label_places (int max_clusters, std::array<Found, kMaxClusters + 1> &found);
   std::uint32_t fill_cluster (std::uint16_t place, std::uint16_t label);
   void spread ();
   [[nodiscard]] int place_of (float x, float z) const

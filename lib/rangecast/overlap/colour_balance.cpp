@@ -16,12 +16,12 @@ namespace {
 constexpr int kSamples = 8192;       ///< grid pixels of all images together
 constexpr int kFirstSamples = 65536; ///< in the first frame
 constexpr float kBinsPerLog = 400;   ///< so histograms reach from -0.8 to 0.8: 0.45 to 2.2
-constexpr float kFewest = 30;        ///< shared pixels that tell something of a pair
-constexpr float kKept = 0.9f;        ///< share of what was counted that counts in the next frame
-/* Of kSameSurfaceM. Where stereo is wrong on a shaded surface the colours are always wrong the same
- * way, so places that it has right tell more than many that it has nearly right. */
+constexpr float kMinShared = 30;     ///< shared pixels of a pair that counts
+constexpr float kKept = 0.9f;        ///< weight of older counts in the next frame
+/* Of kMaxDepthDifferenceM. Where stereo is wrong on a shaded surface the colours are always wrong
+ * the same way, so places that it has right tell more than many that it has nearly right. */
 constexpr float kSamePlace = 0.3f;
-constexpr double kMany = 300; ///< more than so many do not count more
+constexpr double kMaxShared = 300; ///< more do not add weight to a pair
 /* Pulls gains towards 1 where overlaps say little: as 3 shared pixels. */
 constexpr double kPrior = 0.01;
 
@@ -37,10 +37,10 @@ log_table ()
   return table;
 }
 
-/* Dark pixels have no colour to speak of, bright ones may be clipped. Asked of both together, so
- * that it does not favour the ratios of one side. */
+/* Dark pixels have hardly any colour, bright ones may be clipped. Both are tested together, so that
+ * no side's ratios are favoured. */
 bool
-is_usable (int a, int b)
+are_usable (int a, int b)
 {
   return a + b >= 50 && a + b <= 450 && a >= 8 && b >= 8 && a < 250 && b < 250;
 }
@@ -78,6 +78,41 @@ median_of (std::span<const float> bins, float count)
   return (static_cast<float> (at) + share - static_cast<float> (bins.size ()) / 2) / kBinsPerLog;
 }
 
+/* Multiplies colours by factors in 1/32768, with 16 bits, so that compilers vectorize it. */
+void
+multiply_row (Rgbx *pixels, int count, const std::uint16_t (&factors)[4])
+{
+  auto *__restrict bytes = reinterpret_cast<std::uint8_t *> (pixels);
+  for (int x = 0; x < 4 * count; x += 4)
+    for (int c = 0; c < 4; c++) {
+      const auto wide = static_cast<std::uint16_t> (bytes[x + c] << 8);
+      const auto product = static_cast<std::uint16_t> ((std::uint32_t{wide} * factors[c]) >> 16);
+      const auto rounded = static_cast<std::uint16_t> ((product + 64) >> 7);
+      bytes[x + c] = static_cast<std::uint8_t> (std::min<std::uint16_t> (rounded, 255));
+    }
+}
+
+/* Only between the first and the last valid pixel of each row. */
+void
+multiply (const RangeImage &image, const ColourBalance::Gains &gains)
+{
+  static_assert (ColourBalance::kMaxGain < 2);
+  if (gains == ColourBalance::Gains{1, 1, 1})
+    return;
+  std::uint16_t factors[4] = {};
+  for (std::size_t c = 0; c < 3; c++)
+    factors[c] = static_cast<std::uint16_t> (std::lround (gains[c] * 32768));
+  for (int y = 0; y < image.depth.height; y++) {
+    const std::uint16_t *depth = image.depth.row (y);
+    int first = 0, end = image.depth.width;
+    while (first < end && depth[first] == kInvalidDepth)
+      first++;
+    while (end > first && depth[end - 1] == kInvalidDepth)
+      end--;
+    multiply_row (image.colour.row (y) + first, end - first, factors);
+  }
+}
+
 } // namespace
 
 Status
@@ -101,7 +136,7 @@ ColourBalance::reset ()
   pairs_.clear ();
 }
 
-/* What pairs of this frame's views counted fades; what others counted waits until they are back. */
+/* Reduces the older counts of pairs of this frame's views; those of missing views are kept. */
 void
 ColourBalance::age (std::span<const RangeImage> images)
 {
@@ -136,7 +171,7 @@ ColourBalance::compare (std::span<const RangeImage> images, std::size_t from, in
       continue;
     const int column = ColourCameras::column (seen), row = ColourCameras::row (seen);
     const std::uint16_t there = other.depth.at (column, row);
-    const float same = cameras_.of[static_cast<std::size_t> (other.view_id)].same_surface;
+    const float same = cameras_.of[static_cast<std::size_t> (other.view_id)].max_difference;
     if (there == kInvalidDepth || !(std::abs (seen.depth - there) < kSamePlace * same))
       continue;
     if (!is_steady (
@@ -150,7 +185,7 @@ ColourBalance::compare (std::span<const RangeImage> images, std::size_t from, in
     Pair &pair = pairs_.get (image.view_id, other.view_id);
     const std::uint8_t a[] = {first.r, first.g, first.b}, b[] = {second.r, second.g, second.b};
     for (std::size_t c = 0; c < 3; c++) {
-      if (!is_usable (a[c], b[c]))
+      if (!are_usable (a[c], b[c]))
         continue;
       const float bin = (logs[a[c]] - logs[b[c]]) * kBinsPerLog + kBins / 2.0f;
       if (bin >= 0 && bin < kBins)
@@ -159,7 +194,7 @@ ColourBalance::compare (std::span<const RangeImage> images, std::size_t from, in
   }
 }
 
-/* Every step-th pixel each way, another one in each frame. */
+/* Counts every step-th pixel of every step-th row, other ones in each frame. */
 void
 ColourBalance::count_ratios (std::span<const RangeImage> images, std::size_t from)
 {
@@ -170,7 +205,7 @@ ColourBalance::count_ratios (std::span<const RangeImage> images, std::size_t fro
                        (double (fresh_ ? kFirstSamples : kSamples) / double (images.size ()));
   const int step = std::max (1, static_cast<int> (std::ceil (std::sqrt (share))));
   const auto steps = static_cast<std::uint32_t> (step);
-  /* Any order that comes to all places of a step x step square soon. */
+  /* Visits all places of a step x step square soon. */
   const int left = static_cast<int> (frame_ * 5 % steps),
             top = static_cast<int> ((frame_ * 3 + frame_ / steps) % steps);
   for (int y = top; y < image.depth.height; y += step)
@@ -211,11 +246,12 @@ ColourBalance::solve ()
       float count = 0;
       for (float bin : bins)
         count += bin;
-      if (count < kFewest)
+      if (count < kMinShared)
         continue;
       linked_ |= std::uint64_t{1} << pair.first | std::uint64_t{1} << pair.second;
       const std::size_t i = number_among (views, pair.first), j = number_among (views, pair.second);
-      const double weight = std::min (1.0, double{count} / kMany), ratio = median_of (bins, count);
+      const double weight = std::min (1.0, double{count} / kMaxShared),
+                   ratio = median_of (bins, count);
       matrix_[i * n + i] += weight;
       matrix_[j * n + j] += weight;
       matrix_[i * n + j] -= weight;
@@ -240,7 +276,7 @@ ColourBalance::follow (std::span<const RangeImage> images)
   const float most = std::log (kMaxGain);
   for (const RangeImage &image : images) {
     const auto id = static_cast<std::size_t> (image.view_id);
-    if (!(linked_ >> id & 1)) /* what it shared before still holds */
+    if (!(linked_ >> id & 1)) /* keeps its gains */
       continue;
     if (!(started_ >> id & 1))
       frames_[id] = 0;
@@ -267,51 +303,6 @@ ColourBalance::gains (int view_id) const
   return gains;
 }
 
-/* In 1/32768 and 16 bits, which compilers do several at a time. */
-static void
-multiply_row (Rgbx *pixels, int count, const std::uint16_t (&factors)[4])
-{
-  auto *__restrict bytes = reinterpret_cast<std::uint8_t *> (pixels);
-  for (int x = 0; x < 4 * count; x += 4)
-    for (int c = 0; c < 4; c++) {
-      const auto wide = static_cast<std::uint16_t> (bytes[x + c] << 8);
-      const auto product = static_cast<std::uint16_t> ((std::uint32_t{wide} * factors[c]) >> 16);
-      const auto rounded = static_cast<std::uint16_t> ((product + 64) >> 7);
-      bytes[x + c] = static_cast<std::uint8_t> (std::min<std::uint16_t> (rounded, 255));
-    }
-}
-
-/* Of each row only what lies between its first and its last valid pixel. */
-static void
-multiply (const RangeImage &image, const ColourBalance::Gains &gains)
-{
-  static_assert (ColourBalance::kMaxGain < 2);
-  if (gains == ColourBalance::Gains{1, 1, 1})
-    return;
-  std::uint16_t factors[4] = {};
-  for (std::size_t c = 0; c < 3; c++)
-    factors[c] = static_cast<std::uint16_t> (std::lround (gains[c] * 32768));
-  for (int y = 0; y < image.depth.height; y++) {
-    const std::uint16_t *depth = image.depth.row (y);
-    int first = 0, end = image.depth.width;
-    while (first < end && depth[first] == kInvalidDepth)
-      first++;
-    while (end > first && depth[end - 1] == kInvalidDepth)
-      end--;
-    multiply_row (image.colour.row (y) + first, end - first, factors);
-  }
-}
-
-void
-ColourBalance::learn (std::span<const RangeImage> images)
-{
-  age (images);
-  for (std::size_t i = 0; i < images.size (); i++)
-    count_ratios (images, i);
-  solve ();
-  follow (images);
-}
-
 Status
 ColourBalance::process (std::span<const RangeImage> images, int threads)
 {
@@ -319,8 +310,13 @@ ColourBalance::process (std::span<const RangeImage> images, int threads)
     if (Status status = cameras_.check (images); !status.ok ())
       return status;
     frame_++;
-    if (images.size () > 1) /* one alone teaches nothing, and keeps the gains that it had */
-      learn (images);
+    if (images.size () > 1) { /* a single view keeps its gains */
+      age (images);
+      for (std::size_t i = 0; i < images.size (); i++)
+        count_ratios (images, i);
+      solve ();
+      follow (images);
+    }
     in_parallel (images.size (), threads, [&] (std::size_t i) {
       if (has_colour (images[i]))
         multiply (images[i], gains (images[i].view_id));

@@ -16,37 +16,37 @@ namespace rangecast {
  *
  *  A grid of pixels of each view (another grid in each frame) is looked up in the other views;
  *  where the depths agree, and both see the surface well, the ratio of both colours is taken. For
- * each pair of views and each channel the median of the ratios' logarithms tells how their gains
- * differ; least squares over all pairs, each weighted by how much it shares, makes one gain of each
- * view. Their median stays 1: nobody knows which camera is right, but one whose exposure is wrong
- * is not to change the others. A gain on values that went through a camera's gamma curve stands for
- * exposure and white balance, which are gains before it, as long as the curve is near a power. */
+ * each pair of views and each channel the median of the ratios' logarithms is the difference
+ * of their gains; least squares over all pairs, each weighted by how much it shares, makes one gain
+ * of each view. Their median stays 1: a camera whose exposure is wrong does not change the others.
+ * A gain on values that went through a camera's gamma curve stands for exposure and white balance,
+ * which are gains before it, as long as the curve is near a power. */
 class ColourBalance {
 public:
   using Gains = std::array<float, 3>; ///< red, green, blue
 
   /** No gain is larger than this, or smaller than its inverse. */
   static constexpr float kMaxGain = 1.75f;
-  /** A new frame counts that much. */
+  /** Weight of a new frame. */
   static constexpr float kShareOfNew = 0.1f;
-  /** This much of a gain (2 in 1000, a quarter of a level) is left undone, so that cameras which
-   *  agree are left alone, bit by bit. */
+  /** Smaller gains are not applied, and larger ones are reduced by this (0.2 %, a quarter of a
+   *  level), so that the colours of cameras which agree do not change in any bit. */
   static constexpr float kLeftUndone = 0.002f;
 
-  /** Takes the cameras and forgets the stream. */
+  /** Sets the cameras and resets all gains. */
   Status set_rig (const Rig &rig);
-  /** Takes other poses and keeps what it knows of the stream. */
+  /** Sets other poses; gains are kept. */
   Status change_rig (const Rig &rig);
   void reset ();
 
   /** Learns from the images' overlaps, and multiplies their colours; depth is only read, and must
    *  be as it was before overlaps were cleared. Images without colour are left alone.
-   *  What a pair of views shared is kept while one of them is missing.
+   *  The statistics of a pair of views are kept while one of them is missing.
    *  Nothing is allocated once all views have been seen together.
    *  @return as ColourCameras::check(), kNoSpace without memory; colours are then untouched */
   Status process (std::span<const RangeImage> images, int threads);
 
-  /** What the colours of a view were multiplied with in the last frame. */
+  /** Factors of a view's colours in the last frame. */
   [[nodiscard]] Gains gains (int view_id) const;
   /** Whether they have been learnt. */
   [[nodiscard]] bool has_gains (int view_id) const
@@ -63,7 +63,6 @@ private:
     std::array<Histogram, 3> ratios{};
   };
 
-  void learn (std::span<const RangeImage> images);
   void age (std::span<const RangeImage> images);
   void count_ratios (std::span<const RangeImage> images, std::size_t from);
   void compare (std::span<const RangeImage> images, std::size_t from, int x, int y);

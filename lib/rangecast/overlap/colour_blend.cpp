@@ -84,7 +84,7 @@ ColourBlend::owner_of (Images images, std::size_t i, int x, int y) const
     if (there == kInvalidDepth)
       continue;
     const float off = std::abs (place.depth - there) /
-                      cameras_.of[static_cast<std::size_t> (other.view_id)].same_surface;
+                      cameras_.of[static_cast<std::size_t> (other.view_id)].max_difference;
     if (off < least) {
       least = off;
       owner = static_cast<int> (j);
@@ -93,13 +93,13 @@ ColourBlend::owner_of (Images images, std::size_t i, int x, int y) const
   return owner;
 }
 
-/* Whose points begin beside a point that image i kept; -1: nobody's. */
+/* The image whose points begin beside a point that image i kept; -1: none. */
 int
 ColourBlend::seam_at (Images images, std::size_t i, int x, int y) const
 {
   const RangeImage &image = images[i];
   const int depth = image.depth.at (x, y);
-  const float same = cameras_.of[static_cast<std::size_t> (image.view_id)].same_surface;
+  const float same = cameras_.of[static_cast<std::size_t> (image.view_id)].max_difference;
   for (const auto &step : kNeighbours) {
     const int u = x + step[0], v = y + step[1];
     if (u < 0 || v < 0 || u >= image.depth.width || v >= image.depth.height ||
@@ -178,7 +178,7 @@ ColourBlend::spread (Images images, std::size_t i, int most, bool down)
   const int width = image.depth.width, way = down ? -1 : 1;
   const int first = std::max (0, work.first - most / 2),
             last = std::min (image.depth.height - 1, work.last + most / 2);
-  const float same = cameras_.of[static_cast<std::size_t> (image.view_id)].same_surface;
+  const float same = cameras_.of[static_cast<std::size_t> (image.view_id)].max_difference;
   for (int k = 0; k <= last - first; k++) {
     const int y = down ? first + k : last - k;
     Seam *here = seams_.data () + begin_[i] + static_cast<std::size_t> (y) * width;
@@ -246,7 +246,7 @@ ColourBlend::seen_by (
   ColourCameras::Place place;
   if (!cameras_.find (image, point, place))
     return false;
-  const float same = cameras_.of[static_cast<std::size_t> (image.view_id)].same_surface;
+  const float same = cameras_.of[static_cast<std::size_t> (image.view_id)].max_difference;
   const int left = std::min (static_cast<int> (place.x), image.depth.width - 2),
             top = std::min (static_cast<int> (place.y), image.depth.height - 2);
   float weights = 0, off = 0;
@@ -359,23 +359,16 @@ ColourBlend::change (const RangeImage &image, const Work &work) const
   }
 }
 
-Status
-ColourBlend::blend (std::span<const RangeImage> images, double width_m, int threads)
-{
-  return guarded ("blend", [&] { return work (images, width_m, threads); });
-}
-
+/* Allocates; see blend(). */
 Status
 ColourBlend::work (Images images, double width_m, int threads)
 {
-  const auto size_of = [&] (std::size_t i) {
-    return images[i].depth.empty ()
-               ? std::size_t{0}
-               : static_cast<std::size_t> (images[i].depth.width) * images[i].depth.height;
-  };
   bool same = begin_.size () == images.size () + 1;
-  for (std::size_t i = 0; same && i < images.size (); i++)
-    same = begin_[i + 1] - begin_[i] == size_of (i);
+  for (std::size_t i = 0; same && i < images.size (); i++) {
+    const ImageView<std::uint16_t> &depth = images[i].depth;
+    same = begin_[i + 1] - begin_[i] ==
+           (depth.empty () ? 0 : static_cast<std::size_t> (depth.width) * depth.height);
+  }
   if (!same)
     return {StatusCode::kBadSize, "blend: expected the images of the last analysis"};
   if (!(width_m > 0))
@@ -398,12 +391,18 @@ ColourBlend::work (Images images, double width_m, int threads)
     compare (images, i);
     find_ratios (images[i], works_[i]);
   });
-  /* Not before all have looked. */
+  /* When no image is read for another one any more. */
   in_parallel (images.size (), threads, [&] (std::size_t i) {
     if (!works_[i].near.empty ())
       change (images[i], works_[i]);
   });
   return {};
+}
+
+Status
+ColourBlend::blend (std::span<const RangeImage> images, double width_m, int threads)
+{
+  return guarded ("blend", [&] { return work (images, width_m, threads); });
 }
 
 } // namespace rangecast

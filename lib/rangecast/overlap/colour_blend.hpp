@@ -23,11 +23,11 @@ namespace rangecast {
  *  depth or poses are a pixel off. Depth is never written. */
 class ColourBlend {
 public:
-  /** Takes the cameras. */
+  /** Sets the cameras. */
   Status set_rig (const Rig &rig) { return cameras_.set (rig); }
 
-  /** Takes down the images' depths, before overlaps are cleared. Allocates only if the images have
-   *  more pixels than ever before.
+  /** Stores the images' depths before overlaps are cleared. Allocates only for images with more
+   *  pixels than all before.
    *  @return as ColourCameras::check(), kNoSpace without memory */
   Status remember (std::span<const RangeImage> images);
 

@@ -14,7 +14,7 @@ ColourCameras::set (const Rig &rig)
   for (const View &view : rig.views) {
     const double units_per_metre = 1 / view.depth_unit_m;
     of[static_cast<std::size_t> (view.id)] = {PixelRays (view), PixelLookup (view),
-        static_cast<float> (kSameSurfaceM * units_per_metre),
+        static_cast<float> (kMaxDepthDifferenceM * units_per_metre),
         static_cast<float> (std::sqrt (3.0) / view.intrinsics.fx),
         static_cast<float> (view.intrinsics.fx * units_per_metre)};
     known |= std::uint64_t{1} << view.id;

@@ -13,17 +13,16 @@
 
 namespace rangecast {
 
-/** Two views that see a place at depths no further apart than this see the same surface, metres.
- *  As far as stereo errs on one surface; colours of two surfaces differ far more than those of two
- *  places of one. */
-inline constexpr double kSameSurfaceM = 0.015;
+/** Maximum difference of depth of two views of one surface, metres: the error of stereo. Colours of
+ *  two surfaces differ far more than those of two places of one. */
+inline constexpr double kMaxDepthDifferenceM = 0.015;
 
 /** The cameras of a rig, by view-id, to find in one view what another one sees. */
 struct ColourCameras {
   struct Camera {
     PixelRays rays;
     PixelLookup lookup;
-    float same_surface = 0;     ///< kSameSurfaceM in depth units
+    float max_difference = 0;   ///< kMaxDepthDifferenceM in depth units
     float steepest = 0;         ///< change of depth a pixel at 60 degrees, as a share of depth
     float pixels_per_metre = 0; ///< times depth units: at depth d a metre has this / d pixels
   };
@@ -53,7 +52,7 @@ struct ColourCameras {
     of[static_cast<std::size_t> (image.view_id)].lookup.find (point, place.x, place.y, place.depth);
     place.x -= static_cast<float> (image.roi.x);
     place.y -= static_cast<float> (image.roi.y);
-    /* Written so that what is not a number is not on the plane. */
+    /* False for NaN. */
     return place.depth > 0 && place.x >= 0 && place.y >= 0 &&
            place.x <= static_cast<float> (image.depth.width - 1) &&
            place.y <= static_cast<float> (image.depth.height - 1);

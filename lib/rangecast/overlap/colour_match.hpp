@@ -12,17 +12,17 @@ struct ColourSettings {
   int threads = 1;          ///< views at a time; 0 = number of cores
 };
 
-/** What is done to colours round the clearing of overlaps: before() balances the views while their
- *  overlaps are still there, after() blends the seams that were made. */
+/** Colour correction before and after overlaps are cleared: before() balances the views by their
+ *  overlaps, after() blends the seams. */
 class ColourMatch {
 public:
-  /** Takes the cameras and forgets the stream. */
+  /** Sets the cameras and resets all gains. */
   Status set_rig (const Rig &rig)
   {
     const Status status = balance_.set_rig (rig);
     return status.ok () ? blend_.set_rig (rig) : status;
   }
-  /** Takes other poses and keeps what it knows of the stream. */
+  /** Sets other poses; gains are kept. */
   Status change_rig (const Rig &rig)
   {
     const Status status = balance_.change_rig (rig);

@@ -17,8 +17,8 @@ namespace rangecast {
 /* Neighbours whose depths differ by more than this share are not joined; as striprender's
  * depth-step. */
 constexpr float kDepthStep = 0.03f;
-/* How far off a surface a point may lie, in footprints of that view's pixels along the surface.
- * Exact depth needs none; what is farther off may be another surface. */
+/* Maximum distance of a point from a surface that it lies on, in footprints of that view's pixels
+ * along the surface. 0 would do for exact depth. */
 constexpr float kTolerance = 1;
 
 /* Whether pixels of one image cover those of another that it won: the winner, called "other". */
@@ -74,7 +74,7 @@ template <typename L> struct RedundantPoints::CoverLoop {
     return row;
   }
 
-  /* A place so near a pixel is that pixel, so that the outline of one view ends at another's. */
+  /* A place this near a pixel is that pixel, so that the outline of one view ends at another's. */
   static constexpr float kSnap = 1.f / 32;
   static float snapped (float place)
   {
@@ -110,7 +110,7 @@ template <typename L> struct RedundantPoints::CoverLoop {
     compare_depths (u, v, z, seen, L::at (&row.on_surface[at]));
   }
 
-  /* Whether what is seen at a place lies on the surface of the four pixels round it. */
+  /* Whether a point lies on the surface of the four pixels around its place. */
   void compare_depths (const F &u, const F &v, const F &z, const I &seen, I &on_surface) const
   {
     F corners[4] = {}, right_share = {}, down_share = {};
@@ -140,18 +140,10 @@ template <typename L> struct RedundantPoints::CoverLoop {
     on_surface = seen & (least > 0) & (off <= kTolerance * (z * per_focal + (most - least)));
   }
 
-  /* What goes with a pixel, in the other image's plane. */
+  /* Bounding box of a pixel and the triangles around it, in the other image's plane. */
   struct Extent {
     F left, right, top, bottom;
   };
-
-  static void widen (Extent &extent, const F &u, const F &v)
-  {
-    extent.left = u < extent.left ? u : extent.left;
-    extent.right = u > extent.right ? u : extent.right;
-    extent.top = v < extent.top ? v : extent.top;
-    extent.bottom = v > extent.bottom ? v : extent.bottom;
-  }
 
   /* Where a pixel and its neighbours are seen, row by row; the pixel itself for those that do not
    * join it. */
@@ -203,8 +195,13 @@ template <typename L> struct RedundantPoints::CoverLoop {
       return;
     const F u = patch.u[4], v = patch.v[4];
     Extent extent = {u, u, v, v};
-    for (int k = 0; k < 9; k++)
-      widen (extent, u + overlap * (patch.u[k] - u), v + overlap * (patch.v[k] - v));
+    for (int k = 0; k < 9; k++) {
+      const F to_u = u + overlap * (patch.u[k] - u), to_v = v + overlap * (patch.v[k] - v);
+      extent.left = to_u < extent.left ? to_u : extent.left;
+      extent.right = to_u > extent.right ? to_u : extent.right;
+      extent.top = to_v < extent.top ? to_v : extent.top;
+      extent.bottom = to_v > extent.bottom ? to_v : extent.bottom;
+    }
     covered &= (extent.left >= 0) & (extent.top >= 0) &
                (extent.right <= static_cast<float> (other.depth.width - 1)) &
                (extent.bottom <= static_cast<float> (other.depth.height - 1));
@@ -214,7 +211,9 @@ template <typename L> struct RedundantPoints::CoverLoop {
           is_closed (static_cast<int> (extent.left[i]), last_before (extent.right[i]),
               static_cast<int> (extent.top[i]), last_before (extent.bottom[i]))) {
         won[i] = kGoes;
-        remove (first + i, y);
+        for (int row = y - 1; row <= y; row++)
+          std::fill_n (state.surface.row (row) + first + i - 1, 2, std::uint8_t{0});
+        owner.count_++;
       }
   }
 
@@ -235,13 +234,6 @@ template <typename L> struct RedundantPoints::CoverLoop {
       }
     }
     return true;
-  }
-
-  void remove (int x, int y) const
-  {
-    for (int row = y - 1; row <= y; row++)
-      std::fill_n (state.surface.row (row) + x - 1, 2, std::uint8_t{0});
-    owner.count_++;
   }
 
   void run () const

@@ -9,17 +9,19 @@
 #include "../base/parallel.hpp"
 
 namespace rangecast {
+namespace {
 
-static Status
+Status
 check (const CylinderSettings &settings)
 {
-  const CellSettings &u = settings.cells;
+  const CellSettings &cells = settings.cells;
   auto bad = [] (const char *what) { return Status{StatusCode::kBadValue, what}; };
-  if (!(u.height_m >= 0.0002 && u.height_m <= 10))
+  if (!(cells.height_m >= 0.0002 && cells.height_m <= 10))
     return bad ("cylinder: unit height, expected 0.0002 to 10 metres");
-  if (u.columns < 8 || u.columns > 3600)
+  if (cells.columns < 8 || cells.columns > 3600)
     return bad ("cylinder: columns, expected 8 to 3600");
-  if (!(u.layer_gap_m >= 0 && u.layer_gap_m <= 100) || !(u.smoothing_m >= 0 && u.smoothing_m <= 1))
+  if (!(cells.layer_gap_m >= 0 && cells.layer_gap_m <= 100) ||
+      !(cells.smoothing_m >= 0 && cells.smoothing_m <= 1))
     return bad ("cylinder: layer gap, expected 0 to 100 metres; smoothing, 0 to 1 metre");
   if (!(settings.overlap >= 0 && settings.overlap <= kMaxOverlap))
     return bad ("cylinder: overlap, expected 0 to 16 pixels");
@@ -35,6 +37,8 @@ check (const CylinderSettings &settings)
     return bad ("cylinder: position of the fixed axis, expected less than 1000 km");
   return {};
 }
+
+} // namespace
 
 Status
 CylinderFilter::set_rig (const Rig &rig)
@@ -71,8 +75,8 @@ CylinderFilter::reset ()
   decided_ = false;
 }
 
-/* Cells about an axis found by another rule are other cells. So are those about one that was set
- * elsewhere; but one that is set a little further on in each frame follows somebody. */
+/* Winners of cells about an axis found by another rule, or set elsewhere, are of no use. But an
+ * application may move a fixed axis a little in each frame, to follow a person. */
 void
 CylinderFilter::reset_on_new_geometry (const CylinderSettings &settings)
 {
@@ -102,14 +106,7 @@ CylinderFilter::find_cameras (std::span<const RangeImage> images)
   return {};
 }
 
-void
-CylinderFilter::make_points (std::span<const RangeImage> images, int threads)
-{
-  in_parallel (
-      images.size (), threads, [&] (std::size_t i) { cloud_.fill (i, images[i], rays_[i]); });
-}
-
-/* Sorts the points by cluster, and adds each cluster's up. */
+/* Sorts the points by cluster, and computes the moments of each cluster. */
 void
 CylinderFilter::find_clusters (const CylinderSettings &settings)
 {
@@ -134,16 +131,15 @@ CylinderFilter::find_clusters (const CylinderSettings &settings)
   });
 }
 
-/* Gives each cluster the place that it had in the frame before: the nearest pair of a cluster and a
- * place first, if they are nearer than half a metre; clusters that are left get places where nobody
- * was. */
+/* Gives each cluster the slot that it had in the frame before: the nearest pair of a cluster and a
+ * slot first, if they are less than half a metre apart; the other clusters get unused slots. */
 void
 CylinderFilter::choose_slots (const std::array<Axis, kMaxClusters> &measured)
 {
   constexpr double kFar = 0.5;
   slots_.fill (-1);
   unsigned taken = 0;
-  const auto take = [&] (int cluster, int slot) {
+  const auto assign = [&] (int cluster, int slot) {
     slots_[cluster] = slot;
     taken |= 1u << slot;
   };
@@ -160,7 +156,7 @@ CylinderFilter::choose_slots (const std::array<Axis, kMaxClusters> &measured)
           least = distance, best_cluster = cluster, best_slot = slot;
       }
     if (best_cluster >= 0)
-      take (best_cluster, best_slot);
+      assign (best_cluster, best_slot);
   }
   for (int slot = 0; slot < kMaxClusters; slot++)
     if (!(taken >> slot & 1))
@@ -169,7 +165,7 @@ CylinderFilter::choose_slots (const std::array<Axis, kMaxClusters> &measured)
     while (slots_[cluster] < 0 && (taken >> slot & 1))
       slot++;
     if (slots_[cluster] < 0)
-      take (cluster, slot);
+      assign (cluster, slot);
   }
 }
 
@@ -201,28 +197,8 @@ CylinderFilter::choose_axes (const CylinderSettings &settings, std::size_t image
   axis_ = axes_[slots_[0]];
 }
 
-/* Where cameras are about a cluster's cylinder. */
-void
-CylinderFilter::look_from (int cluster, const CylinderFrame &frame, std::size_t images)
-{
-  const Mat3 world_from_cylinder = transposed (frame.rotation);
-  for (std::size_t i = 0; i < images; i++) {
-    const float *a = rays_[i].optical_axis;
-    const Vec3 optical = frame.rotation * Vec3{a[0], a[1], a[2]};
-    rules_.optical[cluster][i] = {static_cast<float> (optical.x), static_cast<float> (optical.z)};
-    const PixelLookup &world = rig_lookups_[ids_[i]];
-    for (int k = 0; k < 3; k++) {
-      const float *row = world.rows[k];
-      const Vec3 r{row[0], row[1], row[2]};
-      const Mat3 &m = world_from_cylinder;
-      const double turned[] = {dot (r, {m[0], m[3], m[6]}), dot (r, {m[1], m[4], m[7]}),
-          dot (r, {m[2], m[5], m[8]}), dot (r, frame.origin) + row[3]};
-      for (int c = 0; c < 4; c++)
-        lookups_[cluster][i].rows[k][c] = static_cast<float> (turned[c]);
-    }
-  }
-}
-
+/* Moves the points to coordinates of their cluster's cylinder, and finds each cylinder's heights.
+ */
 void
 CylinderFilter::unroll (const CylinderSettings &settings, std::size_t images)
 {
@@ -230,7 +206,11 @@ CylinderFilter::unroll (const CylinderSettings &settings, std::size_t images)
   for (int cluster = 0; cluster < cluster_count_; cluster++) {
     const int slot = slots_[cluster];
     frames[slot] = CylinderFrame (axes_[slot]);
-    look_from (slot, frames[slot], images);
+    for (std::size_t i = 0; i < images; i++) {
+      const float *a = rays_[i].optical_axis;
+      const Vec3 optical = frames[slot].rotation * Vec3{a[0], a[1], a[2]};
+      rules_.optical[slot][i] = {static_cast<float> (optical.x), static_cast<float> (optical.z)};
+    }
   }
   if (column_.size () < cloud_.x.size ()) { /* the last to grow: all have grown */
     radius_.resize (cloud_.x.size ());
@@ -251,76 +231,15 @@ CylinderFilter::unroll (const CylinderSettings &settings, std::size_t images)
   }
 }
 
-static std::uint64_t
-views_with_points (const WorldPoints &cloud)
-{
-  std::uint64_t n = 0;
-  for (const WorldPoints::Part &part : cloud.parts ())
-    n += part.size () > 0;
-  return n;
-}
-
-Status
-CylinderFilter::process (
-    std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result)
-{
-  result = {};
-  bool began = false;
-  const Status status = guarded ("cylinder", [&] () -> Status {
-    if (Status bad = check (settings); !bad.ok ())
-      return bad;
-    if (Status bad = find_cameras (images); !bad.ok ())
-      return bad;
-    began = true;
-    return work (images, settings, result);
-  });
-  if (began && !status.ok ()) {
-    reset (); /* what is half done is of no use */
-    result = {};
-  }
-  return status;
-}
-
-Status
-CylinderFilter::work (
-    std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result)
-{
-  decided_ = false;
-  if (Status status = cloud_.reset (images); !status.ok ())
-    return status;
-  reset_on_new_geometry (settings);
-  make_points (images, settings.threads);
-  result.points_in = result.points_out = cloud_.size ();
-  if (result.points_in > 0) {
-    find_clusters (settings);
-    choose_axes (settings, images.size ());
-    result.clusters = cluster_count_;
-  }
-  result.axis = axis_;
-  if (views_with_points (cloud_) < 2)
-    return {};
-  unroll (settings, images.size ());
-  cells_.sort (cloud_, radius_, column_, runs_, ranges_, settings.cells, settings.threads);
-  set_rules (settings, images.size ());
-  decide_cells (settings, result);
-  clear_redundant (images, settings);
-  cells_.rows.keep_winners (rules_, ids_);
-  decided_ = true;
-  result.points_out -= redundant_.size ();
-  return {};
-}
-
 void
 CylinderFilter::set_rules (const CylinderSettings &settings, std::size_t images)
 {
-  /* Cells are narrow near the axis; beyond this many columns they would cost more than they tell.
-   */
-  constexpr double kMaxSmoothingSlices = 8;
+  constexpr double kMaxSmoothingSlices = 8; /* more would cost time for little */
   const CellSettings &cells = settings.cells;
   const double slices = std::min (cells.smoothing_m / cells_.slice_height_m, kMaxSmoothingSlices);
   rules_.layer_gap = static_cast<float> (cells.layer_gap_m);
   rules_.smoothing_columns = static_cast<float> (cells.smoothing_m * cells.columns / (2 * M_PI));
-  rules_.most_columns = std::min (float{CellRows::kPad}, static_cast<float> (cells.columns / 4));
+  rules_.max_columns = std::min (float{CellRows::kPad}, static_cast<float> (cells.columns / 4));
   rules_.smoothing_slices = cells.smoothing_m > 0 ? static_cast<int> (slices + 0.5) : 0;
   rules_.hysteresis = static_cast<float> (settings.hysteresis);
   rules_.agreement = static_cast<float> (settings.agreement);
@@ -358,6 +277,58 @@ CylinderFilter::clear_redundant (
       {lookups.data (), images.size ()}, cloud_, runs_, column_, cells_};
   redundant_.find (frame, settings.overlap, settings.threads);
   redundant_.clear (frame);
+}
+
+Status
+CylinderFilter::work (
+    std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result)
+{
+  decided_ = false;
+  if (Status status = cloud_.reset (images); !status.ok ())
+    return status;
+  reset_on_new_geometry (settings);
+  in_parallel (images.size (), settings.threads,
+      [&] (std::size_t i) { cloud_.fill (i, images[i], rays_[i]); });
+  result.points_in = result.points_out = cloud_.size ();
+  if (result.points_in > 0) {
+    find_clusters (settings);
+    choose_axes (settings, images.size ());
+    result.clusters = cluster_count_;
+  }
+  result.axis = axis_;
+  if (std::ranges::count_if (
+          cloud_.parts (), [] (const WorldPoints::Part &part) { return part.size () > 0; }) < 2)
+    return {};
+  unroll (settings, images.size ());
+  cells_.sort (cloud_, radius_, column_, runs_, ranges_, settings.cells, settings.threads);
+  set_rules (settings, images.size ());
+  decide_cells (settings, result);
+  clear_redundant (images, settings);
+  cells_.rows.keep_winners (rules_, ids_);
+  decided_ = true;
+  result.points_out -= redundant_.size ();
+  return {};
+}
+
+Status
+CylinderFilter::process (
+    std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result)
+{
+  result = {};
+  bool began = false;
+  const Status status = guarded ("cylinder", [&] () -> Status {
+    if (Status bad = check (settings); !bad.ok ())
+      return bad;
+    if (Status bad = find_cameras (images); !bad.ok ())
+      return bad;
+    began = true;
+    return work (images, settings, result);
+  });
+  if (began && !status.ok ()) {
+    reset (); /* an incomplete state cannot be used */
+    result = {};
+  }
+  return status;
 }
 
 } // namespace rangecast

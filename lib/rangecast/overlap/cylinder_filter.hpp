@@ -64,11 +64,11 @@ struct CylinderResult {
  *  - Points of a cell with a gap in radius between them are different surfaces and do not compete.
  *  - T is summed over a neighbourhood, and a view competes in a cell that it has no point in, but
  *    points on both sides of. Without either, winners along a seam are a matter of chance.
- *  - Optical axes need not lie in the slice plane. What is compared is |N . a| (N: normal of T in
+ *  - Optical axes need not lie in the slice plane. So |N . a| is compared (N: normal of T in
  *    the plane, a: optical axis), the larger the better. For axes in the plane that is the same as
  *    the smallest |T . a|, as both squares add up to 1; a camera from above no longer wins by
  *    being shorter in the plane.
- *  - A point goes only if the winner's own surface covers what its view draws of it
+ *  - A point is cleared only if the winner's own surface covers the surface around it
  *    (RedundantPoints): a cell can be larger than what its winner sees of it, the winner may see
  *    something before the point, have a hole there, or see a thin thing from its other side.
  *  - Where no tangent is known, T is the circle's. Of equals, the first image wins.
@@ -79,11 +79,11 @@ struct CylinderResult {
  *  Coordinates and colours are never changed. */
 class CylinderFilter {
 public:
-  /** Takes the cameras and forgets the stream. All views must be range views. */
+  /** Sets the cameras and resets. All views must be range views. */
   Status set_rig (const Rig &rig);
-  /** Takes other poses, or other cameras, and keeps what it knows of the stream. */
+  /** Sets other poses or cameras; axes and winners are kept. */
   Status change_rig (const Rig &rig);
-  /** Forgets where the axis was and who won. */
+  /** Resets the axes and winners of the frame before. */
   void reset ();
 
   /** Clears depths in place. A frame set of less than two images with points is left alone.
@@ -93,8 +93,8 @@ public:
   Status process (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
 
-  /** The winners of the last frame set, to draw or to measure them: slices of all clusters one
-   * above the other, from the lowest up. None if it had points of fewer than two views. */
+  /** The winners of the last frame set, to draw or measure them: slices of all clusters, each from
+   * the lowest up. None if it had points of fewer than two views. */
   [[nodiscard]] int cell_slices () const { return decided_ ? cells_.rows.old_slices () : 0; }
   /** The view-id of the winner of a cell's outermost surface; -1 where the frame set has no points.
    */
@@ -108,12 +108,10 @@ private:
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
   Status find_cameras (std::span<const RangeImage> images);
   void reset_on_new_geometry (const CylinderSettings &settings);
-  void make_points (std::span<const RangeImage> images, int threads);
   void find_clusters (const CylinderSettings &settings);
   void choose_axes (const CylinderSettings &settings, std::size_t images);
   void choose_slots (const std::array<Axis, kMaxClusters> &measured);
   void unroll (const CylinderSettings &settings, std::size_t images);
-  void look_from (int cluster, const CylinderFrame &frame, std::size_t images);
   void set_rules (const CylinderSettings &settings, std::size_t images);
   void decide_cells (const CylinderSettings &settings, CylinderResult &result);
   void clear_redundant (std::span<const RangeImage> images, const CylinderSettings &settings);
@@ -121,20 +119,19 @@ private:
   std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
   std::array<PixelLookup, kMaxViews> rig_lookups_;
   std::uint64_t rig_views_ = 0; /* bit i: view-id i is in the rig */
-  /* Of each cluster. A cluster keeps its place in these as long as it is there. */
+  /* By slot: a cluster keeps its slot as long as it exists. */
   std::array<AxisTracker, kMaxClusters> trackers_;
   Clusters clusters_;
-  AxisMode axis_mode_ = AxisMode::kPrincipal; /* of the last frame set, and its */
+  /* Of the last frame set. */
+  AxisMode axis_mode_ = AxisMode::kPrincipal;
   Axis fixed_axis_;
-  bool decided_ = false; /* it had winners */
+  bool decided_ = false; /* has winners */
 
-  /* Of the present frame; kept for their memory. By number of the image. */
+  /* Of the present frame; kept for their memory. By image: */
   std::array<PixelRays, kMaxViews> rays_;
   std::array<int, kMaxViews> ids_{};
   std::vector<Moments> moments_; /* of each run */
-  /* Where images see points of each cluster's cylinder. */
-  std::array<std::array<PixelLookup, kMaxViews>, kMaxClusters> lookups_;
-  Axis axis_; /* of the largest cluster */
+  Axis axis_;                    /* of the largest cluster */
   std::array<Axis, kMaxClusters> axes_;
   int cluster_count_ = 0;
   std::array<int, kMaxClusters> slots_{}; /* of the clusters, the largest first */

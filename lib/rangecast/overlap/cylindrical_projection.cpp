@@ -7,10 +7,13 @@
 #include "../base/simd.hpp"
 
 namespace rangecast {
+namespace {
 
 constexpr float kAtan[] = {
     0.99997726f, -0.33262347f, 0.19354346f, -0.11643287f, 0.05265332f, -0.01172120f};
 constexpr float kPi = 3.14159265f;
+
+} // namespace
 
 CylinderFrame::CylinderFrame (const Axis &axis) : origin (axis.position)
 {
@@ -37,7 +40,9 @@ fast_atan2 (float y, float x)
   return y < 0 ? 2 * kPi - a : a;
 }
 
-/* Where a point goes, with plain arithmetic: the twin of the vector loop, and its tail. */
+namespace {
+
+/* The projection of one point in scalar arithmetic: the twin of the vector loop, and its tail. */
 struct Projection {
   float origin[3], rotation[9], columns_per_radian;
   int last_column;
@@ -116,6 +121,8 @@ template <typename L> struct ProjectionLoop {
     return i;
   }
 };
+
+} // namespace
 
 HeightRange
 project_to_cylinder (WorldPoints &cloud, WorldPoints::Part part, const CylinderFrame &frame,

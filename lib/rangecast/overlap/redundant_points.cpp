@@ -10,7 +10,7 @@
 namespace rangecast {
 
 void
-RedundantPoints::Plane::reset (int width, int height, std::uint8_t value)
+RedundantPoints::BytePlane::reset (int width, int height, std::uint8_t value)
 {
   stride_ = static_cast<std::size_t> (width + 2 * kMargin);
   const std::size_t size = stride_ * static_cast<std::size_t> (height + 2);
@@ -19,7 +19,7 @@ RedundantPoints::Plane::reset (int width, int height, std::uint8_t value)
   std::fill_n (bytes_.begin (), size, value);
 }
 
-/* Where cells of a slice have several layers, a point's column does not tell its node. */
+/* Where cells of a slice have several layers, a point's column does not determine its node. */
 void
 RedundantPoints::find_nodes (const ResolvedFrame &frame)
 {
@@ -29,20 +29,21 @@ RedundantPoints::find_nodes (const ResolvedFrame &frame)
   first_node_.resize (cells.slices.size ());
   for (std::size_t s = 0; s < cells.slices.size (); s++) {
     const auto number = static_cast<int> (s);
-    const bool plain = cells.is_plain (static_cast<std::uint32_t> (s));
+    const int planes = rows.slices ()[s].planes;
+    const bool plain = cells.slices[s].planes == 1 && planes == 1;
     first_node_[s] = plain ? rows.node (number, 0, 0) : kNoNode;
     if (plain)
       continue;
     for (const CellLayer &layer : cells.layers_of (cells.slices[s])) {
       const std::uint32_t node =
-          cells.has_node (number, layer) ? rows.node (number, layer.plane, layer.column) : kNoNode;
+          layer.plane < planes ? rows.node (number, layer.plane, layer.column) : kNoNode;
       for (std::uint32_t i = 0; i < layer.point_count; i++)
         node_of_[cells.points[layer.first_point + i].index] = node;
     }
   }
 }
 
-/* Who won the cell of each point. */
+/* Marks in each image which other image won the cell of each point. */
 void
 RedundantPoints::list_winners (const ResolvedFrame &frame)
 {
@@ -67,7 +68,7 @@ RedundantPoints::list_winners (const ResolvedFrame &frame)
 }
 
 void
-RedundantPoints::make_surface (const RangeImage &image, Plane &surface) const
+RedundantPoints::make_surface (const RangeImage &image, BytePlane &surface) const
 {
   constexpr std::uint32_t kStep = static_cast<std::uint32_t> (kDepthStep * 65536);
   for (int y = 0; y + 1 < image.depth.height; y++) {
@@ -85,7 +86,8 @@ RedundantPoints::make_surface (const RangeImage &image, Plane &surface) const
 
 /* Finds which columns of each row another image won. @return whether any */
 bool
-RedundantPoints::find_candidates (const RangeImage &image, const Plane &winners, std::size_t winner)
+RedundantPoints::find_candidates (
+    const RangeImage &image, const BytePlane &winners, std::size_t winner)
 {
   const auto number = static_cast<std::uint8_t> (winner);
   bool any = false;
@@ -104,7 +106,7 @@ RedundantPoints::find_candidates (const RangeImage &image, const Plane &winners,
   return any;
 }
 
-/* Makes room for the images, and forgets those of the frame before. */
+/* Resets the state for this frame's images. */
 void
 RedundantPoints::begin (const ResolvedFrame &frame)
 {

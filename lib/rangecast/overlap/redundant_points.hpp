@@ -34,13 +34,13 @@ struct ResolvedFrame {
  *  - The point's surface faces the winner: the other side of a thin thing is not covered.
  *  Pixels join as in striprender: their depths differ by no more than kDepthStep.
  *
- *  Images are worked on one after the other. What is found to go covers nothing any more, so each
- *  point that goes is covered by points that stay, and where the regions of two views meet, the
- *  later one keeps an overlap of a pixel or two. */
+ *  Images are processed in order. A point that goes no longer covers others, so each one that goes
+ * is covered by points that stay, and where the regions of two views meet, the later one keeps an
+ *  overlap of a pixel or two. */
 class RedundantPoints {
 public:
-  /** @param overlap  how far from the point what goes with it is covered, in pixels of its own
-   *                  view; 1: as far as its triangles reach; more keeps a wider overlap */
+  /** @param overlap  radius around a point within which its surface must be covered, in pixels of
+   * its own view; 1: as far as its triangles reach; more keeps a wider overlap */
   void find (const ResolvedFrame &frame, double overlap, int threads);
 
   /** Makes the pixels found invalid. */
@@ -53,7 +53,7 @@ private:
   template <typename L> struct CoverLoop; /* cover_loop.hpp */
 
   /* A byte for each pixel of an image, with a margin. */
-  class Plane {
+  class BytePlane {
   public:
     void reset (int width, int height, std::uint8_t value);
     [[nodiscard]] std::uint8_t *row (int y) { return bytes_.data () + offset (y); }
@@ -72,10 +72,10 @@ private:
   struct ImageState {
     /* kSurface where the pixel, the one to its right and the two below are one surface of points
      * that stay; else 0. */
-    Plane surface;
+    BytePlane surface;
     /* Number of the image that won the pixel's cell; kNoWinner: it is no candidate; kGoes. */
-    Plane winner;
-    std::uint64_t winners = 0; /* bit i: image i is in there */
+    BytePlane winner;
+    std::uint64_t winners = 0; /* bit i: image i is in `winner` */
   };
   static constexpr std::uint8_t kSurface = 0xff, kNoWinner = 0xff, kGoes = 0xfe;
 
@@ -93,15 +93,15 @@ private:
   void begin (const ResolvedFrame &frame);
   void find_nodes (const ResolvedFrame &frame);
   void list_winners (const ResolvedFrame &frame);
-  void make_surface (const RangeImage &image, Plane &surface) const;
-  bool find_candidates (const RangeImage &image, const Plane &winners, std::size_t winner);
+  void make_surface (const RangeImage &image, BytePlane &surface) const;
+  bool find_candidates (const RangeImage &image, const BytePlane &winners, std::size_t winner);
 
   std::array<ImageState, kMaxViews> images_;
   std::size_t count_ = 0;
   std::array<Row, 3> rows_;
   std::vector<Range> candidates_; /* of each row */
-  /* Of each slice of one plane its first node, kNoNode of others. There node_of_ tells the node of
-   * each point; kNoNode for the fifth and further surfaces of a cell, whose points all stay. */
+  /* First node of each slice of one plane, kNoNode for others, whose points have their node in
+   * node_of_: kNoNode for the fifth and further surfaces of a cell, whose points all stay. */
   std::vector<std::uint32_t> first_node_, node_of_;
   static constexpr std::uint32_t kNoNode = UINT32_MAX;
 };

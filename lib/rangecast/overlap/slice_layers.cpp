@@ -11,7 +11,9 @@
 
 namespace rangecast {
 
+namespace {
 constexpr std::uint32_t kNone = UINT32_MAX;
+}
 
 /* Cuts the cells of a slice into layers, and links the entries of each view in their order. */
 struct Cells::Cutter {
@@ -41,7 +43,10 @@ struct Cells::Cutter {
       entry_end = 0;
       cut_cells (ends, columns);
     }
-    close_rings ();
+    for (std::uint64_t rest = views; rest; rest &= rest - 1) { /* close the rings */
+      const int view = std::countr_zero (rest);
+      work.chain[last[view]] = first[view];
+    }
     slice.layer_count = layer_end - slice.begin;
   }
 
@@ -51,14 +56,6 @@ struct Cells::Cutter {
     (views & bit ? work.chain[last[view]] : first[view]) = entry;
     last[view] = entry;
     views |= bit;
-  }
-
-  void close_rings ()
-  {
-    for (std::uint64_t rest = views; rest; rest &= rest - 1) {
-      const int view = std::countr_zero (rest);
-      work.chain[last[view]] = first[view];
-    }
   }
 
   /* Makes a layer of points, which come in the order of the cloud, so view after view.

@@ -17,7 +17,7 @@ public:
 
   /** Draws it anew. @param lines  ASCII, kMaxLines at most; further ones are left out */
   void draw (std::span<const std::string> lines);
-  /** What was drawn: as large as its text needs; empty before the first time. */
+  /** The last picture drawn, as large as its text; empty before the first one. */
   [[nodiscard]] ImageView<const Rgbx> picture () const { return picture_; }
 
 private:

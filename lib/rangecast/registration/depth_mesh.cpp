@@ -34,12 +34,6 @@ fits (float low, float high)
   return high - low <= kWidest && low > -1e6f && high < 1e6f;
 }
 
-void
-put (float &pixel, float inverse)
-{
-  pixel = std::max (pixel, inverse);
-}
-
 /* Fills a front-facing triangle; 1/z is linear in the image. */
 void
 fill (const Corner &a, const Corner &b, const Corner &c, cv::Mat &picture)
@@ -61,7 +55,7 @@ fill (const Corner &a, const Corner &b, const Corner &c, cv::Mat &picture)
       const float v = ((a[0] - c[0]) * (py - c[1]) - (a[1] - c[1]) * (px - c[0])) / area;
       const float w = 1 - u - v;
       if (u >= kEdge && v >= kEdge && w >= kEdge)
-        put (out[x], u * a[2] + v * b[2] + w * c[2]);
+        out[x] = std::max (out[x], u * a[2] + v * b[2] + w * c[2]);
     }
   }
 }
@@ -111,7 +105,8 @@ DepthMesh::set (const View &camera)
 }
 
 void
-DepthMesh::take (ImageView<const std::uint16_t> depth, double metres, double near_m, double far_m)
+DepthMesh::unproject (
+    ImageView<const std::uint16_t> depth, double metres, double near_m, double far_m)
 {
   for (int y = 0; y < points_.rows; y++) {
     const std::uint16_t *in = depth.row (y);

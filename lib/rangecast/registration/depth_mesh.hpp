@@ -20,11 +20,11 @@ public:
   /** @param camera  the depth camera; may have lens distortion */
   Status set (const View &camera);
 
-  /** Unprojects a depth image.
+  /** Computes the points of a depth image.
    *  @param depth     of the camera's size; 0 = invalid
    *  @param metres    per unit of `depth`
    *  @param near_m, far_m  other depths are invalid */
-  void take (ImageView<const std::uint16_t> depth, double metres, double near_m, double far_m);
+  void unproject (ImageView<const std::uint16_t> depth, double metres, double near_m, double far_m);
 
   /** @name The points by row; z = 0 for invalid ones @{ */
   [[nodiscard]] const cv::Vec3f *row (int y) const { return points_.ptr<cv::Vec3f> (y); }

@@ -149,7 +149,7 @@ Registration::sample (ImageView<const Rgbx> colour, const cv::Vec3f &point, Rgbx
 
 /* Undistorts colour; pixels outside of the distorted image become invalid. */
 void
-Registration::straighten (ImageView<const Rgbx> colour, const RangeImage &image) const
+Registration::undistort_colour (ImageView<const Rgbx> colour, const RangeImage &image) const
 {
   cv::Mat out = mat_of (image.colour);
   if (outside_.empty ()) {
@@ -188,37 +188,30 @@ Registration::process (ImageView<const std::uint16_t> depth, double metres,
       !image.depth.same_size (image.colour))
     return {StatusCode::kBadSize, "registration: an image does not have the size of its camera"};
   try {
-    mesh_.take (depth, metres, depth_.near_m, depth_.far_m);
+    mesh_.unproject (depth, metres, depth_.near_m, depth_.far_m);
     if (into_ == RegisterInto::kColour) {
       mesh_.draw (view.intrinsics, colour_from_depth_, drawn_);
       write_depth (image);
-      straighten (colour, image);
+      undistort_colour (colour, image);
       return {};
     }
     mesh_.draw (shadow_lens_, colour_from_depth_, hidden_);
     if (depth_.distortion.empty ()) {
-      if (Status s = rescale (depth, metres, image); !s.ok ())
-        return s;
+      const Status status = rescale_depth (depth, metres / view.depth_unit_m,
+          depth_units (view.near_m, view.depth_unit_m), depth_units (view.far_m, view.depth_unit_m),
+          image.depth);
+      if (!status.ok ())
+        return status;
     } else {
       mesh_.draw (view.intrinsics, {}, drawn_);
       write_depth (image);
-      range_mesh_.take (image.depth, view.depth_unit_m, 0, 1e9);
+      range_mesh_.unproject (image.depth, view.depth_unit_m, 0, 1e9);
     }
     look_up (colour, image);
   } catch (const cv::Exception &) {
     return {StatusCode::kNoSpace, "registration: OpenCV failed"};
   }
   return {};
-}
-
-Status
-Registration::rescale (
-    ImageView<const std::uint16_t> depth, double metres, const RangeImage &image) const
-{
-  const View &view = range_view_;
-  return rescale_depth (depth, metres / view.depth_unit_m,
-      depth_units (view.near_m, view.depth_unit_m), depth_units (view.far_m, view.depth_unit_m),
-      image.depth);
 }
 
 } // namespace rangecast

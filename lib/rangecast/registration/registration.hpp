@@ -35,10 +35,8 @@ public:
       const RangeImage &image);
 
 private:
-  Status rescale (
-      ImageView<const std::uint16_t> depth, double metres, const RangeImage &image) const;
   void write_depth (const RangeImage &image) const;
-  void straighten (ImageView<const Rgbx> colour, const RangeImage &image) const;
+  void undistort_colour (ImageView<const Rgbx> colour, const RangeImage &image) const;
   void look_up (ImageView<const Rgbx> colour, const RangeImage &image);
   bool sample (ImageView<const Rgbx> colour, const cv::Vec3f &point, Rgbx &out) const;
 

@@ -11,14 +11,28 @@
 #include "storage_check.hpp"
 
 namespace rangecast {
+namespace {
 
 static_assert (sizeof (BackgroundPixel) == 8 * sizeof (float));
 
 constexpr int kFileVersion = 2;
 /* A pixel takes 43 bytes in base64, and spaces: enough for about 20 views of 1920x1080. */
 constexpr std::uint64_t kMaxFileBytes = std::uint64_t{2} << 30;
-constexpr std::uint32_t kLongestAdaptMs = 10'000;
+constexpr std::uint32_t kMaxAdaptMs = 10'000;
 constexpr int kAdaptSteps = 1000; // of 10 ms
+
+/* Files are untrusted; the segmenter requires values within their ranges. */
+bool
+is_sound (const BackgroundPixel &p)
+{
+  const auto within = [] (float v, float low, float high) { return v >= low && v <= high; };
+  return within (p.mean[0], 0, 255) && within (p.mean[1], 0, 255) && within (p.mean[2], 0, 255) &&
+         within (p.spread, -1, 255) && within (p.depth, 0, 65535) &&
+         within (p.depth_spread, 0, 65535) && within (p.depth_share, 0, 1) &&
+         within (p.nearest, 0, 65535);
+}
+
+} // namespace
 
 void
 BackgroundModel::reset (int width, int height)
@@ -111,7 +125,7 @@ BackgroundModel::adapt (const ConstRangeImage &image, ImageView<const std::uint8
   std::array<float, kAdaptSteps + 1> shares; // by the time since a pixel's last update
   for (int i = 0; i <= kAdaptSteps; i++)
     shares[i] = float (
-        std::min (1 - std::exp (-i * (kLongestAdaptMs * 1e-3 / kAdaptSteps) / adapt_time_s), 0.5));
+        std::min (1 - std::exp (-i * (kMaxAdaptMs * 1e-3 / kAdaptSteps) / adapt_time_s), 0.5));
   const float to_model[] = {1 / light[0], 1 / light[1], 1 / light[2]};
   for (int y = 0; y < roi.height; y++) {
     const std::size_t first = static_cast<std::size_t> (roi.y + y) * width_ + roi.x;
@@ -124,7 +138,7 @@ BackgroundModel::adapt (const ConstRangeImage &image, ImageView<const std::uint8
       const std::uint32_t since = now_ms - std::min (now_ms, taught_ms_[first + x]);
       taught_ms_[first + x] = now_ms;
       move_towards (pixels_[first + x], colour[x], depth[x], to_model,
-          shares[std::min (since, kLongestAdaptMs) * kAdaptSteps / kLongestAdaptMs]);
+          shares[std::min (since, kMaxAdaptMs) * kAdaptSteps / kMaxAdaptMs]);
     }
   }
 }
@@ -218,20 +232,9 @@ save_backgrounds (
   return {};
 }
 
-/* Files are untrusted; the segmenter requires values within their ranges. */
-static bool
-is_sound (const BackgroundPixel &p)
-{
-  const auto within = [] (float v, float low, float high) { return v >= low && v <= high; };
-  return within (p.mean[0], 0, 255) && within (p.mean[1], 0, 255) && within (p.mean[2], 0, 255) &&
-         within (p.spread, -1, 255) && within (p.depth, 0, 65535) &&
-         within (p.depth_spread, 0, 65535) && within (p.depth_share, 0, 1) &&
-         within (p.nearest, 0, 65535);
-}
-
 /* Reads one view. @return false if it does not have the form that save_backgrounds() writes */
 bool
-read_background (const cv::FileNode &node, int &id, BackgroundModel &model)
+BackgroundModel::read (const cv::FileNode &node, int &id, BackgroundModel &model)
 {
   cv::Mat pixels;
   node["pixels"] >> pixels;
@@ -276,7 +279,7 @@ load_backgrounds (const std::string &path, std::vector<std::pair<int, Background
     for (const cv::FileNode &node : file["views"]) {
       int id = 0;
       BackgroundModel model;
-      if (loaded.size () >= kMaxViews || !read_background (node, id, model))
+      if (loaded.size () >= kMaxViews || !BackgroundModel::read (node, id, model))
         return bad ("views[" + std::to_string (loaded.size ()) + "] is damaged");
       loaded.emplace_back (id, std::move (model));
     }

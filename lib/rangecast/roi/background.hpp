@@ -80,12 +80,14 @@ public:
 private:
   friend Status save_backgrounds (
       const std::string &, const std::vector<std::pair<int, const BackgroundModel *>> &);
-  friend bool read_background (const cv::FileNode &, int &id, BackgroundModel &);
+  friend Status load_backgrounds (
+      const std::string &, std::vector<std::pair<int, BackgroundModel>> &);
 
   struct Sums {
     float colour_m2 = 0, depth_m2 = 0;
     int colour_n = 0, depth_n = 0;
   };
+  static bool read (const cv::FileNode &node, int &id, BackgroundModel &model);
   void measure_noise ();
   void infer_depth ();
   static void move_towards (BackgroundPixel &pixel, const Rgbx &colour, std::uint16_t depth,

@@ -165,11 +165,9 @@ private:
   int all_ = 0;
 };
 
-} // namespace
-
 /* Estimated from every sixteenth pixel that is not nearer than the background, without very dark
  * and saturated ones. */
-static void
+void
 estimate_light (const ConstRangeImage &image, const BackgroundModel &background,
     const Limits &limits, std::array<float, 3> &light)
 {
@@ -194,6 +192,10 @@ estimate_light (const ConstRangeImage &image, const BackgroundModel &background,
   for (int c = 0; c < 3; c++)
     light[c] = ratios[c].peak (light[c]);
 }
+
+const Status kFailed = {StatusCode::kNoSpace, "background subtraction: OpenCV failed"};
+
+} // namespace
 
 void
 Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &background,
@@ -289,7 +291,7 @@ Segmenter::find_sides (const SegmentationSettings &settings)
 
 /* Ignores shadows and light of any strength where depth matches the background all around. */
 void
-Segmenter::forgive_light (int reach)
+Segmenter::ignore_lighting (int reach)
 {
   const cv::Size window (2 * reach + 1, 2 * reach + 1);
   cv::compare (sides_, int (Side::kForeground), opened_, cv::CMP_EQ);
@@ -361,7 +363,7 @@ Segmenter::join_cues (const SegmentationSettings &settings)
   if (kernel_.rows != side)
     kernel_ = cv::getStructuringElement (cv::MORPH_RECT, cv::Size (side, side));
   find_sides (settings);
-  forgive_light (settings.fringe);
+  ignore_lighting (settings.fringe);
   find_same (settings.fringe);
   cv::bitwise_and (inverse_, nearer_, inverse_);
   cv::bitwise_or (inverse_, same_, inverse_); /* wide where it extends into the object */
@@ -485,20 +487,6 @@ Segmenter::extend_depth (const RangeImage &image, const SegmentationSettings &se
   }
 }
 
-static void
-clear_where (const cv::Mat &mask, const RangeImage &image)
-{
-  for (int y = 0; y < image.roi.height; y++) {
-    const auto clear = mask.ptr<std::uint8_t> (y);
-    std::uint16_t *depth = image.depth.row (y);
-    for (int x = 0; x < image.roi.width; x++)
-      if (clear[x])
-        depth[x] = kInvalidDepth;
-  }
-}
-
-static const Status kFailed = {StatusCode::kNoSpace, "background subtraction: OpenCV failed"};
-
 Status
 Segmenter::decide (const ConstRangeImage &image, const BackgroundModel &background,
     double depth_unit_m, const SegmentationSettings &settings)
@@ -530,7 +518,13 @@ Segmenter::clear (const RangeImage &image, const BackgroundModel &background, do
   if (image.roi.empty ())
     return {};
   try {
-    clear_where (inverse_, image);
+    for (int y = 0; y < image.roi.height; y++) {
+      const auto clear = inverse_.ptr<std::uint8_t> (y);
+      std::uint16_t *depth = image.depth.row (y);
+      for (int x = 0; x < image.roi.width; x++)
+        if (clear[x])
+          depth[x] = kInvalidDepth;
+    }
     remove_small_in_space (
         image, depth_unit_m, background.depth_noise () / depth_unit_m, settings.min_area);
     extend_depth (image, settings);

@@ -74,7 +74,7 @@ private:
   void classify (const ConstRangeImage &image, const BackgroundModel &background,
       double depth_unit_m, const SegmentationSettings &settings);
   void find_sides (const SegmentationSettings &settings);
-  void forgive_light (int reach);
+  void ignore_lighting (int reach);
   void find_same (int reach);
   void join_cues (const SegmentationSettings &settings);
   void remove_small (cv::Mat &mask, int min_area, int keep);

@@ -93,20 +93,14 @@ has_header (std::string_view text, const std::string &header, bool json)
   return text.starts_with (header);
 }
 
-bool
-is_control (char c)
-{
-  return std::iscntrl (static_cast<unsigned char> (c)) && c != '\n' && c != '\r' && c != '\t';
-}
-
 /* Checks that a YAML file is one map with unindented keys. If the collection of a document ends
  * early (a list, a flow collection, an indented map), OpenCV 4.6 takes the rest for the document
  * end, skips three characters, and may then loop forever. Other formats pass. */
 class YamlShape {
 public:
-  /** @param rest  starts with the character to examine
+  /** @param rest  starts with the character to check
    *  @return an error message, or an empty string */
-  std::string look_at (std::string_view rest)
+  std::string check (std::string_view rest)
   {
     const char c = rest[0];
     if (part_ == Part::kFirst && static_cast<unsigned char> (c) < 0x80) /* else a byte order mark */
@@ -117,11 +111,11 @@ public:
       return "has a carriage return within a line";
     if (c == '\n')
       line_ = {};
-    std::string complaint;
+    std::string error;
     if (std::isgraph (static_cast<unsigned char> (c)) && !line_.ignored)
-      complaint = look_at_sign (rest);
+      error = check_sign (rest);
     line_.column += c != '\n';
-    return complaint;
+    return error;
   }
 
 private:
@@ -132,7 +126,7 @@ private:
     bool marked = false;  /* starts with --- or ... */
   };
 
-  std::string look_at_sign (std::string_view rest)
+  std::string check_sign (std::string_view rest)
   {
     const bool begins = line_.column == 0, starts = begins && rest.starts_with ("---"),
                ends = begins && rest.starts_with ("...");
@@ -175,18 +169,19 @@ public:
   {
     bytes_ += count;
     if (bytes_ > limits_.max_bytes)
-      complaint_ = "has more than " + std::to_string (limits_.max_bytes) + " bytes";
-    for (std::size_t i = 0; i < count && complaint_.empty (); i++) {
-      complaint_ = look_at (text.substr (i));
+      error_ = "has more than " + std::to_string (limits_.max_bytes) + " bytes";
+    for (std::size_t i = 0; i < count && error_.empty (); i++) {
+      error_ = check (text.substr (i));
       before_.add (text[i]);
     }
   }
-  [[nodiscard]] const std::string &complaint () const { return complaint_; }
+  [[nodiscard]] const std::string &error () const { return error_; }
 
 private:
-  std::string look_at (std::string_view rest)
+  std::string check (std::string_view rest)
   {
-    if (is_control (rest[0]))
+    const char c = rest[0];
+    if (std::iscntrl (static_cast<unsigned char> (c)) && c != '\n' && c != '\r' && c != '\t')
       return "has control characters, which no text has";
     if (rest[0] == '<' && before_.solid == '\n')
       return "is XML; expected YAML or JSON";
@@ -197,11 +192,11 @@ private:
       return "has binary data";
     if (marker && !has_header (rest.substr (marker), header_, rest[0] == '$'))
       return "has binary data of another type than expected";
-    return yaml_.look_at (rest);
+    return yaml_.check (rest);
   }
 
   const StorageLimits limits_;
-  std::string header_, complaint_;
+  std::string header_, error_;
   std::uint64_t bytes_ = 0;
   int signs_ = 0;
   Before before_;
@@ -222,7 +217,7 @@ check_storage (const std::string &path, const StorageLimits &limits)
   StorageScanner scanner (limits);
   std::vector<char> text;
   std::size_t kept = 0;
-  for (bool at_end = false; !at_end && scanner.complaint ().empty ();) {
+  for (bool at_end = false; !at_end && scanner.error ().empty ();) {
     text.resize (kept + kBlock);
     const int got = gzread (file.get (), text.data () + kept, kBlock);
     at_end = got < int (kBlock);
@@ -233,8 +228,8 @@ check_storage (const std::string &path, const StorageLimits &limits)
         text.begin ());
     kept = size - count;
   }
-  if (!scanner.complaint ().empty ())
-    return {StatusCode::kBadData, path + ": " + scanner.complaint ()};
+  if (!scanner.error ().empty ())
+    return {StatusCode::kBadData, path + ": " + scanner.error ()};
   return {};
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What the built-in figure can wear: sheets and tubes that hang or stand free of the body, so that
- * one surface hides another, as hair, glasses, collars and hands of people do. */
+/* Clothing and hair of the built-in figure: sheets and tubes that hang or stand free of the body,
+ * so that one surface hides another. */
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -22,15 +22,7 @@ make_sheet (const Surface &surface, int columns, int rows)
   for (int j = 0; j <= rows; j++)
     for (int i = 0; i <= columns; i++) {
       const double u = double (i) / columns, v = double (j) / rows;
-      const Vec3 p = surface (u, v);
-      MeshVertex vertex{};
-      vertex.x = static_cast<float> (p.x);
-      vertex.y = static_cast<float> (p.y);
-      vertex.z = static_cast<float> (p.z);
-      vertex.u = static_cast<float> (u);
-      vertex.v = static_cast<float> (v);
-      vertex.head = static_cast<float> (smooth_step (-0.09, -0.01, p.y));
-      mesh.vertices.push_back (vertex);
+      mesh.vertices.push_back (figure_vertex (surface (u, v), u, v));
     }
   const auto index = [&] (int i, int j) {
     return static_cast<std::uint32_t> (j * (columns + 1) + i);
@@ -91,10 +83,8 @@ make_cloth (Vec3 rgb, double contrast, double wavelength, double length, std::ui
     for (int i = 0; i < kSide; i++) {
       const Vec3 place{double (i) / kSide, j / length / kSide, 0};
       const double light = 1 + contrast * smooth_noise (place, wavelength, 3, seed);
-      const auto byte = [light] (double c) {
-        return static_cast<std::uint8_t> (std::lround (std::clamp (c * light, 0.0, 255.0)));
-      };
-      pixels.push_back ({byte (rgb.x), byte (rgb.y), byte (rgb.z), 255});
+      pixels.push_back (
+          {to_byte (rgb.x * light), to_byte (rgb.y * light), to_byte (rgb.z * light), 255});
     }
   return std::make_shared<MipMap> (kSide, kSide, std::move (pixels));
 }

@@ -75,6 +75,19 @@ smooth_section_at (double y)
   return sum;
 }
 
+MeshVertex
+figure_vertex (Vec3 p, double u, double v)
+{
+  MeshVertex vertex{};
+  vertex.x = static_cast<float> (p.x);
+  vertex.y = static_cast<float> (p.y);
+  vertex.z = static_cast<float> (p.z);
+  vertex.u = static_cast<float> (u);
+  vertex.v = static_cast<float> (v);
+  vertex.head = static_cast<float> (smooth_step (-0.09, -0.01, p.y));
+  return vertex;
+}
+
 namespace {
 
 double
@@ -137,31 +150,22 @@ surface (double s, double y, std::uint32_t seed)
   return base + out * fade * Vec3{std::sin (angle), 0, std::cos (angle)};
 }
 
-struct Colour {
-  double r, g, b;
-};
-
-Colour
-mixed (Colour a, Colour b, double t)
+/* Colours are R, G, B, 0 to 255. */
+Vec3
+mixed (Vec3 a, Vec3 b, double t)
 {
-  return {std::lerp (a.r, b.r, t), std::lerp (a.g, b.g, t), std::lerp (a.b, b.b, t)};
+  return {std::lerp (a.x, b.x, t), std::lerp (a.y, b.y, t), std::lerp (a.z, b.z, t)};
 }
 
-Colour
-shaded (Colour c, double factor)
-{
-  return {c.r * factor, c.g * factor, c.b * factor};
-}
-
-Colour
-face_colour (double x, double y, Colour skin)
+Vec3
+face_colour (double x, double y, Vec3 skin)
 {
   const double side = std::abs (x);
   const auto ellipse = [&] (double x0, double y0, double rx, double ry) {
     const double d = std::hypot ((side - x0) / rx, (y - y0) / ry);
     return smooth_step (1.12, 0.88, d);
   };
-  Colour c = mixed (skin, {205, 110, 100}, 0.45 * bump (side, y, 0.043, 0.058, 0.016, 0.014));
+  Vec3 c = mixed (skin, {205, 110, 100}, 0.45 * bump (side, y, 0.043, 0.058, 0.016, 0.014));
   c = mixed (c, {176, 74, 76}, ellipse (0, 0.020, 0.026, 0.010));
   c = mixed (c, {84, 26, 30}, ellipse (0, 0.020, 0.027, 0.0016));
   c = mixed (c, {70, 38, 34}, ellipse (0.008, 0.047, 0.0045, 0.0025));
@@ -173,39 +177,25 @@ face_colour (double x, double y, Colour skin)
   return mixed (c, {12, 12, 14}, ellipse (0.031, 0.0950, 0.0028, 0.0028));
 }
 
-Colour
+Vec3
 colour_at (double s, double y, std::uint32_t seed)
 {
   const double angle = angle_of (s);
   const Section c = section_at (y);
   const Vec3 p{c.side * std::sin (angle), y, c.front * std::cos (angle)};
   const double grain = smooth_noise (p, 0.016, 3, seed + 1);
-  Colour skin =
-      shaded ({214, 166, 142}, 1 + 0.17 * grain + 0.08 * smooth_noise (p, 0.05, 1, seed + 5));
+  Vec3 skin = (1 + 0.17 * grain + 0.08 * smooth_noise (p, 0.05, 1, seed + 5)) * Vec3{214, 166, 142};
   if (std::abs (angle) < 1.2)
     skin = face_colour (0.09 * angle, y, skin);
   const Vec3 strand{p.x, 0.25 * p.y, p.z}; // hair hangs: its noise is drawn out downwards
-  const Colour hair = shaded ({82, 56, 38}, 1 + 0.75 * smooth_noise (strand, 0.010, 3, seed + 2));
+  const Vec3 hair = (1 + 0.75 * smooth_noise (strand, 0.010, 3, seed + 2)) * Vec3{82, 56, 38};
   /* Blotches, not checks: a pattern that repeats would fool stereo matching. */
   const double blotch = smooth_noise (p, 0.045, 2, seed + 4);
-  Colour shirt = mixed ({44, 72, 128}, {176, 60, 56}, smooth_step (0.05, 0.2, blotch));
-  shirt = shaded (shirt, 1 + 0.5 * smooth_noise (p, 0.018, 3, seed + 3));
+  Vec3 shirt = mixed ({44, 72, 128}, {176, 60, 56}, smooth_step (0.05, 0.2, blotch));
+  shirt = (1 + 0.5 * smooth_noise (p, 0.018, 3, seed + 3)) * shirt;
   const double collar = -0.078 - 0.045 * bump (angle, 0, 0, 0, 0.5, 1);
-  Colour out = mixed (skin, hair, hair_at (angle, y));
+  const Vec3 out = mixed (skin, hair, hair_at (angle, y));
   return mixed (out, shirt, smooth_step (collar + 0.002, collar - 0.002, y));
-}
-
-std::uint8_t
-to_byte (double value)
-{
-  return static_cast<std::uint8_t> (std::lround (std::clamp (value, 0.0, 255.0)));
-}
-
-/** v = 0 to 1 from crown to chest. */
-double
-height_of (double v)
-{
-  return kTop + (kBottom - kTop) * v;
 }
 
 MipMap
@@ -214,36 +204,27 @@ make_texture (std::uint32_t seed)
   std::vector<Rgbx> pixels (static_cast<std::size_t> (kTextureSize) * kTextureSize);
   for (int j = 0; j < kTextureSize; j++)
     for (int i = 0; i < kTextureSize; i++) {
-      const double s = ((i + 0.5) / kTextureSize * 2 - 1) * M_PI;
-      const Colour c = colour_at (s, height_of ((j + 0.5) / kTextureSize), seed);
+      const double s = ((i + 0.5) / kTextureSize * 2 - 1) * M_PI,
+                   y = kTop + (kBottom - kTop) * ((j + 0.5) / kTextureSize);
+      const Vec3 c = colour_at (s, y, seed);
       pixels[static_cast<std::size_t> (j) * kTextureSize + i] = {
-          to_byte (c.r), to_byte (c.g), to_byte (c.b), 0};
+          to_byte (c.x), to_byte (c.y), to_byte (c.z), 0};
     }
   return {kTextureSize, kTextureSize, std::move (pixels)};
 }
 
-MeshVertex
-vertex_at (Vec3 p, double u, double v)
+/* Head and shoulders, closed at the bottom. */
+Mesh
+make_body (std::uint32_t seed)
 {
-  MeshVertex vertex{};
-  vertex.x = static_cast<float> (p.x);
-  vertex.y = static_cast<float> (p.y);
-  vertex.z = static_cast<float> (p.z);
-  vertex.u = static_cast<float> (u);
-  vertex.v = static_cast<float> (v);
-  vertex.head = static_cast<float> (smooth_step (-0.09, -0.01, p.y));
-  return vertex;
-}
-
-void
-add_grid (Mesh &mesh, std::uint32_t seed)
-{
+  Mesh mesh;
   for (int j = 0; j <= kRows; j++)
     for (int i = 0; i <= kColumns; i++) {
       const double u = double (i) / kColumns, v = double (j) / kRows;
       /* The seam's two ends are one point; so is the crown. */
       const double s = (double (i % kColumns) / kColumns * 2 - 1) * M_PI;
-      mesh.vertices.push_back (vertex_at (surface (j ? s : 0, height_of (v), seed), u, v));
+      mesh.vertices.push_back (
+          figure_vertex (surface (j ? s : 0, kTop + (kBottom - kTop) * v, seed), u, v));
     }
   const auto index = [] (int i, int j) {
     return static_cast<std::uint32_t> (j * (kColumns + 1) + i);
@@ -254,16 +235,14 @@ add_grid (Mesh &mesh, std::uint32_t seed)
         mesh.triangles.push_back ({index (i, j), index (i, j + 1), index (i + 1, j)});
       mesh.triangles.push_back ({index (i + 1, j), index (i, j + 1), index (i + 1, j + 1)});
     }
-}
-
-void
-close_bottom (Mesh &mesh)
-{
   const auto rim = static_cast<std::uint32_t> (kRows * (kColumns + 1));
   const auto centre = static_cast<std::uint32_t> (mesh.vertices.size ());
-  mesh.vertices.push_back (vertex_at ({0, kBottom, -0.01}, 0.5, 1));
+  mesh.vertices.push_back (figure_vertex ({0, kBottom, -0.01}, 0.5, 1));
   for (std::uint32_t i = 0; i < kColumns; i++)
     mesh.triangles.push_back ({rim + i, centre, rim + i + 1});
+  compute_normals (mesh);
+  mesh.texture = std::make_shared<MipMap> (make_texture (seed));
+  return mesh;
 }
 
 } // namespace
@@ -271,12 +250,7 @@ close_bottom (Mesh &mesh)
 Figure
 make_figure (std::uint32_t seed, unsigned dress)
 {
-  Mesh body;
-  add_grid (body, seed);
-  close_bottom (body);
-  compute_normals (body);
-  body.texture = std::make_shared<MipMap> (make_texture (seed));
-  Figure figure{std::move (body)};
+  Figure figure{make_body (seed)};
   if (dress & kDressHair)
     add_long_hair (seed, figure);
   if (dress & kDressGlasses)

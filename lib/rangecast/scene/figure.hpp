@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "../geometry/camera.hpp"
 #include "mesh.hpp"
 
 namespace rangecast {
@@ -15,7 +16,11 @@ struct Section {
 /** Without features: nose, ears and hair stand out of it. */
 Section smooth_section_at (double y);
 
-/** @name What the figure wears, added behind its other meshes. @{ */
+/** A vertex without normal that turns with the head if it is above the neck. u, v: texture, 0 to 1.
+ */
+MeshVertex figure_vertex (Vec3 p, double u, double v);
+
+/** @name Clothing and hair, appended to the figure's meshes. @{ */
 void add_long_hair (std::uint32_t seed, Figure &figure);
 void add_glasses (Figure &figure);
 void add_collar (std::uint32_t seed, Figure &figure);

@@ -11,24 +11,19 @@ namespace {
 
 constexpr int kTextureSize = 64;
 constexpr int kMapSize = 256;
-/* The rim of the shadow is so wide in the map, each side: a lamp with a shade. */
+/* Width of the shadow's rim on each side, pixels of the map: of a lamp with a shade. */
 constexpr int kRim = 2;
-
-struct Box {
-  Vec3 low, high;
-};
 
 /* Six faces of four corners each, so that every face has its own normal. */
 void
-add_box (Mesh &mesh, const Box &box)
+add_box (Mesh &mesh, Vec3 from, Vec3 to)
 {
   for (int axis = 0; axis < 3; axis++)
     for (const int side : {0, 1}) {
       const auto first = static_cast<std::uint32_t> (mesh.vertices.size ());
       const int a = (axis + 1) % 3, b = (axis + 2) % 3;
       for (const auto &[i, j] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}}) {
-        const double low[] = {box.low.x, box.low.y, box.low.z},
-                     high[] = {box.high.x, box.high.y, box.high.z};
+        const double low[] = {from.x, from.y, from.z}, high[] = {to.x, to.y, to.z};
         MeshVertex v{};
         (&v.x)[axis] = static_cast<float> (side ? high[axis] : low[axis]);
         (&v.x)[a] = static_cast<float> (i ? high[a] : low[a]);
@@ -51,10 +46,7 @@ wood (std::uint32_t seed)
     for (int i = 0; i < kTextureSize; i++) {
       const Vec3 grain{0.002 * i, 0.012 * j, 0};
       const double light = 1 + 0.3 * smooth_noise (grain, 0.05, 3, seed + 40);
-      const auto byte = [light] (double c) {
-        return static_cast<std::uint8_t> (std::lround (std::clamp (c * light, 0.0, 255.0)));
-      };
-      pixels.push_back ({byte (150), byte (108), byte (72), 0});
+      pixels.push_back ({to_byte (150 * light), to_byte (108 * light), to_byte (72 * light), 0});
     }
   return {kTextureSize, kTextureSize, std::move (pixels)};
 }
@@ -77,11 +69,11 @@ make_chair (std::uint32_t seed)
 {
   Mesh mesh;
   const double x = -0.55, z = -0.9, floor = -1.0, half = 0.21, leg = 0.03;
-  add_box (mesh, {{x - half, -0.42, z - half}, {x + half, 0.02, z - half + 0.04}});
-  add_box (mesh, {{x - half, -0.55, z - half}, {x + half, -0.51, z + half}});
+  add_box (mesh, {x - half, -0.42, z - half}, {x + half, 0.02, z - half + 0.04});
+  add_box (mesh, {x - half, -0.55, z - half}, {x + half, -0.51, z + half});
   for (const double side : {x - half, x + half - leg})
     for (const double back : {z - half, z + half - leg})
-      add_box (mesh, {{side, floor, back}, {side + leg, back < z ? -0.42 : -0.55, back + leg}});
+      add_box (mesh, {side, floor, back}, {side + leg, back < z ? -0.42 : -0.55, back + leg});
   mesh.texture = std::make_shared<MipMap> (wood (seed));
   return mesh;
 }
@@ -152,7 +144,7 @@ void
 ShadowMap::darken (const Intrinsics &camera, const Pose &world_from_camera, const float *room,
     double strength, ImageView<Rgbx> colour) const
 {
-  /* What is left in a shadow comes from the sky: a little bluer. */
+  /* The light in a shadow is a little bluer, as that of the sky. */
   const float tint[] = {1.f, 0.98f, 0.94f};
   for (int y = 0; y < colour.height; y++)
     for (int x = 0; x < colour.width; x++, room++) {

@@ -14,8 +14,8 @@ namespace rangecast {
 /** A wooden chair on the room's floor, left of the figure and 0.9 m behind it as view 0 sees it. */
 Mesh make_chair (std::uint32_t seed);
 
-/** The shadow that figures throw onto what stands behind them: a map of what a lamp at the upper
- *  left of the front does not reach, with a soft rim. */
+/** The shadow that figures cast onto the room: a map of the directions in which the light of a lamp
+ *  at the upper left of the front is blocked, with a soft rim. */
 class ShadowMap {
 public:
   ShadowMap ();
@@ -28,10 +28,9 @@ public:
   void end ();
   /** @} */
 
-  /** Darkens the room. What is nearer to the camera than the room is left alone by the caller's
-   *  order: the figures are drawn after.
+  /** Darkens the room, before figures are drawn.
    *  @param room  1/z of the room, 1/m, row by row
-   *  @param strength  share of light that is missing in the full shadow */
+   *  @param strength  fraction of the light that is blocked in full shadow */
   void darken (const Intrinsics &camera, const Pose &world_from_camera, const float *room,
       double strength, ImageView<Rgbx> colour) const;
 

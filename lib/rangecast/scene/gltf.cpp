@@ -10,6 +10,7 @@
 #include <map>
 
 #include "gltf_document.hpp"
+#include "pattern.hpp"
 
 namespace rangecast {
 namespace {
@@ -85,15 +86,14 @@ displayed (double linear) /* the sRGB transfer function */
   return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow (c, 1 / 2.4) - 0.055;
 }
 
-struct Skin {
-  std::vector<Affine> joints; ///< world from the mesh's space, as each joint would move it
-};
+/** For each joint, world from the mesh's space as the joint would move it. */
+using Skin = std::vector<Affine>;
 
 /** Whether a primitive follows the skin's joints; else its node's transform places it. */
 bool
 follows (const Json &attributes, const Skin &skin)
 {
-  return !skin.joints.empty () && !attributes["JOINTS_0"].is_null ();
+  return !skin.empty () && !attributes["JOINTS_0"].is_null ();
 }
 
 /** Functions that return bool leave the reason in status_ when it is false. */
@@ -320,7 +320,7 @@ Reader::read_skin (int index)
     const Affine bind = inverse.count == 0 ? Affine{} : affine_of ([&] (int k) {
       return double (inverse.numbers[16 * i + std::size_t (k)]);
     });
-    skin.joints.push_back (world_[node] * bind);
+    skin.push_back (world_[node] * bind);
   }
   return true;
 }
@@ -385,9 +385,9 @@ Reader::read_weights (const Json &attributes, const Affine &world, const Skin &s
       const double weight = weights.numbers[i];
       if (!(weight > 0 && std::isfinite (weight)))
         continue;
-      if (!(joints.numbers[i] >= 0 && joints.numbers[i] < float (skin.joints.size ())))
+      if (!(joints.numbers[i] >= 0 && joints.numbers[i] < float (skin.size ())))
         return fail (StatusCode::kBadData, "a vertex follows a joint that is missing");
-      const Affine &joint = skin.joints[std::size_t (joints.numbers[i])];
+      const Affine &joint = skin[std::size_t (joints.numbers[i])];
       for (int k = 0; k < 12; k++)
         pose[i / 4].m[k / 4][k % 4] += weight * joint.m[k / 4][k % 4];
       sums[i / 4] += weight;
@@ -455,8 +455,7 @@ Reader::read_vertices (
     if (colours.components >= 3) {
       const float *c = colours.numbers.data () + std::size_t (colours.components) * i;
       const auto byte = [] (float value) {
-        return static_cast<std::uint8_t> (
-            std::lround (255 * displayed (std::isfinite (value) ? value : 1)));
+        return to_byte (255 * displayed (std::isfinite (value) ? value : 1));
       };
       mesh.colours.push_back ({byte (c[0]), byte (c[1]), byte (c[2]), 255});
     }

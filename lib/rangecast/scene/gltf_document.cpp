@@ -259,7 +259,7 @@ GltfDocument::load_buffers ()
     if (uri.is_null () && i == 0 && !binary_.empty ()) {
       buffers_.push_back (binary_);
     } else if (uri.is_null ()) {
-      buffers_.emplace_back (); /* to be filled by an extension; told where it is used */
+      buffers_.emplace_back (); /* filled by an extension; an error where it is used */
       continue;
     } else if (!load_uri (uri.text, "a buffer of a glTF model", buffers_.emplace_back ())) {
       return false;
@@ -292,7 +292,7 @@ GltfDocument::view_bytes (int index, Bytes &bytes)
   return true;
 }
 
-/* `values` knows its count and components. */
+/* Requires count and components of `values`. */
 bool
 GltfDocument::read_block (const Json &from, int component_type, bool normalised, Values &values)
 {

@@ -18,7 +18,7 @@ class GltfDocument {
 protected:
   using Bytes = std::span<const std::uint8_t>;
 
-  /** What an accessor holds. */
+  /** The elements of an accessor. */
   struct Values {
     std::vector<float> numbers; ///< `components` for each element
     std::size_t count = 0;

@@ -20,14 +20,16 @@ public:
   {
   }
 
-  bool document (Json &value)
+  Status document (Json &value)
   {
     const bool parsed = this->value (value, 0);
     skip_space ();
-    return parsed && at_ == end_;
+    if (parsed && at_ == end_)
+      return {};
+    if (values_ > kMaxValues)
+      return {StatusCode::kUnsupported, "more than 4 million JSON values"};
+    return {StatusCode::kBadData, "not JSON"};
   }
-
-  [[nodiscard]] bool has_too_many_values () const { return values_ > kMaxValues; }
 
 private:
   void skip_space ()
@@ -36,7 +38,7 @@ private:
       at_++;
   }
 
-  bool take (char c)
+  bool consume (char c)
   {
     skip_space ();
     if (at_ == end_ || *at_ != c)
@@ -83,28 +85,28 @@ private:
   {
     value.type = Json::Type::kObject;
     at_++;
-    if (take ('}'))
+    if (consume ('}'))
       return true;
     do {
       skip_space ();
-      if (!string (value.names.emplace_back ()) || !take (':') ||
+      if (!string (value.names.emplace_back ()) || !consume (':') ||
           !this->value (value.items.emplace_back (), level + 1))
         return false;
-    } while (take (','));
-    return take ('}');
+    } while (consume (','));
+    return consume ('}');
   }
 
   bool array (Json &value, int level)
   {
     value.type = Json::Type::kArray;
     at_++;
-    if (take (']'))
+    if (consume (']'))
       return true;
     do {
       if (!this->value (value.items.emplace_back (), level + 1))
         return false;
-    } while (take (','));
-    return take (']');
+    } while (consume (','));
+    return consume (']');
   }
 
   bool number (double &value)
@@ -256,12 +258,7 @@ Status
 parse_json (std::string_view text, Json &value)
 {
   value = {};
-  Parser parser (text);
-  if (parser.document (value))
-    return {};
-  if (parser.has_too_many_values ())
-    return {StatusCode::kUnsupported, "more than 4 million JSON values"};
-  return {StatusCode::kBadData, "not JSON"};
+  return Parser (text).document (value);
 }
 
 } // namespace rangecast

@@ -9,15 +9,16 @@
 #include "pattern.hpp"
 
 namespace rangecast {
+namespace {
 
-static std::uint8_t
+std::uint8_t
 average (int a, int b, int c, int d)
 {
   return static_cast<std::uint8_t> ((a + b + c + d + 2) / 4);
 }
 
 /* The highest threshold that at least this share of the pixels reaches. */
-static int
+int
 threshold_of (const std::vector<Rgbx> &pixels, double share)
 {
   std::size_t histogram[256] = {}, above = 0;
@@ -28,6 +29,57 @@ threshold_of (const std::vector<Rgbx> &pixels, double share)
     above += histogram[--threshold];
   return threshold;
 }
+
+struct Bounds {
+  float low[3] = {1e30f, 1e30f, 1e30f}, high[3] = {-1e30f, -1e30f, -1e30f};
+
+  [[nodiscard]] double side (int axis) const { return double (high[axis]) - low[axis]; }
+};
+
+/* Without vertices that belong to no triangle. */
+Bounds
+bounds_of (const Figure &figure)
+{
+  Bounds bounds;
+  for (const Mesh &mesh : figure)
+    for (const auto &triangle : mesh.triangles)
+      for (const std::uint32_t index : triangle)
+        for (int i = 0; i < 3; i++) {
+          const float value = (&mesh.vertices[index].x)[i];
+          bounds.low[i] = std::min (bounds.low[i], value);
+          bounds.high[i] = std::max (bounds.high[i], value);
+        }
+  return bounds;
+}
+
+void
+move_to_origin (Figure &figure, const Bounds &bounds, double scale)
+{
+  for (int i = 0; i < 3; i++) {
+    const double centre = (double (bounds.high[i]) + bounds.low[i]) / 2;
+    for (Mesh &mesh : figure)
+      for (MeshVertex &v : mesh.vertices)
+        (&v.x)[i] = static_cast<float> (scale * ((&v.x)[i] - centre));
+  }
+}
+
+/* Keeps the triangles that lie above a floor and near the axis. */
+void
+cut (Figure &figure, double floor_y, double radius)
+{
+  for (Mesh &mesh : figure) {
+    std::erase_if (mesh.triangles, [&] (const auto &triangle) {
+      return std::ranges::any_of (triangle, [&] (std::uint32_t index) {
+        const MeshVertex &v = mesh.vertices[index];
+        return v.y < floor_y || std::hypot (v.x, v.z) > radius;
+      });
+    });
+    drop_unused_vertices (mesh);
+  }
+  std::erase_if (figure, [] (const Mesh &mesh) { return mesh.triangles.empty (); });
+}
+
+} // namespace
 
 MipMap::MipMap (int width, int height, std::vector<Rgbx> pixels, std::uint8_t alpha_cutoff)
 {
@@ -116,82 +168,30 @@ drop_unused_vertices (Mesh &mesh)
   mesh.colours = std::move (colours);
 }
 
-namespace {
-
-struct Box {
-  float low[3] = {1e30f, 1e30f, 1e30f}, high[3] = {-1e30f, -1e30f, -1e30f};
-
-  [[nodiscard]] double side (int axis) const { return double (high[axis]) - low[axis]; }
-  [[nodiscard]] double centre (int axis) const { return (double (high[axis]) + low[axis]) / 2; }
-};
-
-/* Of what is drawn: vertices that belong to no triangle do not count. */
-Box
-box_of (const Figure &figure)
-{
-  Box box;
-  for (const Mesh &mesh : figure)
-    for (const auto &triangle : mesh.triangles)
-      for (const std::uint32_t index : triangle)
-        for (int i = 0; i < 3; i++) {
-          const float value = (&mesh.vertices[index].x)[i];
-          box.low[i] = std::min (box.low[i], value);
-          box.high[i] = std::max (box.high[i], value);
-        }
-  return box;
-}
-
-void
-move_to_origin (Figure &figure, const Box &box, double scale)
-{
-  for (Mesh &mesh : figure)
-    for (MeshVertex &v : mesh.vertices)
-      for (int i = 0; i < 3; i++)
-        (&v.x)[i] = static_cast<float> (scale * ((&v.x)[i] - box.centre (i)));
-}
-
-/* Keeps the triangles that lie above a floor and near the axis. */
-void
-cut (Figure &figure, double floor_y, double radius)
-{
-  for (Mesh &mesh : figure) {
-    std::erase_if (mesh.triangles, [&] (const auto &triangle) {
-      return std::ranges::any_of (triangle, [&] (std::uint32_t index) {
-        const MeshVertex &v = mesh.vertices[index];
-        return v.y < floor_y || std::hypot (v.x, v.z) > radius;
-      });
-    });
-    drop_unused_vertices (mesh);
-  }
-  std::erase_if (figure, [] (const Mesh &mesh) { return mesh.triangles.empty (); });
-}
-
-} // namespace
-
 bool
 fit_figure (Figure &figure, double top_m)
 {
   constexpr double kSize = 0.5, kReach = 0.45, kNeckBelowCrown = 0.27; /* metres */
-  Box box = box_of (figure);
-  if (figure.empty () || box.side (1) < 0)
+  Bounds bounds = bounds_of (figure);
+  if (figure.empty () || bounds.side (1) < 0)
     return false;
-  const bool stands = box.side (1) >= 3.5 * box.side (2) && box.side (2) > 0;
+  const bool stands = bounds.side (1) >= 3.5 * bounds.side (2) && bounds.side (2) > 0;
   if (top_m == kTopAutomatic)
     top_m = stands ? kSize : kTopAll;
-  double scale = kSize / std::max ({box.side (0), box.side (1), 1e-20});
+  double scale = kSize / std::max ({bounds.side (0), bounds.side (1), 1e-20});
   if (top_m > 0) {
-    scale = kPersonHeight / std::max (box.side (1), 1e-20);
-    move_to_origin (figure, box, scale);
+    scale = kPersonHeight / std::max (bounds.side (1), 1e-20);
+    move_to_origin (figure, bounds, scale);
     cut (figure, kPersonHeight / 2 - top_m, kReach);
-    box = box_of (figure);
+    bounds = bounds_of (figure);
     scale = 1;
     if (figure.empty ())
       return false;
   }
-  move_to_origin (figure, box, scale);
-  /* A bust has its neck where the built-in figure has it, a person where persons do. */
+  move_to_origin (figure, bounds, scale);
+  /* A bust has its neck where the built-in figure has it. */
   const double person = top_m > 0 ? 1 : kSize / kPersonHeight;
-  const double chin = stands ? box.side (1) * scale / 2 - person * kNeckBelowCrown : -0.01;
+  const double chin = stands ? bounds.side (1) * scale / 2 - person * kNeckBelowCrown : -0.01;
   const double spread = stands ? person * 0.08 : 0.08;
   for (Mesh &mesh : figure)
     for (MeshVertex &v : mesh.vertices)

@@ -37,7 +37,7 @@ struct MeshVertex {
   float head;       ///< 0: moves with the body; 1: turns with the head
 };
 
-/** What lies outside of a texture. */
+/** How a texture continues outside of 0 to 1. */
 enum class TextureWrap { kClamp, kRepeat, kMirror };
 
 /** A textured surface; triangles are counter-clockwise seen from outside. */
@@ -53,7 +53,7 @@ struct Mesh {
   static std::shared_ptr<const MipMap> plain_texture (Rgbx colour);
 };
 
-/** Whatever moves as one person. */
+/** The meshes of one person. */
 using Figure = std::vector<Mesh>;
 
 /** Sets each normal to the average of its triangles', weighted by area; vertices at the same

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "gltf.hpp"
+#include "pattern.hpp"
 #include "texture.hpp"
 
 namespace fs = std::filesystem;
@@ -54,9 +55,7 @@ is_drawable (const Mesh &mesh)
 Rgbx
 byte_colour (const aiColor4D &c)
 {
-  const auto byte = [] (float value) {
-    return static_cast<std::uint8_t> (std::lround (255 * std::clamp (value, 0.f, 1.f)));
-  };
+  const auto byte = [] (float value) { return to_byte (255 * std::clamp (value, 0.f, 1.f)); };
   return {byte (c.r), byte (c.g), byte (c.b), 255};
 }
 
@@ -220,7 +219,7 @@ public:
       : settings_ (settings), model_ (model)
   {
     const auto used = [&model] (auto test) { return std::ranges::any_of (model.palette, test); };
-    any_picture_ = used ([] (const ModelMaterial &m) { return m.picture >= 0; });
+    const bool any_picture = used ([] (const ModelMaterial &m) { return m.picture >= 0; });
     any_colour_ = used ([] (const ModelMaterial &m) { return m.has_colour; }) ||
                   std::ranges::any_of (
                       model.meshes, [] (const Mesh &mesh) { return !mesh.colours.empty (); });
@@ -228,7 +227,7 @@ public:
     const std::size_t n = model.pictures.size ();
     max_side_ = n <= 16 ? 2048 : n <= 64 ? 1024 : n <= 256 ? 512 : 256;
     const std::set<int> materials (model.materials.begin (), model.materials.end ());
-    if (settings.texture.empty () && !any_picture_ && materials.size () <= 1)
+    if (settings.texture.empty () && !any_picture && materials.size () <= 1)
       beside_ = colour_map_beside (settings.path);
   }
 
@@ -249,7 +248,8 @@ public:
     } else if (m.picture >= 0) {
       status = from_material (m, mesh);
     } else if (any_colour_) {
-      mesh.texture = Mesh::plain_texture (colour_of (m));
+      mesh.texture = Mesh::plain_texture ({to_byte (255 * m.factor[0]), to_byte (255 * m.factor[1]),
+          to_byte (255 * m.factor[2]), 255});
     }
     if (settings_.texture_flip)
       turn_texture (mesh);
@@ -257,14 +257,6 @@ public:
   }
 
 private:
-  static Rgbx colour_of (const ModelMaterial &m)
-  {
-    const auto byte = [] (double value) {
-      return static_cast<std::uint8_t> (std::lround (255 * std::clamp (value, 0.0, 1.0)));
-    };
-    return {byte (m.factor[0]), byte (m.factor[1]), byte (m.factor[2]), 255};
-  }
-
   Status from_file (const std::string &path, Mesh &mesh)
   {
     mesh.colours.clear ();
@@ -325,7 +317,7 @@ private:
 
   const ModelSettings &settings_;
   const Model &model_;
-  bool any_picture_ = false, any_colour_ = false;
+  bool any_colour_ = false;
   int max_side_ = 0;
   std::string beside_;
   std::shared_ptr<const MipMap> file_;

@@ -4,8 +4,9 @@
 #include <cmath>
 
 namespace rangecast {
+namespace {
 
-static double
+double
 grid_value (std::int64_t x, std::int64_t y, std::int64_t z, std::uint32_t seed)
 {
   const auto h = mix64 (static_cast<std::uint64_t> (x * 73856093 ^ y * 19349663 ^ z * 83492791) ^
@@ -13,7 +14,7 @@ grid_value (std::int64_t x, std::int64_t y, std::int64_t z, std::uint32_t seed)
   return static_cast<double> (h >> 40) / (1 << 23) - 1;
 }
 
-static double
+double
 one_octave (Vec3 p, std::uint32_t seed)
 {
   const double fx = std::floor (p.x), fy = std::floor (p.y), fz = std::floor (p.z);
@@ -31,6 +32,8 @@ one_octave (Vec3 p, std::uint32_t seed)
   }
   return std::lerp (plane[0], plane[1], w);
 }
+
+} // namespace
 
 double
 smooth_noise (Vec3 point, double wavelength_m, int octaves, std::uint32_t seed)

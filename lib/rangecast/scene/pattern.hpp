@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 #include "../geometry/camera.hpp"
@@ -30,6 +32,13 @@ smooth_step (double from, double to, double x)
 {
   const double t = (x - from) / (to - from), c = t < 0 ? 0 : t > 1 ? 1 : t;
   return c * c * (3 - 2 * c);
+}
+
+/** A grey level, rounded and clipped to 0 .. 255. */
+inline std::uint8_t
+to_byte (double level)
+{
+  return static_cast<std::uint8_t> (std::lround (std::clamp (level, 0.0, 255.0)));
 }
 
 } // namespace rangecast

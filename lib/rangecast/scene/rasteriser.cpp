@@ -6,27 +6,26 @@
 #include <cmath>
 
 namespace rangecast {
+namespace {
 
-static constexpr int kSubpixels = 256;
+constexpr int kSubpixels = 256;
 /* Corners farther out than this do not fit the fixed-point arithmetic (64 bit products). */
-static constexpr float kFarthest = 1 << 20;
+constexpr float kFarthest = 1 << 20;
 
-/** A quantity that is linear in the picture: at (x, y) it is base + dx * x + dy * y. */
+} // namespace
+
+/** A quantity that is linear in the picture: at (x0 + x, y0 + y) it is base + dx * x + dy * y. The
+ *  origin (x0, y0) is near the triangle, so that small differences keep their digits. */
 struct Rasteriser::Plane {
   float base, dx, dy;
 
   Plane (const RasterVertex &a, const RasterVertex &b, const RasterVertex &c, float inverse_area,
-      float qa, float qb, float qc)
+      float qa, float qb, float qc, int x0, int y0)
   {
     const float ab = qb - qa, ac = qc - qa;
     dx = (ab * (c.y - a.y) - ac * (b.y - a.y)) * inverse_area;
     dy = (ac * (b.x - a.x) - ab * (c.x - a.x)) * inverse_area;
-    base = qa - dx * a.x - dy * a.y;
-  }
-  /** Moves the origin to a corner, where small differences keep their digits. */
-  void rebase (const RasterVertex &a, float qa, int x, int y)
-  {
-    base = qa + dx * (static_cast<float> (x) - a.x) + dy * (static_cast<float> (y) - a.y);
+    base = qa + dx * (static_cast<float> (x0) - a.x) + dy * (static_cast<float> (y0) - a.y);
   }
 };
 
@@ -35,7 +34,9 @@ struct Rasteriser::Corner : RasterVertex {
   Rgbx tint; ///< the vertex's own colour
 };
 
-static inline Rgbx
+namespace {
+
+inline Rgbx
 sample (ImageView<const Rgbx> level, float u, float v, float light)
 {
   const float x = std::clamp (
@@ -57,7 +58,7 @@ sample (ImageView<const Rgbx> level, float u, float v, float light)
       blend (top[0].b, top[step].b, low[0].b, low[step].b), 0};
 }
 
-static inline int
+inline int
 wrapped (int i, int size, TextureWrap wrap)
 {
   if (wrap == TextureWrap::kClamp)
@@ -68,7 +69,7 @@ wrapped (int i, int size, TextureWrap wrap)
 }
 
 /** Any wrap, with alpha in x. @param light  of R, G, B */
-static Rgbx
+Rgbx
 sample_wrapped (
     ImageView<const Rgbx> level, float u, float v, const float (&light)[3], const Mesh &mesh)
 {
@@ -89,6 +90,22 @@ sample_wrapped (
       blend (&Rgbx::x, 1)};
 }
 
+/** The mip level whose texels are about as large as pixels. */
+int
+level_for (const RasterVertex &a, const RasterVertex &b, const RasterVertex &c, float area,
+    const MipMap &texture)
+{
+  const ImageView<const Rgbx> full = texture.level (0);
+  const float texels = std::abs ((b.u - a.u) * (c.v - a.v) - (c.u - a.u) * (b.v - a.v)) *
+                       static_cast<float> (full.width) * static_cast<float> (full.height);
+  if (!(texels > area))
+    return 0;
+  const auto last = static_cast<float> (texture.levels () - 1);
+  return static_cast<int> (std::min (0.5f * std::log2 (texels / area) + 0.5f, last));
+}
+
+} // namespace
+
 void
 Rasteriser::begin (int width, int height)
 {
@@ -103,20 +120,6 @@ Rasteriser::begin (int width, int height, const std::vector<float> &inverse_dept
   width_ = width;
   height_ = height;
   inverse_depth_ = inverse_depth;
-}
-
-/** The mip level whose texels are about as large as pixels. */
-static int
-level_for (const RasterVertex &a, const RasterVertex &b, const RasterVertex &c, float area,
-    const MipMap &texture)
-{
-  const ImageView<const Rgbx> full = texture.level (0);
-  const float texels = std::abs ((b.u - a.u) * (c.v - a.v) - (c.u - a.u) * (b.v - a.v)) *
-                       static_cast<float> (full.width) * static_cast<float> (full.height);
-  if (!(texels > area))
-    return 0;
-  const auto last = static_cast<float> (texture.levels () - 1);
-  return static_cast<int> (std::min (0.5f * std::log2 (texels / area) + 0.5f, last));
 }
 
 /** @tparam kPlain  a texture without wrap and alpha, and no colours of vertices */
@@ -141,23 +144,20 @@ Rasteriser::triangle (
   if (std::abs (area) < 1e-9f)
     return;
   const float k = 1 / area;
-  Plane w (a, b, c, k, a.inverse_depth, b.inverse_depth, c.inverse_depth);
-  Plane u (a, b, c, k, a.u * a.inverse_depth, b.u * b.inverse_depth, c.u * c.inverse_depth);
-  Plane v (a, b, c, k, a.v * a.inverse_depth, b.v * b.inverse_depth, c.v * c.inverse_depth);
-  Plane l (a, b, c, k, a.light, b.light, c.light);
-  w.rebase (a, a.inverse_depth, x0, y0);
-  u.rebase (a, a.u * a.inverse_depth, x0, y0);
-  v.rebase (a, a.v * a.inverse_depth, x0, y0);
-  l.rebase (a, a.light, x0, y0);
+  const auto plane = [&] (float qa, float qb, float qc) {
+    return Plane (a, b, c, k, qa, qb, qc, x0, y0);
+  };
+  const Plane w = plane (a.inverse_depth, b.inverse_depth, c.inverse_depth),
+              u = plane (a.u * a.inverse_depth, b.u * b.inverse_depth, c.u * c.inverse_depth),
+              v = plane (a.v * a.inverse_depth, b.v * b.inverse_depth, c.v * c.inverse_depth),
+              l = plane (a.light, b.light, c.light);
   const MipMap &texture = *mesh.texture;
   const ImageView<const Rgbx> level = texture.level (level_for (a, b, c, std::abs (area), texture));
   const auto tinted = [&] (std::uint8_t Rgbx::*channel) {
     const auto at = [channel] (const Corner &corner) {
       return corner.light * static_cast<float> (corner.tint.*channel) / 255;
     };
-    Plane plane (a, b, c, k, at (a), at (b), at (c));
-    plane.rebase (a, at (a), x0, y0);
-    return plane;
+    return plane (at (a), at (b), at (c));
   };
   const Plane tint[] = {kPlain ? l : tinted (&Rgbx::r), kPlain ? l : tinted (&Rgbx::g),
       kPlain ? l : tinted (&Rgbx::b)};

@@ -26,7 +26,8 @@ class Rasteriser {
 public:
   /** Starts a picture; allocates only if it is larger than any before. */
   void begin (int width, int height);
-  /** The same, with something there already. @param inverse_depth  1/z, 1/m, row by row */
+  /** The same, behind and in front of surfaces drawn before. @param inverse_depth  1/z, 1/m, row by
+   * row */
   void begin (int width, int height, const std::vector<float> &inverse_depth);
   /** Draws what faces the camera, and the rest of a double-sided mesh.
    *  @param vertices  the mesh's as the camera sees them */

@@ -7,11 +7,12 @@
 #include "pattern.hpp"
 
 namespace rangecast {
+namespace {
 
-static constexpr double kFloor = -1.0, kCeiling = 1.4; ///< metres
+constexpr double kFloor = -1.0, kCeiling = 1.4; ///< metres
 
-/** How many times `direction` it is to wall, floor or ceiling. */
-static double
+/** Distance to wall, floor or ceiling, as a multiple of `direction`. */
+double
 hit_distance (Vec3 from, Vec3 direction, double radius_m)
 {
   const double a = direction.x * direction.x + direction.z * direction.z;
@@ -26,7 +27,7 @@ hit_distance (Vec3 from, Vec3 direction, double radius_m)
 }
 
 /** Blue-grey plaster with boards, so that it looks like neither skin nor shirt. */
-static Vec3
+Vec3
 room_colour (Vec3 p, double radius_m, const RoomPaint &paint)
 {
   const auto &[seed, contrast, warmth] = paint;
@@ -52,13 +53,12 @@ room_colour (Vec3 p, double radius_m, const RoomPaint &paint)
          (warmth * Vec3{170, 122, 98} + (1 - warmth) * Vec3{96, 124, 140});
 }
 
+} // namespace
+
 void
 draw_room (const Intrinsics &camera, const Pose &world_from_camera, double radius_m,
     const RoomPaint &paint, ImageView<Rgbx> colour)
 {
-  const auto byte = [] (double v) {
-    return static_cast<std::uint8_t> (std::lround (std::clamp (v / 4, 0.0, 255.0)));
-  };
   for (int y = 0; y < colour.height; y++)
     for (int x = 0; x < colour.width; x++) {
       Vec3 sum;
@@ -69,7 +69,7 @@ draw_room (const Intrinsics &camera, const Pose &world_from_camera, double radiu
           const Vec3 point = from + hit_distance (from, ray, radius_m) * ray;
           sum = sum + room_colour (point, radius_m, paint);
         }
-      colour.at (x, y) = {byte (sum.x), byte (sum.y), byte (sum.z), 0};
+      colour.at (x, y) = {to_byte (sum.x / 4), to_byte (sum.y / 4), to_byte (sum.z / 4), 0};
     }
 }
 

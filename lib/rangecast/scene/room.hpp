@@ -9,7 +9,7 @@
 
 namespace rangecast {
 
-/** How the room looks. */
+/** Appearance of the room. */
 struct RoomPaint {
   std::uint32_t seed = 1;
   double contrast = 1; ///< of the texture, 1 = as it is, 0 = plain walls
@@ -17,7 +17,7 @@ struct RoomPaint {
 };
 
 /** Draws the empty room, a textured round wall with floor and ceiling about the y axis: four rays a
- *  pixel, as slow as it is exact, for pictures that are kept.
+ *  pixel. Slow: for pictures that are kept.
  *  @param radius_m  of the wall; the camera stands inside
  *  @param[out] colour  H x W. Reentrant. */
 void draw_room (const Intrinsics &camera, const Pose &world_from_camera, double radius_m,

@@ -22,7 +22,7 @@ constexpr double kWallRadius = 2.2; ///< metres: at least 1.4 from every camera 
 constexpr int kCamerasPerView = 3;
 constexpr double kNeckHeight = -0.06; ///< the head turns and nods about this point of the y axis
 
-/** Gaussian samples, read from places that a hash of camera, time and row names. */
+/** Gaussian samples, read from positions given by a hash of camera, time and row. */
 class NoiseTable {
 public:
   void fill (double sigma, std::uint32_t seed)
@@ -69,7 +69,7 @@ private:
 
 constexpr double kLightPeriod = 40; ///< seconds
 
-/** Where a figure is at a moment. */
+/** Pose of a figure at a moment. */
 struct FigurePose {
   float sin_yaw, cos_yaw, sin_nod, cos_nod; ///< of the head
   float dx, dz;                             ///< of all, metres
@@ -81,32 +81,24 @@ wave (double time_s, double period_s)
   return std::sin (2 * M_PI * std::fmod (time_s, period_s) / period_s);
 }
 
-FigurePose
-pose_at (double time_s, double motion)
-{
-  const double yaw = motion * 20 * M_PI / 180 * wave (time_s, 4);
-  const double nod = motion * 4 * M_PI / 180 * wave (time_s, 2.7);
-  return {static_cast<float> (std::sin (yaw)), static_cast<float> (std::cos (yaw)),
-      static_cast<float> (std::sin (nod)), static_cast<float> (std::cos (nod)),
-      static_cast<float> (motion * 0.015 * wave (time_s, 5)),
-      static_cast<float> (motion * 0.010 * wave (time_s, 3.3))};
-}
-
-struct Direction {
-  float x, y, z;
-};
-
-/** The others move as the first did a while ago. */
+/** Persons behind the first one move as it did some seconds before. */
 FigurePose
 pose_of (int person, double time_s, double motion)
 {
   constexpr float kPlaces[SceneSettings::kMaxPersons][2] = {
       {0, 0}, {-0.65f, -0.4f}, {0.65f, -0.4f}};
-  FigurePose pose = pose_at (time_s + 1.3 * person, motion);
-  pose.dx += kPlaces[person][0];
-  pose.dz += kPlaces[person][1];
-  return pose;
+  time_s += 1.3 * person;
+  const double yaw = motion * 20 * M_PI / 180 * wave (time_s, 4);
+  const double nod = motion * 4 * M_PI / 180 * wave (time_s, 2.7);
+  return {static_cast<float> (std::sin (yaw)), static_cast<float> (std::cos (yaw)),
+      static_cast<float> (std::sin (nod)), static_cast<float> (std::cos (nod)),
+      static_cast<float> (motion * 0.015 * wave (time_s, 5)) + kPlaces[person][0],
+      static_cast<float> (motion * 0.010 * wave (time_s, 3.3)) + kPlaces[person][1]};
 }
+
+struct Direction {
+  float x, y, z;
+};
 
 /** Nods, then turns, as far as the vertex belongs to the head. */
 Direction
@@ -215,7 +207,7 @@ scale_light (ImageView<Rgbx> colour, double factor)
 {
   std::uint8_t table[256];
   for (int i = 0; i < 256; i++)
-    table[i] = static_cast<std::uint8_t> (std::lround (std::clamp (i * factor, 0.0, 255.0)));
+    table[i] = to_byte (i * factor);
   for (int y = 0; y < colour.height; y++)
     for (int x = 0; x < colour.width; x++) {
       Rgbx &pixel = colour.at (x, y);
@@ -277,9 +269,8 @@ struct Scene::Impl {
 ImageView<const Rgbx>
 Scene::Impl::room_of (CameraState &camera) const
 {
-  const ImageView<Rgbx> picture{nullptr, settings.width, settings.height,
+  ImageView<Rgbx> room{camera.room.data (), settings.width, settings.height,
       static_cast<std::ptrdiff_t> (settings.width * sizeof (Rgbx))};
-  ImageView<Rgbx> room = picture;
   if (camera.room.empty ()) {
     camera.room.resize (static_cast<std::size_t> (settings.width) * settings.height);
     room.data = camera.room.data ();
@@ -291,7 +282,6 @@ Scene::Impl::room_of (CameraState &camera) const
     if (settings.chair)
       draw_chair (camera, room);
   }
-  room.data = camera.room.data ();
   return room;
 }
 
@@ -300,7 +290,7 @@ Scene::Impl::draw_chair (CameraState &camera, ImageView<Rgbx> room) const
 {
   const Mesh chair = make_chair (settings.seed);
   project (
-      chair, pose_at (0, 0), rig.views[0].intrinsics, camera.world_from_camera, camera.corners);
+      chair, pose_of (0, 0, 0), rig.views[0].intrinsics, camera.world_from_camera, camera.corners);
   camera.rasteriser.begin (settings.width, settings.height, camera.room_depth);
   camera.rasteriser.draw (camera.corners, chair, room);
   camera.room_depth.assign (

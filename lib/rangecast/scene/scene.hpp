@@ -12,7 +12,7 @@
 
 namespace rangecast {
 
-/** What the built-in figure wears: surfaces one behind the other, which a bare head has not. */
+/** Clothing and hair of the built-in figure: surfaces in front of one another. */
 enum DressFlags : unsigned {
   kDressHair = 1,    ///< long hair, with strands that hang free before cheeks and neck
   kDressGlasses = 2, ///< thin rims before the eyes
@@ -21,7 +21,7 @@ enum DressFlags : unsigned {
   kDressAll = 15,
 };
 
-/** What the synthetic rig is made of. */
+/** Settings of the synthetic rig. */
 struct SceneSettings {
   int views = 4;           ///< 1 .. kMaxViews
   int width = 320;         ///< pixels, 16 .. 4096
@@ -30,7 +30,7 @@ struct SceneSettings {
   double distance_m = 0.8; ///< of the left cameras from the y axis, 0.5 .. 1.2
   double baseline_m = 0.1; ///< left to right, and left to third, 0.01 .. 0.3
   double noise_sigma = 1;  ///< sensor noise, grey levels, 0 .. 20
-  double motion = 1;       ///< of the figure: 0 = still, 1 = as a person who talks, up to 2
+  double motion = 1;       ///< of the figure: 0 = still, 1 = as of a person who talks, up to 2
   std::uint32_t seed = 1;  ///< of all patterns and of the noise
   std::string model;       ///< glTF or OBJ file; empty: the built-in figure
   std::string texture;     ///< picture for the model; empty: what the model names, or one beside it
@@ -41,8 +41,8 @@ struct SceneSettings {
 
   int persons = 1;    ///< figures, 1 .. kMaxPersons; the others stand 0.4 m behind, left and right
   double far_m = 1.3; ///< farthest depth, 1 .. 6; from 3.5 on it reaches the room's walls
-  double cast_shadow = 0;  ///< share of light that is missing in the figures' shadow, 0 .. 0.9
-  double light_drift = 0;  ///< all light swings slowly (40 s) by this share, 0 .. 0.5
+  double cast_shadow = 0;  ///< fraction of light that the figures' shadow blocks, 0 .. 0.9
+  double light_drift = 0;  ///< amplitude of a slow change of all light (40 s), 0 .. 0.5
   double wall_texture = 1; ///< contrast of the room's texture, 0 = plain .. 1
   double wall_warmth = 0;  ///< 0 = blue-grey walls .. 1 = as wood, skin and hair
   bool chair = false;      ///< a chair stands behind the figure, also in the empty room

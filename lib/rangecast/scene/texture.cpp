@@ -12,6 +12,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "pattern.hpp"
+
 namespace fs = std::filesystem;
 
 namespace rangecast {
@@ -123,8 +125,7 @@ make_texture (cv::Mat bgra, const TextureSettings &settings)
   std::uint8_t tables[4][256];
   for (int c = 0; c < 4; c++)
     for (int i = 0; i < 256; i++)
-      tables[c][i] =
-          static_cast<std::uint8_t> (std::lround (std::clamp (i * settings.factor[c], 0.0, 255.0)));
+      tables[c][i] = to_byte (i * settings.factor[c]);
   std::vector<Rgbx> pixels;
   pixels.reserve (bgra.total ());
   for (int y = 0; y < bgra.rows; y++)

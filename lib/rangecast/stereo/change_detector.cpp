@@ -8,6 +8,7 @@
 #include "../base/simd.hpp"
 
 namespace rangecast {
+namespace {
 
 constexpr int kBlock = ChangeDetector::kBlock;
 constexpr int kDifference = 10; /* grey levels */
@@ -17,7 +18,7 @@ constexpr int kEnough = 2;      /* minimum number of blocks; one may be a reflec
 /* Sums of kRows rows, then of eight columns; the first pixel of a block gets its sum.
  * @param sums  of n channels, padded by kBlock * 4 */
 template <int kRows>
-static void
+void
 sum_blocks (const std::uint8_t *row, std::ptrdiff_t step, int n, std::uint16_t *sums)
 {
   std::fill_n (sums, n, std::uint16_t{0});
@@ -31,8 +32,8 @@ sum_blocks (const std::uint8_t *row, std::ptrdiff_t step, int n, std::uint16_t *
 
 /* Equal bit by bit to cv::resize (INTER_AREA) of whole blocks of every second row: the mean,
  * rounded half to even. cv::resize is scalar and took 5 % of the time of stereodepth. */
-static void
-look_at_whole_blocks (const cv::Mat &picture, std::vector<std::uint16_t> &sums, cv::Mat &blocks)
+void
+average_whole_blocks (const cv::Mat &picture, std::vector<std::uint16_t> &sums, cv::Mat &blocks)
 {
   constexpr int kRows = kBlock / 2, kHalf = kRows * kBlock / 2;
   const int n = 4 * picture.cols;
@@ -51,28 +52,7 @@ look_at_whole_blocks (const cv::Mat &picture, std::vector<std::uint16_t> &sums, 
   }
 }
 
-void
-ChangeDetector::look (const cv::Mat &picture)
-{
-  const cv::Size size ((picture.cols + kBlock - 1) / kBlock, (picture.rows + kBlock - 1) / kBlock);
-  /* Every second row is enough: the noise of the mean is still far below the threshold. */
-  if (picture.cols % kBlock == 0 && picture.rows % kBlock == 0) {
-    blocks_.create (size, CV_8UC4);
-    for_this_cpu ([&] { look_at_whole_blocks (picture, sums_, blocks_); });
-    return;
-  }
-  const cv::Mat rows (
-      (picture.rows + 1) / 2, picture.cols, picture.type (), picture.data, 2 * picture.step);
-  cv::resize (rows, blocks_, size, 0, 0, cv::INTER_AREA);
-}
-
-void
-ChangeDetector::remember ()
-{
-  cv::swap (blocks_, remembered_);
-}
-
-static bool
+bool
 differ (const cv::Vec4b &a, const cv::Vec4b &b, int most)
 {
   for (int c = 0; c < 3; c++)
@@ -81,10 +61,27 @@ differ (const cv::Vec4b &a, const cv::Vec4b &b, int most)
   return false;
 }
 
+} // namespace
+
+void
+ChangeDetector::update (const cv::Mat &picture)
+{
+  const cv::Size size ((picture.cols + kBlock - 1) / kBlock, (picture.rows + kBlock - 1) / kBlock);
+  /* Every second row is enough: the noise of the mean is still far below the threshold. */
+  if (picture.cols % kBlock == 0 && picture.rows % kBlock == 0) {
+    blocks_.create (size, CV_8UC4);
+    for_this_cpu ([&] { average_whole_blocks (picture, sums_, blocks_); });
+    return;
+  }
+  const cv::Mat rows (
+      (picture.rows + 1) / 2, picture.cols, picture.type (), picture.data, 2 * picture.step);
+  cv::resize (rows, blocks_, size, 0, 0, cv::INTER_AREA);
+}
+
 bool
 ChangeDetector::changed_outside (const Roi &roi) const
 {
-  if (remembered_.size () != blocks_.size ())
+  if (reference_.size () != blocks_.size ())
     return true;
   const cv::Rect inside (roi.x, roi.y, roi.width, roi.height);
   int changed = 0;
@@ -93,7 +90,7 @@ ChangeDetector::changed_outside (const Roi &roi) const
       const cv::Rect block (x * kBlock, y * kBlock, kBlock, kBlock);
       if ((block & inside).empty ())
         changed +=
-            differ (blocks_.at<cv::Vec4b> (y, x), remembered_.at<cv::Vec4b> (y, x), kDifference);
+            differ (blocks_.at<cv::Vec4b> (y, x), reference_.at<cv::Vec4b> (y, x), kDifference);
     }
   return changed >= kEnough;
 }
@@ -101,8 +98,8 @@ ChangeDetector::changed_outside (const Roi &roi) const
 bool
 ChangeDetector::block_changed (int bx, int by) const
 {
-  return remembered_.size () != blocks_.size () ||
-         differ (blocks_.at<cv::Vec4b> (by, bx), remembered_.at<cv::Vec4b> (by, bx), kSlight);
+  return reference_.size () != blocks_.size () ||
+         differ (blocks_.at<cv::Vec4b> (by, bx), reference_.at<cv::Vec4b> (by, bx), kSlight);
 }
 
 } // namespace rangecast

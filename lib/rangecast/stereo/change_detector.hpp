@@ -15,12 +15,12 @@ class ChangeDetector {
 public:
   static constexpr int kBlock = 8; ///< pixels
   /** Computes the blocks of an image. @param image  CV_8UC4, R G B x */
-  void look (const cv::Mat &picture);
+  void update (const cv::Mat &picture);
   /** Means of the blocks, CV_8UC4: of every second row, rounded half to even. */
   [[nodiscard]] const cv::Mat &blocks () const { return blocks_; }
-  /** Makes the last image the reference for later ones. */
-  void remember ();
-  void reset () { remembered_.release (); }
+  /** Makes the last image the reference for later ones; blocks() are then unspecified. */
+  void set_reference () { cv::swap (blocks_, reference_); }
+  void reset () { reference_.release (); }
 
   /** Whether two or more blocks completely outside of the ROI (pixels) differ from the reference by
    * more than 10 grey levels in one channel. True without reference. */
@@ -31,7 +31,7 @@ public:
   [[nodiscard]] bool block_changed (int bx, int by) const;
 
 private:
-  cv::Mat blocks_, remembered_; /* CV_8UC4 */
+  cv::Mat blocks_, reference_; /* CV_8UC4 */
   std::vector<std::uint16_t> sums_;
 };
 

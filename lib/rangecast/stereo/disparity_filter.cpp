@@ -23,6 +23,24 @@ grey_at (const std::uint8_t *row, int x16, int width)
   return (row[x] * (16 - f) + row[std::min (x + 1, width - 1)] * f + 8) >> 4;
 }
 
+/* Copies a tile with a border of one pixel, and `more` columns for vectors that end beyond it. */
+void
+copy_with_border (
+    const cv::Mat &disparity, const cv::Rect &tile, int more, std::int16_t none, Plane &to)
+{
+  const cv::Rect all (0, 0, disparity.cols, disparity.rows);
+  const cv::Rect there (tile.x - 1, tile.y - 1, tile.width + 2, tile.height + 2);
+  const cv::Rect inside = there & all;
+  to.set_size (there.width + more, there.height);
+  for (int y = 0; y < to.height (); y++) {
+    std::int16_t *row = to.row (y);
+    std::fill_n (row, to.width (), none);
+    if (const int v = there.y + y; v >= 0 && v < all.height)
+      std::copy_n (
+          disparity.ptr<std::int16_t> (v) + inside.x, inside.width, row + (inside.x - there.x));
+  }
+}
+
 } // namespace
 
 /* Sums over patches: number of pixels with disparity, signed and absolute difference between both
@@ -114,24 +132,6 @@ DisparityFilter::clear_hidden (int least, const Tiles &tiles, cv::Mat &disparity
           d[x] = none;
     }
   });
-}
-
-/* Copies a tile with a border of one pixel, and `more` columns for vectors that end beyond it. */
-static void
-copy_with_border (
-    const cv::Mat &disparity, const cv::Rect &tile, int more, std::int16_t none, Plane &to)
-{
-  const cv::Rect all (0, 0, disparity.cols, disparity.rows);
-  const cv::Rect there (tile.x - 1, tile.y - 1, tile.width + 2, tile.height + 2);
-  const cv::Rect inside = there & all;
-  to.set_size (there.width + more, there.height);
-  for (int y = 0; y < to.height (); y++) {
-    std::int16_t *row = to.row (y);
-    std::fill_n (row, to.width (), none);
-    if (const int v = there.y + y; v >= 0 && v < all.height)
-      std::copy_n (
-          disparity.ptr<std::int16_t> (v) + inside.x, inside.width, row + (inside.x - there.x));
-  }
 }
 
 void

@@ -7,18 +7,21 @@
 #include <opencv2/imgproc.hpp>
 
 namespace rangecast {
+namespace {
 
 /* Margin around the ROI in which to match, for the same quality at its border, pixels. */
 constexpr int kMargin = 8;
 
-static Status
-needs_too_much (double near_m, double pixels)
+Status
+too_near (double near_m, double pixels)
 {
   char text[120];
   std::snprintf (text, sizeof text,
       "near = %g m needs disparities of %g pixels, more than the image is wide", near_m, pixels);
   return {StatusCode::kBadValue, text};
 }
+
+} // namespace
 
 Status
 DisparityFinder::set (
@@ -32,17 +35,17 @@ DisparityFinder::set (
       settings.search_far_m > 0 ? std::max (settings.search_far_m, far_m) : INFINITY;
   const double nearest = pair.focal_baseline / near_m - pair.offset; /* may exceed int */
   if (!(nearest < pair.width))
-    return needs_too_much (near_m, nearest);
-  least_ = static_cast<int> (std::floor (pair.focal_baseline / farthest - pair.offset));
-  most_ = static_cast<int> (std::ceil (pair.focal_baseline / near_m - pair.offset));
-  most_ = std::max (most_, least_ + 1);
+    return too_near (near_m, nearest);
+  min_disparity_ = static_cast<int> (std::floor (pair.focal_baseline / farthest - pair.offset));
+  max_disparity_ = static_cast<int> (std::ceil (pair.focal_baseline / near_m - pair.offset));
+  max_disparity_ = std::max (max_disparity_, min_disparity_ + 1);
   far_ = static_cast<int> (std::ceil (16 * (pair.focal_baseline / far_m - pair.offset)));
   background_.reset ();
-  if (Status s = all_.set (settings.match, least_, most_); !s.ok ())
+  if (Status s = all_.set (settings.match, min_disparity_, max_disparity_); !s.ok ())
     return s;
   if (all_.reach () >= pair.width)
-    return needs_too_much (near_m, all_.reach ());
-  return some_.set (settings.match, least_, most_);
+    return too_near (near_m, all_.reach ());
+  return some_.set (settings.match, min_disparity_, max_disparity_);
 }
 
 /* Configures the matcher for a range of depths. Its number of disparities is a multiple of 16; the
@@ -54,10 +57,10 @@ DisparityFinder::choose_range (double near_m, double far_m)
   if (!(near_m > 0) || !(far_m > near_m))
     return {};
   const int low = std::max (
-      least_, static_cast<int> (std::floor (pair_.focal_baseline / far_m - pair_.offset)));
-  const int high =
-      std::min (most_, static_cast<int> (std::ceil (pair_.focal_baseline / near_m - pair_.offset)));
-  if ((high - low + 16) / 16 >= (most_ - least_ + 16) / 16)
+      min_disparity_, static_cast<int> (std::floor (pair_.focal_baseline / far_m - pair_.offset)));
+  const int high = std::min (
+      max_disparity_, static_cast<int> (std::ceil (pair_.focal_baseline / near_m - pair_.offset)));
+  if ((high - low + 16) / 16 >= (max_disparity_ - min_disparity_ + 16) / 16)
     return {};
   matcher_ = &some_;
   return some_.set_range (low, std::max (high, low + 1));
@@ -78,13 +81,6 @@ DisparityFinder::place_window (const Roi &roi)
   window_at_ = cv::Rect (left, top, right - left, bottom - top);
   missing_[0] = reach - (x0 - left);
   missing_[1] = reach_right - (right - x1);
-}
-
-void
-DisparityFinder::cut_window (int camera, const cv::Mat &picture)
-{
-  cv::cvtColor (picture (window_at_), grey_, cv::COLOR_RGBA2GRAY);
-  cv::copyMakeBorder (grey_, window_[camera], 0, 0, missing_[0], missing_[1], cv::BORDER_REPLICATE);
 }
 
 void
@@ -109,7 +105,7 @@ DisparityFinder::match ()
   for (int i = 0; i < 2; i++) {
     cv::Mat &core = i ? next_ : core_;
     core = whole_[i](all);
-    core.setTo (16 * least_ - 16);
+    core.setTo (16 * min_disparity_ - 16);
   }
   const int reach = matcher_->reach (), beside = reach + matcher_->reach_right (),
             above = kMargin - 2, below = matcher_->looks_down () ? above : 2;
@@ -127,9 +123,9 @@ DisparityFinder::match ()
 
 /* After matching a limited range: sets the disparities of known background beyond it, or none. */
 void
-DisparityFinder::know_background (const cv::Mat &grey, int right_x)
+DisparityFinder::restore_background (const cv::Mat &grey, int right_x)
 {
-  const int none = 16 * least_ - 16, found = 16 * matcher_->min_disparity ();
+  const int none = 16 * min_disparity_ - 16, found = 16 * matcher_->min_disparity ();
   if (background_.empty ()) {
     core_.setTo (none, core_ < found);
     return;
@@ -144,7 +140,7 @@ void
 DisparityFinder::filter (const cv::Mat &left)
 {
   const MatchSettings &m = settings_.match;
-  const int least = 16 * least_;
+  const int least = 16 * min_disparity_;
   const int offset = static_cast<int> (std::lround (16 * pair_.offset));
   const int right_x = matcher_->reach ();
   const cv::Mat grey = window_[0](cv::Rect (right_x, 0, core_at_.width, core_at_.height)),
@@ -152,7 +148,7 @@ DisparityFinder::filter (const cv::Mat &left)
   const bool limited = matcher_ != &all_;
   const int nearest = limited ? std::max (least, far_) : least; /* of interest */
   if (limited)
-    know_background (grey, right_x);
+    restore_background (grey, right_x);
   if (settings_.patch_tolerance > 0) {
     filter_.clear_unlike (
         grey, window_[1], right_x, settings_.patch_tolerance, least, tiles_, core_, next_);
@@ -193,12 +189,12 @@ DisparityFinder::filter (const cv::Mat &left)
 }
 
 /* Converts OpenCV's disparities of the window to disparity_. The farthest one means none: see
- * extend(). */
+ * BackgroundDisparity::extend(). */
 void
-DisparityFinder::take (const Roi &roi)
+DisparityFinder::write_disparity (const Roi &roi)
 {
   const int x0 = roi.x - core_at_.x, y0 = roi.y - core_at_.y;
-  const int least = 16 * least_;
+  const int least = 16 * min_disparity_;
   const int offset = static_cast<int> (std::lround (16 * pair_.offset));
   disparity_.create (roi.height, roi.width, CV_16U);
   for (int y = 0; y < roi.height; y++) {
@@ -222,15 +218,17 @@ DisparityFinder::find (const cv::Mat &left, const cv::Mat &right, const Roi &roi
   try {
     place_window (roi);
     choose_parts (parts);
-    cut_window (0, left);
-    cut_window (1, right);
+    for (int i = 0; i < 2; i++) {
+      cv::cvtColor ((i ? right : left) (window_at_), grey_, cv::COLOR_RGBA2GRAY);
+      cv::copyMakeBorder (grey_, window_[i], 0, 0, missing_[0], missing_[1], cv::BORDER_REPLICATE);
+    }
     if (Status s = match (); !s.ok ())
       return s;
     filter (left);
   } catch (const cv::Exception &) {
     return {StatusCode::kNoSpace, "stereo: OpenCV failed to match the images"};
   }
-  take (roi);
+  write_disparity (roi);
   return {};
 }
 

@@ -64,25 +64,23 @@ public:
     return 16 * pair_.focal_baseline / depth_m;
   }
 
-  /** Disparity range in the images, pixels. */
-  [[nodiscard]] int least () const { return least_; }
-  [[nodiscard]] int most () const { return most_; }
+  /** Maximum disparity in the images, pixels. */
+  [[nodiscard]] int max_disparity () const { return max_disparity_; }
 
 private:
   Status choose_range (double near_m, double far_m);
   void place_window (const Roi &roi);
-  void cut_window (int camera, const cv::Mat &picture);
   void choose_parts (const std::vector<cv::Rect> *parts);
   Status match ();
   void filter (const cv::Mat &left);
-  void know_background (const cv::Mat &grey, int right_x);
-  void take (const Roi &roi);
+  void restore_background (const cv::Mat &grey, int right_x);
+  void write_disparity (const Roi &roi);
 
   PairGeometry pair_;
   StereoSettings settings_;
   Matcher all_, some_, *matcher_ = &all_;
-  int least_ = 0, most_ = 0; /* disparity range of all depths, pixels */
-  int far_ = 0;              /* disparity, 1/16 pixel, of the farthest depth of interest */
+  int min_disparity_ = 0, max_disparity_ = 0; /* disparity range of all depths, pixels */
+  int far_ = 0; /* disparity, 1/16 pixel, of the farthest depth of interest */
   DisparityFilter filter_;
   SilhouetteFilter silhouettes_;
   DisparityRefiner refiner_;

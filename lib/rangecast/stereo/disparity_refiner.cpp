@@ -86,10 +86,39 @@ private:
   T *columns_, *sums_;
 };
 
+/* One bit per neighbour, eight per row, of which the last is unused. */
+using Members = std::uint64_t;
+constexpr int kLanes = 2 * kPlane + 2;
+static_assert (kLanes == 8 && kPlane == 3);
+using Floats = cv::v_float32x4;
+
+/* Masks for a row of members, left and right half: all bits or none. */
+struct Choice {
+  Floats half[2];
+  Choice (Members members, int v)
+  {
+    alignas (16) static constexpr int kBits[kLanes] = {1, 2, 4, 8, 16, 32, 64, 128};
+    const cv::v_int32x4 row = cv::v_setall_s32 (int (members >> (8 * (v + kPlane)) & 255)),
+                        low = cv::v_load_aligned (kBits), high = cv::v_load_aligned (kBits + 4);
+    half[0] = cv::v_reinterpret_as_f32 ((row & low) == low);
+    half[1] = cv::v_reinterpret_as_f32 ((row & high) == high);
+  }
+};
+
+/* The shift that minimizes the difference between both images, without its mean: cameras may differ
+ * in brightness. From sums over n pixels. */
+inline float
+best_shift (float product, float square, float slope, float difference, float n)
+{
+  const float mean = slope / n,
+              by = -(product - mean * difference) / (square - mean * slope + kDull);
+  return std::min (std::max (by, -kMax), kMax);
+}
+
 } // namespace
 
 void
-DisparityRefiner::make_room (const cv::Size &size, const Tiles &tiles)
+DisparityRefiner::begin (const Job &job, const cv::Size &size, const Tiles &tiles)
 {
   const cv::Size all (size.width + 2 * kPad + 8, size.height + 2 * kPad); /* 8: ends of vectors */
   for (cv::Mat *m : {&first_, &now_, &next_, &products_, &squares_, &slopes_, &differences_}) {
@@ -104,14 +133,7 @@ DisparityRefiner::make_room (const cv::Size &size, const Tiles &tiles)
     plane.create (all, CV_8U);
     plane.setTo (0);
   }
-  members_.assign (std::size_t (all.width) * std::size_t (all.height), 0);
-  parts_ = tiles.tiles ();
-  memory_.reserve (tiles.workers ());
-}
-
-void
-DisparityRefiner::take_colours (const cv::Mat &colour)
-{
+  const cv::Mat &colour = job.colour;
   for (int y = 0; y < colour.rows; y++) {
     const auto from = colour.ptr<std::uint8_t> (y);
     for (int c = 0; c < 3; c++) {
@@ -120,12 +142,15 @@ DisparityRefiner::take_colours (const cv::Mat &colour)
         to[x] = from[4 * x + c];
     }
   }
+  members_.assign (std::size_t (all.width) * std::size_t (all.height), 0);
+  parts_ = tiles.tiles ();
+  memory_.reserve (tiles.workers ());
 }
 
 /* Copies a part of the image and shrinks it to the columns with disparities. From then on parts are
  * in the coordinates of the padded planes. */
 void
-DisparityRefiner::take (const Job &job, const cv::Mat &disparity, cv::Rect &part)
+DisparityRefiner::load (const Job &job, const cv::Mat &disparity, cv::Rect &part)
 {
   int begin = part.width, end = 0;
   for (int y = 0; y < part.height; y++) {
@@ -162,26 +187,6 @@ DisparityRefiner::mark_steps (const cv::Rect &part)
     }
   }
 }
-
-/* One bit per neighbour, eight per row, of which the last is unused. */
-using Members = std::uint64_t;
-constexpr int kLanes = 2 * kPlane + 2;
-static_assert (kLanes == 8 && kPlane == 3);
-using Floats = cv::v_float32x4;
-
-/* Masks for a row of members: all bits or none. */
-struct Choice {
-  Floats left, right;
-  Choice (Members members, int v)
-  {
-    alignas (16) static constexpr int kBits[kLanes] = {1, 2, 4, 8, 16, 32, 64, 128};
-    const cv::v_int32x4 row = cv::v_setall_s32 (int (members >> (8 * (v + kPlane)) & 255)),
-                        low = cv::v_load_aligned (kBits), high = cv::v_load_aligned (kBits + 4);
-    left = cv::v_reinterpret_as_f32 ((row & low) == low);
-    right = cv::v_reinterpret_as_f32 ((row & high) == high);
-  }
-  [[nodiscard]] const Floats &of (int part) const { return part == 0 ? left : right; }
-};
 
 /* The neighbours that belong to the surface of a pixel, by disparity and colour. */
 Members
@@ -227,8 +232,8 @@ DisparityRefiner::on_plane (int x, int y, Members members) const
     const Choice choice (members, v);
     const Floats row = cv::v_setall_f32 (float (v));
     for (int k = 0; k < 2; k++) {
-      const Floats w = choice.of (k) & one,
-                   e = choice.of (k) &
+      const Floats w = choice.half[k] & one,
+                   e = choice.half[k] &
                        (cv::v_load (now_.ptr<float> (y + v) + x - kPlane + 4 * k) - centre),
                    wy = row * w;
       count[k] += w;
@@ -331,21 +336,6 @@ DisparityRefiner::compare (const Job &job, const cv::Rect &part, Memory &m)
   }
 }
 
-/* Sums over pixels. */
-struct Match {
-  float product, square, slope, difference;
-};
-
-/* The shift that minimizes the difference between both images, without its mean: cameras may differ
- * in brightness. */
-inline float
-shift_of (const Match &m, float n)
-{
-  const float mean = m.slope / n,
-              by = -(m.product - mean * m.difference) / (m.square - mean * m.slope + kDull);
-  return std::min (std::max (by, -kMax), kMax);
-}
-
 float
 DisparityRefiner::shift_of_members (int x, int y, Members members) const
 {
@@ -356,15 +346,14 @@ DisparityRefiner::shift_of_members (int x, int y, Members members) const
     const Choice choice (members, v);
     for (int i = 0; i < 4; i++) {
       const float *row = planes[i]->ptr<float> (y + v) + x - kPlane;
-      sums[i] += (choice.left & cv::v_load (row)) + (choice.right & cv::v_load (row + 4));
+      sums[i] += (choice.half[0] & cv::v_load (row)) + (choice.half[1] & cv::v_load (row + 4));
     }
   }
-  return shift_of ({cv::v_reduce_sum (sums[0]), cv::v_reduce_sum (sums[1]),
-                       cv::v_reduce_sum (sums[2]), cv::v_reduce_sum (sums[3])},
-      float (std::popcount (members)));
+  return best_shift (cv::v_reduce_sum (sums[0]), cv::v_reduce_sum (sums[1]),
+      cv::v_reduce_sum (sums[2]), cv::v_reduce_sum (sums[3]), float (std::popcount (members)));
 }
 
-/* From next_ to now_: see shift_of(). */
+/* From next_ to now_: see best_shift(). */
 void
 DisparityRefiner::move (const cv::Rect &part, Memory &m)
 {
@@ -389,8 +378,8 @@ DisparityRefiner::move (const cv::Rect &part, Memory &m)
     auto to = now_.ptr<float> (y) + part.x;
     const Members *members = members_.data () + std::size_t (y) * std::size_t (now_.cols) + part.x;
     for (int x = 0; x < part.width; x++)
-      shift[x] = shift_of (
-          {product[x], square[x], slope[x], difference[x]}, float (std::max<int> (count[x], 1)));
+      shift[x] = best_shift (
+          product[x], square[x], slope[x], difference[x], float (std::max<int> (count[x], 1)));
     for (int x = 0; x < part.width; x++)
       if (members[x] != 0)
         shift[x] = shift_of_members (part.x + x, y, members[x]);
@@ -420,14 +409,13 @@ DisparityRefiner::apply (const Job &job, const Tiles &tiles, cv::Mat &disparity)
 {
   if (job.iterations <= 0 || job.right.cols < 4)
     return;
-  make_room (disparity.size (), tiles);
-  take_colours (job.colour);
+  begin (job, disparity.size (), tiles);
   const auto each = [&] (const auto &work) {
     in_parallel (parts_.size (), tiles.n_threads (), [&] (std::size_t i, std::size_t worker) {
       for_this_cpu ([&, &memory = memory_.of (worker)] { work (parts_[i], memory); });
     });
   };
-  each ([&] (cv::Rect &part, Memory &) { take (job, disparity, part); });
+  each ([&] (cv::Rect &part, Memory &) { load (job, disparity, part); });
   std::erase_if (parts_, [] (const cv::Rect &part) { return part.empty (); });
   each ([&] (const cv::Rect &part, Memory &) { mark_steps (part); });
   each ([&] (const cv::Rect &part, Memory &m) { choose_members (part, m); });

@@ -39,14 +39,13 @@ private:
     std::vector<std::int32_t> at;
     std::vector<std::uint32_t> greys;
   };
-  void make_room (const cv::Size &size, const Tiles &tiles);
-  void take (const Job &job, const cv::Mat &disparity, cv::Rect &part);
+  void begin (const Job &job, const cv::Size &size, const Tiles &tiles);
+  void load (const Job &job, const cv::Mat &disparity, cv::Rect &part);
   void mark_steps (const cv::Rect &part);
   void smooth (const cv::Rect &part, Memory &memory);
   void compare (const Job &job, const cv::Rect &part, Memory &memory);
   void move (const cv::Rect &part, Memory &memory);
   void put_back (const Job &job, const cv::Rect &part, cv::Mat &disparity) const;
-  void take_colours (const cv::Mat &colour);
   void choose_members (const cv::Rect &part, Memory &memory);
   [[nodiscard]] std::uint64_t members_of (int x, int y) const;
   [[nodiscard]] float on_plane (int x, int y, std::uint64_t members) const;

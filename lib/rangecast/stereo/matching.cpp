@@ -7,55 +7,49 @@
 #include <string>
 
 namespace rangecast {
+namespace {
 
 /* Limit of OpenCV's 16-bit disparities in 1/16 pixel. */
 constexpr int kMaxDisparity = 2000;
 
-static cv::Ptr<cv::StereoMatcher>
-make_bm (const MatchSettings &s, int block_size, int disparities)
-{
-  auto bm = cv::StereoBM::create (disparities, block_size);
-  bm->setPreFilterCap (31);
-  bm->setTextureThreshold (10);
-  bm->setUniquenessRatio (s.uniqueness_ratio);
-  return bm;
-}
-
-static cv::Ptr<cv::StereoMatcher>
-make_sgbm (const MatchSettings &s, int block_size, int disparities)
-{
-  /* A quarter less than in OpenCV's examples: steps are located better, and hair is less often
-   * merged with the background. */
-  const int area = block_size * block_size;
-  const int mode = s.algorithm == MatchAlgorithm::kSgbm ? cv::StereoSGBM::MODE_SGBM
-                                                        : cv::StereoSGBM::MODE_SGBM_3WAY;
-  return cv::StereoSGBM::create (
-      0, disparities, block_size, 6 * area, 24 * area, 0, 31, s.uniqueness_ratio, 0, 0, mode);
-}
-
-static int
-block_of (const MatchSettings &s)
+int
+block_size_of (const MatchSettings &s)
 {
   return s.block_size > 0 ? s.block_size : s.algorithm == MatchAlgorithm::kBm ? 15 : 3;
 }
 
-static cv::Ptr<cv::StereoMatcher>
-make (const MatchSettings &s, int min_disparity, int disparities)
+cv::Ptr<cv::StereoMatcher>
+make_matcher (const MatchSettings &s, int min_disparity, int disparities)
 {
-  const cv::Ptr<cv::StereoMatcher> matcher = s.algorithm == MatchAlgorithm::kBm
-                                                 ? make_bm (s, block_of (s), disparities)
-                                                 : make_sgbm (s, block_of (s), disparities);
+  const int block_size = block_size_of (s), area = block_size * block_size;
+  cv::Ptr<cv::StereoMatcher> matcher;
+  if (s.algorithm == MatchAlgorithm::kBm) {
+    const auto bm = cv::StereoBM::create (disparities, block_size);
+    bm->setPreFilterCap (31);
+    bm->setTextureThreshold (10);
+    bm->setUniquenessRatio (s.uniqueness_ratio);
+    matcher = bm;
+  } else {
+    /* Penalties are a quarter less than in OpenCV's examples: steps are located better, and hair is
+     * less often merged with the background. */
+    matcher = cv::StereoSGBM::create (0, disparities, block_size, 6 * area, 24 * area, 0, 31,
+        s.uniqueness_ratio, 0, 0,
+        s.algorithm == MatchAlgorithm::kSgbm ? cv::StereoSGBM::MODE_SGBM
+                                             : cv::StereoSGBM::MODE_SGBM_3WAY);
+  }
   matcher->setMinDisparity (min_disparity);
   matcher->setSpeckleWindowSize (0); /* DisparityFinder does it after other filters */
   matcher->setDisp12MaxDiff (s.left_right_max_difference);
   return matcher;
 }
 
+} // namespace
+
 Status
 Matcher::set (const MatchSettings &s, int min_disparity, int max_disparity)
 {
   const bool bm = s.algorithm == MatchAlgorithm::kBm;
-  const int block = block_of (s);
+  const int block = block_size_of (s);
   if (block % 2 == 0 || (bm && block < 5) || block > 51)
     return {StatusCode::kBadValue, "stereo: block size " + std::to_string (block) +
                                        ", expected an odd number" +
@@ -81,7 +75,7 @@ Matcher::set_range (int min_disparity, int max_disparity)
     return {};
   try {
     if (!matcher_)
-      matcher_ = make (settings_, min_disparity_, disparities_);
+      matcher_ = make_matcher (settings_, min_disparity_, disparities_);
     const auto limit = [this] (cv::StereoMatcher &matcher) {
       matcher.setMinDisparity (min_disparity_);
       matcher.setNumDisparities (disparities_);
@@ -132,9 +126,9 @@ Matcher::match_stripes (
 {
   constexpr int kOverlap = 16; /* minimum number of rows; the paths of SGM converge within them */
   const int n = std::clamp (left.rows / (4 * kOverlap), 1, n_threads);
-  const int overlap = std::max (kOverlap, block_of (settings_));
+  const int overlap = std::max (kOverlap, block_size_of (settings_));
   while (static_cast<int> (more_.size ()) < n)
-    more_.push_back (make (settings_, min_disparity_, disparities_));
+    more_.push_back (make_matcher (settings_, min_disparity_, disparities_));
   stripes_.resize (more_.size ());
   disparity.create (left.size (), CV_16S);
   std::atomic<bool> failed = false;

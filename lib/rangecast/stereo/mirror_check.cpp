@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 namespace rangecast {
+namespace {
 
 constexpr int kWidth = 240;      /* width to which images are scaled down, pixels */
 constexpr int kEveryPicture = 8; /* number of images that are all examined at first */
@@ -17,7 +18,7 @@ constexpr double kMuch = 0.04, kTimes = 2;
 
 /* Fraction of pixels in front of the cameras minus those beyond infinity. The same disparity range
  * is searched on both sides, so that random matches cancel. */
-static double
+double
 balance (const MirrorCheck::Pair &pair, double infinity, double most)
 {
   const double scale = std::min (1.0, double (kWidth) / pair.left.cols);
@@ -45,8 +46,10 @@ balance (const MirrorCheck::Pair &pair, double infinity, double most)
   return (front - behind) / double (inside.total ());
 }
 
+} // namespace
+
 bool
-MirrorCheck::wants_next ()
+MirrorCheck::is_due ()
 {
   if (decided_ || seen_++ < next_)
     return false;
@@ -55,7 +58,7 @@ MirrorCheck::wants_next ()
 }
 
 void
-MirrorCheck::look (const Pair &as_is, const Pair &exchanged, double infinity, double most)
+MirrorCheck::evaluate (const Pair &as_is, const Pair &exchanged, double infinity, double most)
 {
   const double normal = balance (as_is, infinity, most),
                mirrored = balance (exchanged, infinity, most);

@@ -15,18 +15,18 @@ public:
   };
 
   void reset () { *this = {}; }
-  /** Whether look() has reached a decision and need not be called again. */
+  /** Whether evaluate() has reached a decision and need not be called again. */
   [[nodiscard]] bool decided () const { return decided_; }
   [[nodiscard]] bool mirrored () const { return mirrored_; }
   /** Whether to examine the next images: all at first, then fewer and fewer, to save time if there
    * is nothing to match. Counts the calls. */
-  [[nodiscard]] bool wants_next ();
+  [[nodiscard]] bool is_due ();
 
   /** @param as_is      rectified in the given order
    *  @param exchanged  the same images, exchanged and then rectified
    *  @param infinity   disparity of infinity, pixels
    *  @param most       maximum disparity to search, pixels */
-  void look (const Pair &as_is, const Pair &exchanged, double infinity, double most);
+  void evaluate (const Pair &as_is, const Pair &exchanged, double infinity, double most);
 
 private:
   int seen_ = 0, next_ = 0;

@@ -5,8 +5,10 @@
 
 namespace rangecast {
 
+namespace {
 constexpr int kBlock = ChangeDetector::kBlock;
-constexpr int kFew = 4; /* number of pixels with depth in a block that may be noise */
+constexpr int kMinPixels = 4; /* with depth in a block; fewer may be noise */
+} // namespace
 
 void
 Occupancy::set (int width, int height)
@@ -33,7 +35,7 @@ Occupancy::learn (const RangeImage &image)
         for (int x = x0; x < x1; x++)
           n += depth[x] != 0;
       }
-      had_depth_[std::size_t (by * columns_ + bx)] = n >= kFew;
+      had_depth_[std::size_t (by * columns_ + bx)] = n >= kMinPixels;
     }
   }
   known_ = true;

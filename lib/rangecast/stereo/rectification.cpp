@@ -16,12 +16,6 @@ camera_matrix (const Intrinsics &k)
   return (cv::Mat_<double> (3, 3) << k.fx, 0, k.cx, 0, k.fy, k.cy, 0, 0, 1);
 }
 
-cv::Mat
-matrix (const Mat3 &m)
-{
-  return cv::Mat (3, 3, CV_64F, const_cast<double *> (m.data ())).clone ();
-}
-
 Status
 bad_pair (const View &view, const char *what)
 {
@@ -43,12 +37,8 @@ Rectifier::set (const View &view)
   for (auto &maps : maps_)
     for (cv::Mat &map : maps)
       map.release ();
-  return is_rectified (view) ? set_ideal (view) : set_from_rectification (view);
-}
-
-Status
-Rectifier::set_ideal (const View &view)
-{
+  if (!is_rectified (view))
+    return compute_rectification (view);
   baseline_m_ = -view.right->partner_from_left.translation.x;
   principal_offset_ = view.right->intrinsics.cx - view.intrinsics.cx;
   if (baseline_m_ <= 0)
@@ -57,18 +47,18 @@ Rectifier::set_ideal (const View &view)
 }
 
 Status
-Rectifier::set_from_rectification (const View &view)
+Rectifier::compute_rectification (const View &view)
 {
   const PartnerCamera &right = *view.right;
   const Vec3 &t = right.partner_from_left.translation;
   const cv::Size size (view.width, view.height);
   const cv::Mat k1 = camera_matrix (view.intrinsics), k2 = camera_matrix (right.intrinsics);
-  const cv::Mat translation = (cv::Mat_<double> (3, 1) << t.x, t.y, t.z);
+  const cv::Mat rotation (cv::Matx33d (right.partner_from_left.rotation.data ())),
+      translation = (cv::Mat_<double> (3, 1) << t.x, t.y, t.z);
   cv::Mat r1, r2, p1, p2, q;
   try {
-    cv::stereoRectify (k1, view.distortion, k2, right.distortion, size,
-        matrix (right.partner_from_left.rotation), translation, r1, r2, p1, p2, q,
-        cv::CALIB_ZERO_DISPARITY, 0);
+    cv::stereoRectify (k1, view.distortion, k2, right.distortion, size, rotation, translation, r1,
+        r2, p1, p2, q, cv::CALIB_ZERO_DISPARITY, 0);
     cv::initUndistortRectifyMap (
         k1, view.distortion, r1, p1, size, CV_16SC2, maps_[0][0], maps_[0][1]);
     cv::initUndistortRectifyMap (

@@ -32,8 +32,7 @@ public:
   void rectify (int camera, const cv::Mat &in, cv::Mat &out) const;
 
 private:
-  Status set_ideal (const View &view);
-  Status set_from_rectification (const View &view);
+  Status compute_rectification (const View &view);
 
   View range_view_;
   double baseline_m_ = 0, principal_offset_ = 0;

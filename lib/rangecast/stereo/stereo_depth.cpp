@@ -17,14 +17,6 @@ as_mat (ImageView<const Rgbx> picture)
       static_cast<std::size_t> (picture.stride));
 }
 
-template <typename T>
-ImageView<T>
-as_view (const cv::Mat &mat)
-{
-  return {
-      reinterpret_cast<T *> (mat.data), mat.cols, mat.rows, static_cast<std::ptrdiff_t> (mat.step)};
-}
-
 } // namespace
 
 Status
@@ -58,20 +50,12 @@ StereoDepth::set (const View &view, const StereoSettings &settings, bool with_th
       range.intrinsics.fx, rectifier_.baseline_m (), range.depth_unit_m, range.near_m, range.far_m);
 }
 
-void
-StereoDepth::rectify (int camera, ImageView<const Rgbx> picture)
-{
-  raw_[camera] = pictures_[camera] = as_mat (picture);
-  if (rectifier_.is_identity ())
-    return;
-  rectifier_.rectify (camera, pictures_[camera], rectified_[camera]);
-  pictures_[camera] = rectified_[camera];
-}
-
 ImageView<const std::uint16_t>
 StereoDepth::disparity () const
 {
-  return as_view<const std::uint16_t> (finder_.disparity ());
+  const cv::Mat &mat = finder_.disparity ();
+  return {reinterpret_cast<const std::uint16_t *> (mat.data), mat.cols, mat.rows,
+      static_cast<std::ptrdiff_t> (mat.step)};
 }
 
 Status
@@ -83,13 +67,17 @@ StereoDepth::rectify (
     if (picture.width != view_.width || picture.height != view_.height)
       return {StatusCode::kBadSize, "stereo: an image does not have the view's size"};
   try {
-    rectify (0, left);
-    rectify (1, right);
-    if (has_third_)
-      third_.take (as_mat (left), as_mat (third));
-    for (int i = 0; i < 2; i++)
+    for (int i = 0; i < 2; i++) {
+      raw_[i] = pictures_[i] = as_mat (i ? right : left);
+      if (!rectifier_.is_identity ()) {
+        rectifier_.rectify (i, raw_[i], rectified_[i]);
+        pictures_[i] = rectified_[i];
+      }
       matched_[i] = settings_.average > 1 ? still_[i].add (pictures_[i]) : pictures_[i];
-    changes_.look (pictures_[0]);
+    }
+    if (has_third_)
+      third_.rectify (raw_[0], as_mat (third));
+    changes_.update (pictures_[0]);
   } catch (const cv::Exception &) {
     return {StatusCode::kNoSpace, "stereo: OpenCV failed to rectify"};
   }
@@ -192,12 +180,12 @@ StereoDepth::find (const RangeImage &image, bool everywhere)
   return status;
 }
 
-/* Images are exchanged before rectification, because lenses and rows are those of the other camera.
+/* Exchanges the images before rectification, because lenses and rows are those of the other camera.
  */
 void
 StereoDepth::check_mirror ()
 {
-  if (!mirror_.wants_next ())
+  if (!mirror_.is_due ())
     return;
   try {
     MirrorCheck::Pair exchanged = {raw_[1], raw_[0]};
@@ -206,8 +194,8 @@ StereoDepth::check_mirror ()
       rectifier_.rectify (0, raw_[1], exchanged.left);
       rectifier_.rectify (1, raw_[0], exchanged.right);
     }
-    mirror_.look (
-        {pictures_[0], pictures_[1]}, exchanged, -rectifier_.principal_offset (), finder_.most ());
+    mirror_.evaluate ({pictures_[0], pictures_[1]}, exchanged, -rectifier_.principal_offset (),
+        finder_.max_disparity ());
   } catch (const cv::Exception &) {
     return; /* too small to decide */
   }
@@ -229,7 +217,7 @@ StereoDepth::match (const RangeImage &image)
   }
   const bool whole = roi.width == view_.width && roi.height == view_.height;
   if (whole) {
-    changes_.remember ();
+    changes_.set_reference ();
     check_mirror ();
   }
   const bool everywhere = whole || near_now_m_ <= 0;

@@ -79,7 +79,6 @@ public:
   [[nodiscard]] ImageView<const std::uint16_t> disparity () const;
 
 private:
-  void rectify (int camera, ImageView<const Rgbx> picture);
   Status find (const RangeImage &image, bool everywhere);
   void clear_rims_of_third (const Roi &roi);
   void check_mirror ();

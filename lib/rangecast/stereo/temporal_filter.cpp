@@ -5,17 +5,20 @@
 #include <cmath>
 
 namespace rangecast {
+namespace {
 
 constexpr int kBlock = 8;
 constexpr float kDrift = 0.15f;  /* pixels of disparity, in two successive images */
 constexpr float kJump = 1.0f;    /* the same, of one pixel */
 constexpr float kMaxNoise = 6.f; /* grey levels: more is motion */
 
-static float
+float
 grey_of (const Rgbx &p)
 {
   return (2.f * p.r + 5.f * p.g + p.b) / 8.f;
 }
+
+} // namespace
 
 void
 TemporalFilter::set (int width, int height, double steady, double focal_baseline)
@@ -32,7 +35,7 @@ TemporalFilter::set (int width, int height, double steady, double focal_baseline
 
 /* Compares the part of a block that is in the ROI. */
 void
-TemporalFilter::look_at_block (const RangeImage &image, int bx, int by, Block &block) const
+TemporalFilter::compare_block (const RangeImage &image, int bx, int by, Block &block) const
 {
   const Roi &roi = image.roi;
   const int x0 = std::max (bx * kBlock, roi.x),
@@ -110,7 +113,7 @@ TemporalFilter::apply (const RangeImage &image)
         work (bx, by, blocks_[static_cast<std::size_t> (by * columns_ + bx)]);
   };
   each ([&] (int bx, int by, Block &block) {
-    look_at_block (image, bx, by, block);
+    compare_block (image, bx, by, block);
     changes_.push_back (block.change);
   });
   const float most = 1 + 1.5f * noise ();

@@ -31,7 +31,7 @@ private:
     float drift_before = 0; /* in the previous image */
     bool moves = false, drifts = false;
   };
-  void look_at_block (const RangeImage &image, int bx, int by, Block &block) const;
+  void compare_block (const RangeImage &image, int bx, int by, Block &block) const;
   [[nodiscard]] float noise ();
   void average (const RangeImage &image);
 

@@ -10,12 +10,6 @@ namespace rangecast {
 namespace {
 
 cv::Matx33d
-matx (const Mat3 &m)
-{
-  return cv::Matx33d (m.data ());
-}
-
-cv::Matx33d
 camera_matrix (const Intrinsics &k)
 {
   return {k.fx, 0, k.cx, 0, k.fy, k.cy, 0, 0, 1};
@@ -25,6 +19,19 @@ Status
 bad_third (const View &view, const char *what)
 {
   return {StatusCode::kBadValue, "view " + std::to_string (view.id) + ": third camera " + what};
+}
+
+/* Number of pixels around (x, y) that agree with disparity d. */
+int
+support (const cv::Mat &of, int x, int y, int d)
+{
+  int n = 0;
+  for (int v = std::max (0, y - 2); v <= std::min (of.rows - 1, y + 2); v++)
+    for (int u = std::max (0, x - 2); u <= std::min (of.cols - 1, x + 2); u++) {
+      const int other = of.at<std::uint16_t> (v, u);
+      n += other != 0 && std::abs (other - d) <= 20;
+    }
+  return n;
 }
 
 } // namespace
@@ -57,7 +64,8 @@ ThirdPair::place (const View &view, const View &range_view)
       transposed (view.world_from_view.rotation) * range_view.world_from_view.rotation;
   const double fx = range_view.intrinsics.fx;
   picture_from_range_ = cv::Matx33d (fx, 0, 0, 0, fx, 0, 0, 0, 1) * rectified_from_left_ *
-                        matx (left_from_range) * camera_matrix (range_view.intrinsics).inv ();
+                        cv::Matx33d (left_from_range.data ()) *
+                        camera_matrix (range_view.intrinsics).inv ();
   cv::Vec2d low, high;
   if (!bounds ({0, 0, range_view.width, range_view.height}, low, high))
     return bad_third (view, "looks elsewhere");
@@ -92,10 +100,10 @@ ThirdPair::bounds (const Roi &roi, cv::Vec2d &low, cv::Vec2d &high) const
 }
 
 Status
-ThirdPair::rectify (const View &view)
+ThirdPair::make_maps (const View &view)
 {
   const cv::Matx33d rotations[2] = {rectified_from_left_,
-      rectified_from_left_ * matx (view.third->partner_from_left.rotation).t ()};
+      rectified_from_left_ * cv::Matx33d (view.third->partner_from_left.rotation.data ()).t ()};
   const cv::Size size (pair_.width, pair_.height);
   try {
     cv::initUndistortRectifyMap (camera_matrix (view.intrinsics), view.distortion, rotations[0],
@@ -108,6 +116,7 @@ ThirdPair::rectify (const View &view)
   return {};
 }
 
+/* Computes where each pixel of the range view is in the rectified image. */
 void
 ThirdPair::map_range_view (const View &range_view, double focal_baseline)
 {
@@ -136,7 +145,7 @@ ThirdPair::set (
     return s;
   if (Status s = place (view, range_view); !s.ok ())
     return s;
-  if (Status s = rectify (view); !s.ok ())
+  if (Status s = make_maps (view); !s.ok ())
     return s;
   map_range_view (range_view, focal_baseline);
   precision_ = pair_.focal_baseline / focal_baseline;
@@ -149,7 +158,7 @@ ThirdPair::set (
 }
 
 void
-ThirdPair::take (const cv::Mat &left, const cv::Mat &third)
+ThirdPair::rectify (const cv::Mat &left, const cv::Mat &third)
 {
   cv::remap (left, pictures_[0], maps_[0][0], maps_[0][1], cv::INTER_LINEAR);
   cv::remap (third, pictures_[1], maps_[1][0], maps_[1][1], cv::INTER_LINEAR);
@@ -207,19 +216,6 @@ ThirdPair::find (const Roi &roi, double near_m, double far_m)
     }
   }
   return {};
-}
-
-/* Number of pixels around (x, y) that agree with disparity d. */
-static int
-support (const cv::Mat &of, int x, int y, int d)
-{
-  int n = 0;
-  for (int v = std::max (0, y - 2); v <= std::min (of.rows - 1, y + 2); v++)
-    for (int u = std::max (0, x - 2); u <= std::min (of.cols - 1, x + 2); u++) {
-      const int other = of.at<std::uint16_t> (v, u);
-      n += other != 0 && std::abs (other - d) <= 20;
-    }
-  return n;
 }
 
 void

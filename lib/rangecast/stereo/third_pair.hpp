@@ -22,8 +22,8 @@ public:
   Status set (const View &view, const View &range_view, double focal_baseline,
       const StereoSettings &settings);
 
-  /** Rectifies. @param left, third  CV_8UC4, of the view's size, not rectified */
-  void take (const cv::Mat &left, const cv::Mat &third);
+  /** @param left, third  CV_8UC4, of the view's size, not rectified */
+  void rectify (const cv::Mat &left, const cv::Mat &third);
 
   /** @param roi  of the range view
    *  @param near_m, far_m  depths of the range view; else as DisparityFinder::find() */
@@ -40,7 +40,7 @@ private:
   };
   Status choose_axes (const View &view);
   Status place (const View &view, const View &range_view);
-  Status rectify (const View &view);
+  Status make_maps (const View &view);
   void map_range_view (const View &range_view, double focal_baseline);
   bool bounds (const Roi &roi, cv::Vec2d &low, cv::Vec2d &high) const;
   [[nodiscard]] Roi bounding_box (const Roi &roi) const;

@@ -29,11 +29,11 @@ bool
 changed (cv::Rect brighter, const Roi &roi, int levels = 30)
 {
   ChangeDetector detector;
-  detector.look (picture (1));
-  detector.remember ();
+  detector.update (picture (1));
+  detector.set_reference ();
   cv::Mat next = picture (2);
   next (brighter) += cv::Scalar (0, levels, 0, 0);
-  detector.look (next);
+  detector.update (next);
   return detector.changed_outside (roi);
 }
 
@@ -65,14 +65,14 @@ TEST (ChangeDetector, one_block_is_not_enough_and_little_light_neither)
 TEST (ChangeDetector, without_memory_or_after_a_new_size_everything_has_changed)
 {
   ChangeDetector detector;
-  detector.look (picture (1));
+  detector.update (picture (1));
   EXPECT_TRUE (detector.changed_outside (kRoi));
-  detector.remember ();
-  detector.look (picture (2));
+  detector.set_reference ();
+  detector.update (picture (2));
   EXPECT_FALSE (detector.changed_outside (kRoi));
-  detector.look (picture (3) (cv::Rect (0, 0, 100, 100)));
+  detector.update (picture (3) (cv::Rect (0, 0, 100, 100)));
   EXPECT_TRUE (detector.changed_outside (kRoi));
-  detector.look (picture (2));
+  detector.update (picture (2));
   detector.reset ();
   EXPECT_TRUE (detector.changed_outside (kRoi));
 }
@@ -91,7 +91,7 @@ TEST (ChangeDetector, whole_blocks_are_those_that_opencv_makes)
     for (CpuLevel level : kCpuLevels) {
       limit_cpu (level);
       ChangeDetector detector;
-      detector.look (part);
+      detector.update (part);
       ASSERT_EQ (detector.blocks ().size (), expected.size ());
       EXPECT_EQ (cv::norm (detector.blocks (), expected, cv::NORM_INF), 0) << most << " levels";
     }

@@ -312,7 +312,7 @@ TEST (Rectification, third_camera_may_stand_anywhere_beside_and_turned)
   const auto mat = [] (Image<Rgbx> &image) {
     return cv::Mat (240, 320, CV_8UC4, image.view ().data, std::size_t (image.view ().stride));
   };
-  pair.take (mat (left), mat (turned));
+  pair.rectify (mat (left), mat (turned));
   ASSERT_TRUE (pair.find ({0, 0, 320, 240}, 0, 0).ok ());
   int person = 0, right_ones = 0;
   for (int y = 0; y < 240; y++)

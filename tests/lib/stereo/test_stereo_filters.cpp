@@ -313,14 +313,14 @@ struct Seen {
   void learn ()
   {
     look ();
-    changes.remember ();
+    changes.set_reference ();
     look ();
     occupancy.learn ({0, {0, 0, kWidth, kHeight}, depth.view (), colour.view (), 0});
   }
   void look ()
   {
     const auto view = colour.view ();
-    changes.look (
+    changes.update (
         cv::Mat (kHeight, kWidth, CV_8UC4, view.data, static_cast<std::size_t> (view.stride)));
   }
   void fill_depth (int x0, int y0, int x1, int y1)

@@ -127,7 +127,7 @@ struct Trio {
   }
   void take (const Walls &walls)
   {
-    pair.take (draw (walls, view.intrinsics, view.distortion, {}),
+    pair.rectify (draw (walls, view.intrinsics, view.distortion, {}),
         draw (
             walls, view.third->intrinsics, view.third->distortion, view.third->partner_from_left));
   }
