@@ -16,7 +16,7 @@ namespace {
 constexpr int kSide = 3, kDiagonal = 4;
 constexpr int kFarthest = kSide * kFeatherPixels;
 
-/* Metres by which a view has to see farther than a place to see through it. */
+/* A view sees through a point if it sees something farther by this, metres. */
 constexpr double kClearance = 0.01;
 /* A view sees the background at an invalid pixel if there is no valid one this near: matching
  * leaves holes in surfaces, too. */
@@ -26,9 +26,10 @@ constexpr int kBackgroundRadius = 1;
  */
 constexpr int kCopyRange = 7, kCopyReach = 2;
 
-class Planes {
+class PlaneBuilder {
 public:
-  Planes (std::span<const SurfaceView> views, std::size_t which, double depth_step, BlendPlanes &to)
+  PlaneBuilder (
+      std::span<const SurfaceView> views, std::size_t which, double depth_step, BlendPlanes &to)
       : views_ (views), which_ (which), image_ (views[which].image), view_ (*views[which].view),
         depth_step_ (static_cast<float> (depth_step)),
         steep_ (static_cast<float> (kSteepSlope / view_.intrinsics.fx)), to_ (to),
@@ -137,7 +138,7 @@ private:
     }
   }
 
-  /* One step for pixels at a depth edge. */
+  /* Initial distances: one step for pixels at a depth edge. */
   void begin_distances (int y)
   {
     for (int x = 0; x < width_; x++) {
@@ -180,7 +181,8 @@ private:
     smooth (width_, [this] (int, int y) { return std::pair (y, height_); });
   }
 
-  /* Pixels that equal the left, upper-left, upper or upper-right one. */
+  /* Finds pixels that equal the left, upper-left, upper or upper-right one. @return whether any
+   * does */
   bool find_copies (int y)
   {
     std::uint8_t *copied = &to_.copied[place (0, y)];
@@ -246,8 +248,8 @@ private:
     int before, after;         /* of the depth */
     int has_before, has_after; /* 1: joined */
   };
-  /* What depth changes by from one pixel to the next: the mean of both sides, or the steeper step,
-   * if that is a steep one. */
+  /* Change of depth from one pixel to the next: the mean of both sides, or the steeper step if that
+   * is steep. */
   [[nodiscard]] float slope (Steps s, float steep_share) const
   {
     const int before = s.has_before * s.before, after = s.has_after * s.after;
@@ -259,8 +261,8 @@ private:
     return mean + part * (static_cast<float> (steeper) - mean);
   }
 
-  /* The square root of what a place weighs: of the distance to the edge, times the cosine between
-   * the surface's normal and the ray to the camera. */
+  /* The square root of the weight: of the distance to the edge times the squared cosine between the
+   * surface's normal and the ray to the camera. */
   void weigh_row (int y)
   {
     const std::uint16_t *depth = image_.depth.row (y);
@@ -318,7 +320,7 @@ void
 make_blend_planes (
     std::span<const SurfaceView> views, std::size_t which, double depth_step, BlendPlanes &to)
 {
-  for_this_cpu ([&] { Planes (views, which, depth_step, to).make (); });
+  for_this_cpu ([&] { PlaneBuilder (views, which, depth_step, to).make (); });
 }
 
 } // namespace rangecast

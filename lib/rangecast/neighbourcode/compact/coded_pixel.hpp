@@ -141,14 +141,14 @@ struct CodedPixel {
 };
 
 /** Limits of the components, and of depth, R, G, B. */
-struct Limits {
+struct PixelLimits {
   Components min{}, max{};   ///< of depth, Y, Co, Cg
   Components max_rgb{};      ///< of depth, R, G, B; the minima are 0
   Components max_residual{}; ///< in steps: enough to move a component across its range
 
-  Limits () = default;
+  PixelLimits () = default;
   /** @param last_depth, maximum  greatest codes of depth and colour */
-  Limits (std::int32_t last_depth, std::int32_t maximum, Components steps)
+  PixelLimits (std::int32_t last_depth, std::int32_t maximum, Components steps)
       : min{0, 0, -maximum, -maximum}, max{last_depth, maximum, maximum, maximum}, max_rgb (max),
         max_residual ((1 << 17) / steps + 1)
   {
@@ -157,7 +157,7 @@ struct Limits {
 
 /** The pixel that predicts the first one of a slice. */
 inline PixelCode
-first_expected (const Limits &limits)
+first_expected (const PixelLimits &limits)
 {
   return pack_components (Components{limits.max[0] / 2, limits.max[1] / 2, 0, 0});
 }
@@ -166,7 +166,7 @@ first_expected (const Limits &limits)
  * rounded.
  */
 inline Components
-to_rgb (Components c, const Limits &limits)
+to_rgb (Components c, const PixelLimits &limits)
 {
   const Components half =
       c >> 1; /* t = Y - half of Cg; G = t + Cg; B = t - half of Co; R = B + Co */
@@ -245,7 +245,7 @@ struct Steps {
 
 /** A predicted pixel plus its residual; the residual may be any number. */
 inline Components
-correct (Components predicted, Components residual, Components steps, const Limits &limits)
+correct (Components predicted, Components residual, Components steps, const PixelLimits &limits)
 {
   const Components bounded = clamped (residual, -limits.max_residual, limits.max_residual);
   return clamped (predicted + bounded * steps, limits.min, limits.max);

@@ -30,7 +30,7 @@ public:
 
 /* A pixel as it goes into the image: R, G, B in the lower half, depth in the upper. */
 inline std::uint64_t
-shown_as (PixelCode code, const CompactQuantisers &quantisers, const Limits &limits)
+shown_as (PixelCode code, const CompactQuantisers &quantisers, const PixelLimits &limits)
 {
   const Components c = to_rgb (components_of (code), limits);
   const std::uint64_t depth = quantisers.depth.depth (static_cast<std::uint16_t> (c[0]));
@@ -249,7 +249,8 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
     motions_.assign (
         motion_blocks (header.roi.x + header.first_column, header.columns), BlockMotion{});
   }
-  limits_ = Limits (quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1, steps_);
+  limits_ =
+      PixelLimits (quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1, steps_);
   last_ = first_expected (limits_);
   for (int y = 0; y < header.rows; y++) {
     if constexpr (Delta)

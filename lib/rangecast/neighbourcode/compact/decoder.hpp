@@ -50,7 +50,7 @@ private:
   std::vector<std::uint8_t> bytes_;      /* of the slice, and padding */
   EntropyModel model_{};
   Components steps_{};
-  Limits limits_;
+  PixelLimits limits_;
   PixelCode last_ = kNoPixel;
 };
 

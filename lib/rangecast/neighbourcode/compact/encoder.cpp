@@ -536,7 +536,7 @@ CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &ba
   half_steps_ = steps_ / 2;
   reciprocals_ = 1.0f / __builtin_convertvector(steps_, FloatComponents);
   limits_ =
-      Limits (quantisers_->depth.codes () - 1, (1 << quantisers_->colour.bits ()) - 1, steps_);
+      PixelLimits (quantisers_->depth.codes () - 1, (1 << quantisers_->colour.bits ()) - 1, steps_);
   orders_ = {};
   size_sums_ = size_counts_ = Components{};
   const ConstRangeImage &image = picture.image;

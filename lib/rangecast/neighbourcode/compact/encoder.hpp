@@ -8,7 +8,7 @@
 #include "../../geometry/quantiser.hpp"
 #include "../../geometry/range_image.hpp"
 #include "../bitstream/refresh.hpp"
-#include "../bitstream/slice_partition.hpp"
+#include "../encoder_result.hpp"
 #include "entropy_code.hpp"
 #include "pixel_key.hpp"
 #include "row.hpp"
@@ -91,7 +91,7 @@ private:
   EncoderResult result_;
   Components steps_{}, half_steps_{};
   FloatComponents reciprocals_{};
-  Limits limits_;
+  PixelLimits limits_;
   PixelKey bias_ = 0, earlier_bias_ = 0; /* of the thresholds */
   Components earlier_threshold_{};
   CodingReference reference_;

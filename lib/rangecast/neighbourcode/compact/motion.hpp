@@ -80,7 +80,7 @@ public:
     const DepthQuantiser &depth;
     const ColourQuantiser &colour;
     const ReferencePlane &before; ///< holds PixelCodes
-    const Limits &limits;
+    const PixelLimits &limits;
   };
 
   /** @param threshold  of depth, R, G, B, codes
