@@ -115,10 +115,10 @@ private:
   {
     const int a = image_.depth.at (x, y), b = image_.depth.at (u, v);
     const auto step = static_cast<float> (std::abs (a - b)),
-               least = static_cast<float> (std::min (a, b));
-    if (b == kInvalidDepth || step > depth_step_ * least)
+               min = static_cast<float> (std::min (a, b));
+    if (b == kInvalidDepth || step > depth_step_ * min)
       return false;
-    return step <= steep_ * least ||
+    return step <= steep_ * min ||
            !is_seen_through (0.5 * (world_of (x, y, a) + world_of (u, v, b)));
   }
 
@@ -156,9 +156,9 @@ private:
     const auto sweep = [this] (int x, int y, int way) {
       std::uint8_t *at = &to_.weight[place (x, y)];
       const std::ptrdiff_t row = way * width_;
-      const int least = std::min (
+      const int min = std::min (
           std::min (at[way], at[row]) + kSide, std::min (at[row - 1], at[row + 1]) + kDiagonal);
-      *at = static_cast<std::uint8_t> (std::min<int> (*at, least));
+      *at = static_cast<std::uint8_t> (std::min<int> (*at, min));
     };
     for (int y = 1; y + 1 < height_; y++)
       for (int x = 1; x + 1 < width_; x++)
@@ -295,8 +295,8 @@ private:
       const int distance = weight[x];
       const float share = static_cast<float> (distance) * (1.f / kFarthest);
       const auto root = static_cast<int> (255 * std::sqrt (share * squared) + 0.5f);
-      const int least = distance > 0 ? 1 : 0, most = root > 255 ? 255 : root;
-      weight[x] = static_cast<std::uint8_t> (most > least ? most : least);
+      const int min = distance > 0 ? 1 : 0, max = root > 255 ? 255 : root;
+      weight[x] = static_cast<std::uint8_t> (max > min ? max : min);
     };
     weigh (0, 0, width > 1 ? 1 : 0);
     for (int x = 1; x < width - 1; x++)

@@ -288,11 +288,11 @@ public:
 
 private:
   template <std::size_t N>
-  [[gnu::always_inline]] int get (const std::array<PackedTables::Entry, N> &table, int most)
+  [[gnu::always_inline]] int get (const std::array<PackedTables::Entry, N> &table, int max_bits)
   {
-    if (count_ < most)
+    if (count_ < max_bits)
       refill ();
-    const PackedTables::Entry e = table[held_ & ((1u << most) - 1)];
+    const PackedTables::Entry e = table[held_ & ((1u << max_bits) - 1)];
     consume (e.length);
     return e.symbol;
   }

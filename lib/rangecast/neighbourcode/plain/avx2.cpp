@@ -133,9 +133,9 @@ load_pixels (const PlainPixel *from)
 
 /* Lanes of all ones where `pixel` lies between the limits in all four numbers. */
 AVX2 inline __m256i
-is_between (__m256i pixel, __m256i least, __m256i most)
+is_between (__m256i pixel, __m256i min, __m256i max)
 {
-  return _mm256_cmpeq_epi64 (_mm256_min_epu16 (_mm256_max_epu16 (pixel, least), most), pixel);
+  return _mm256_cmpeq_epi64 (_mm256_min_epu16 (_mm256_max_epu16 (pixel, min), max), pixel);
 }
 
 /* The symbol's lowest bit lies where invalid pixels have theirs. */
@@ -162,12 +162,12 @@ choose_pixel (__m256i otherwise, __m256i pixel, __m256i mask)
 AVX2 inline __m256i
 step (Wave &wave, __m256i own, __m256i threshold, const PlainPixel *above)
 {
-  const __m256i least = _mm256_subs_epu16 (own, threshold);
-  const __m256i most = _mm256_adds_epu16 (own, threshold);
-  const __m256i upper_right = is_between (wave.upper_right, least, most);
-  const __m256i upper = is_between (wave.upper, least, most);
-  const __m256i upper_left = is_between (wave.upper_left, least, most);
-  const __m256i left = is_between (wave.left, least, most);
+  const __m256i min = _mm256_subs_epu16 (own, threshold);
+  const __m256i max = _mm256_adds_epu16 (own, threshold);
+  const __m256i upper_right = is_between (wave.upper_right, min, max);
+  const __m256i upper = is_between (wave.upper, min, max);
+  const __m256i upper_left = is_between (wave.upper_left, min, max);
+  const __m256i left = is_between (wave.left, min, max);
   static_assert (kInvalid == kFull + 1);
   __m256i symbol = _mm256_or_si256 (
       _mm256_and_si256 (own, _mm256_set1_epi64x (kInvalidPixelBit)), symbols (kFull));

@@ -62,9 +62,9 @@ PlainEncoder::resize (int columns)
   for (auto &symbols : row_symbols_)
     symbols.resize (std::max (symbols.size (), symbol_bytes (size) + kSymbolBytesBehind));
   row_full_.resize (std::max (row_full_.size (), size + kGroup));
-  const auto most = static_cast<std::size_t> (settings_.max_slice_size) + 16;
-  symbols_.resize (std::max (symbols_.size (), most));
-  full_.resize (std::max (full_.size (), most));
+  const auto size_with_padding = static_cast<std::size_t> (settings_.max_slice_size) + 16;
+  symbols_.resize (std::max (symbols_.size (), size_with_padding));
+  full_.resize (std::max (full_.size (), size_with_padding));
 }
 
 /* Codes the first rows of rows_. @return the columns with valid pixels */

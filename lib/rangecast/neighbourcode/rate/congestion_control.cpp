@@ -106,9 +106,9 @@ void
 CongestionControl::decrease (double delivered, std::uint64_t now_ns)
 {
   const double wanted = kDecrease * delivered;
-  const double least = rate_ > 0 ? kMaxDecrease * rate_ : 0;
+  const double min = rate_ > 0 ? kMaxDecrease * rate_ : 0;
   const double before = bits_per_s ();
-  rate_ = limited (before > 0 ? std::min (std::max (wanted, least), before) : wanted);
+  rate_ = limited (before > 0 ? std::min (std::max (wanted, min), before) : wanted);
   capacity_ = delivered;
   calm_s_ = 0;
   before_loss_ = 0;
@@ -135,8 +135,8 @@ CongestionControl::increase (double delivered, double elapsed_s)
     more = std::min (kProbe * std::exp2 (calm_s_ / kDoubling), kMaxProbe) * rate_;
     calm_s_ += elapsed_s;
   }
-  const double most = std::max (rate_, kHeadroom * delivered + kMore);
-  rate_ = limited (std::min (rate_ + more * elapsed_s, most));
+  const double max = std::max (rate_, kHeadroom * delivered + kMore);
+  rate_ = limited (std::min (rate_ + more * elapsed_s, max));
 }
 
 void

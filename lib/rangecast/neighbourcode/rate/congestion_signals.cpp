@@ -127,7 +127,7 @@ QueueDelay::add (const PacketReport &packet)
 {
   if (burst_packets_ > 0 && packet.sent_ns - last_sent_ns_ > kBurstNs) {
     if (burst_packets_ > 1 && burst_packets_ < kHead)
-      finish (burst_sent_ns_, first_arrival_ns_);
+      add_burst (burst_sent_ns_, first_arrival_ns_);
     burst_packets_ = 0;
   }
   last_sent_ns_ = packet.sent_ns;
@@ -139,19 +139,19 @@ QueueDelay::add (const PacketReport &packet)
   }
   first_arrival_ns_ = std::min (first_arrival_ns_, packet.arrival_ns);
   if (burst_packets_ == kHead)
-    finish (burst_sent_ns_, first_arrival_ns_);
+    add_burst (burst_sent_ns_, first_arrival_ns_);
 }
 
 void
-QueueDelay::finish (std::uint64_t sent_ns, std::uint64_t arrival_ns)
+QueueDelay::add_burst (std::uint64_t sent_ns, std::uint64_t arrival_ns)
 {
   const double delay = seconds_between (sent_ns, arrival_ns);
   if (n_ > 0 && std::abs (delay - latest (0).delay_s) > kMaxDelayStep) {
     n_ = 0;
-    least_.reset ();
+    min_.reset ();
     queue_s_ = growth_s_ = variation_s_ = 0;
   }
-  const double least = least_.add (sent_ns, delay);
+  const double min = min_.add (sent_ns, delay);
   const double elapsed = n_ > 0 ? seconds_between (latest (0).sent_ns, sent_ns) : 0;
   samples_[n_++ % samples_.size ()] = {sent_ns, delay, 0};
   const std::size_t known = std::min (n_, samples_.size ());
@@ -161,7 +161,7 @@ QueueDelay::finish (std::uint64_t sent_ns, std::uint64_t arrival_ns)
       break;
     jitter_free = std::min (jitter_free, latest (i).delay_s);
   }
-  queue_s_ = jitter_free - least;
+  queue_s_ = jitter_free - min;
   samples_[(n_ - 1) % samples_.size ()].queue_s = queue_s_;
   std::size_t then = 0;
   while (then + 1 < known && sent_ns - latest (then).sent_ns < kGrowthNs)

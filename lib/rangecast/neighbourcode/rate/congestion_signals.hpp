@@ -79,7 +79,7 @@ private:
     std::uint64_t sent_ns;
     double delay_s, queue_s;
   };
-  void finish (std::uint64_t sent_ns, std::uint64_t arrival_ns);
+  void add_burst (std::uint64_t sent_ns, std::uint64_t arrival_ns);
   [[nodiscard]] const Sample &latest (std::size_t i) const
   {
     return samples_[(n_ - 1 - i) % samples_.size ()];
@@ -87,7 +87,7 @@ private:
 
   std::array<Sample, 64> samples_{}; /* a ring */
   std::size_t n_ = 0;
-  SlidingMinimum least_;
+  SlidingMinimum min_;
   std::uint64_t burst_sent_ns_ = 0, first_arrival_ns_ = 0, last_sent_ns_ = 0;
   int burst_packets_ = 0;
   double queue_s_ = 0, growth_s_ = 0, variation_s_ = 0;

@@ -41,16 +41,16 @@ void
 FrameThinning::adjust (const ThinningInput &in, double elapsed_s)
 {
   const double fps = 1e9 / static_cast<double> (interval_ns_);
-  const int most = in.least_fps > 0
-                       ? static_cast<int> (std::clamp (fps / in.least_fps, 1.0, double (kMax)))
-                       : kMax;
+  const int max = in.least_fps > 0
+                      ? static_cast<int> (std::clamp (fps / in.least_fps, 1.0, double (kMax)))
+                      : kMax;
   const double share = in.bits_per_s > 0 ? in.least_bits * fps / in.bits_per_s : 0;
   const auto one_of = [&] (double x) {
-    return static_cast<int> (std::ceil (std::clamp (x, 1.0, double (most))));
+    return static_cast<int> (std::ceil (std::clamp (x, 1.0, double (max))));
   };
   short_s_ = share > kTooMuch * one_of_ ? short_s_ + elapsed_s : 0;
   enough_s_ = one_of (kReserve * share) < one_of_ ? enough_s_ + elapsed_s : 0;
-  if (short_s_ > kShort || one_of_ > most)
+  if (short_s_ > kShort || one_of_ > max)
     one_of_ = one_of (share);
   else if (enough_s_ > kEnough)
     one_of_ = one_of (kReserve * share);

@@ -173,8 +173,8 @@ RateControl::next (std::uint64_t time_ns, std::uint64_t pixels)
     const double wanted = (bits_at_best - std::log (8 * planned)) / b_;
     const double far_off = std::abs (wanted - x_) * b_ - kFarOff;
     const double speed = kSlowest + kFaster * std::max (0.0, far_off);
-    const double most = frames_ > 0 ? speed * elapsed_s_ : max_x_;
-    x_ = std::clamp (x_ + std::clamp (wanted - x_, -most, most), 0.0, max_x_);
+    const double max_step = frames_ > 0 ? speed * elapsed_s_ : max_x_;
+    x_ = std::clamp (x_ + std::clamp (wanted - x_, -max_step, max_step), 0.0, max_x_);
   }
   const RateSettings &s = settings_;
   thresholds_ = {
