@@ -7,9 +7,9 @@
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
+#include "bitstream/encoder_result.hpp"
 #include "bitstream/unit.hpp"
 #include "compact/encoder.hpp"
-#include "encoder_result.hpp"
 #include "plain/encoder.hpp"
 #include "plain/temporal.hpp"
 #include "reference_choice.hpp"

@@ -7,8 +7,8 @@
 
 #include "../../geometry/quantiser.hpp"
 #include "../../geometry/range_image.hpp"
+#include "../bitstream/encoder_result.hpp"
 #include "../bitstream/refresh.hpp"
-#include "../encoder_result.hpp"
 #include "entropy_code.hpp"
 #include "pixel_key.hpp"
 #include "row.hpp"

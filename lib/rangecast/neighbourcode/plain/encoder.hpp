@@ -8,9 +8,9 @@
 
 #include "../../geometry/quantiser.hpp"
 #include "../../geometry/range_image.hpp"
+#include "../bitstream/encoder_result.hpp"
 #include "../bitstream/symbols.hpp"
 #include "../bitstream/unit.hpp"
-#include "../encoder_result.hpp"
 #include "functions.hpp"
 
 namespace rangecast {
