@@ -3,7 +3,7 @@
 
 #include <gst/video/video.h>
 
-#include "dump-graph.hpp"
+#include "common/dump-graph.hpp"
 #include "glue.hpp"
 #include "join.hpp"
 #include "tcp-viewer.hpp"

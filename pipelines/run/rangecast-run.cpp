@@ -14,7 +14,7 @@
 #include <memory>
 #include <string>
 
-#include "dump-graph.hpp"
+#include "common/dump-graph.hpp"
 #include "latency-trace.hpp"
 #include "report.hpp"
 #include "srtp-key.hpp"

@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <clocale>
 
-#include "dump-graph.hpp"
+#include "common/dump-graph.hpp"
 #include "viewer.hpp"
 
 void

@@ -34,7 +34,7 @@ LAYERS = (
     (("lib/gstrange",), CORE_FOLDERS),
     (("gst/common",), ("lib/gstrange", "lib/rangecast")),
     (("gst",), ("gst/common", "lib/gstrange", "lib/rangecast")),
-    (("pipelines",), ("lib/gstrange", "lib/rangecast")),
+    (("pipelines",), ("pipelines/common", "lib/gstrange", "lib/rangecast")),
 )
 # Headers of other projects that a folder must do without.
 GSTREAMER = ("gst/", "glib", "gio/", "gobject")

@@ -25,7 +25,7 @@ test_a_loss_brings_a_key_frame_set_over_rtcp () {
   start_viewer $((ports + 150)) 14
   send $((ports + 150)) 12
   wait "$viewer" || true
-  grep -q 'asking for a key frame set' viewer.log || fail "nothing was lost: $(tail -n 5 viewer.log)"
+  grep -q 'requesting a key frame set' viewer.log || fail "nothing was lost: $(tail -n 5 viewer.log)"
   local all keys
   all=$(grep -c 'last-message = chain' camera.log)
   keys=$(grep 'last-message = chain' camera.log | grep -vc 'delta-unit' || true)

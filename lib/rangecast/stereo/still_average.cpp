@@ -107,7 +107,7 @@ StillAverage::add (const cv::Mat &picture)
     rows_ = (picture.rows + kBlock - 1) / kBlock;
     blocks_.assign (std::size_t (columns_) * std::size_t (rows_), {});
     mean_.create (picture.size (), CV_8UC4);
-    sum_.create (picture.size (), CV_16UC4);
+    sum_ = cv::Mat::zeros (picture.size (), CV_16UC4); /* average() reads it */
     for (Block &block : blocks_)
       block.frames = 1;
   }

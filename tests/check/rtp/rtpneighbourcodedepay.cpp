@@ -378,7 +378,7 @@ GST_START_TEST (test_access_units_keep_their_bytes_while_others_follow)
   }
   fail_unless_equals_int (places.size (), 12);
   for (std::size_t i = 0; i < kept.size (); i++) {
-    fail_unless (bytes_of (kept[i]) == bytes_of (sent.access_units[i]));
+    fail_unless_cmp (bytes_of (kept[i]), ==, bytes_of (sent.access_units[i]));
     gst_buffer_unref (kept[i]);
   }
   const auto whole = bytes_of (sent.access_units[5]);
