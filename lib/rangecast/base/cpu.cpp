@@ -15,6 +15,11 @@
 #endif
 
 namespace rangecast {
+namespace {
+
+std::atomic<CpuLevel> limit{kCpuLevels[std::size (kCpuLevels) - 1]};
+
+} // namespace
 
 const char *
 cpu_level_name (CpuLevel level)
@@ -34,23 +39,17 @@ cpu_supports ()
   return CpuLevel::kScalar;
 }
 
-static CpuLevel
-find_level ()
-{
-  CpuLevel most = cpu_supports ();
-  if (const char *asked = std::getenv ("RANGECAST_CPU"))
-    for (CpuLevel level : kCpuLevels)
-      if (std::strcmp (asked, cpu_level_name (level)) == 0)
-        most = std::min (most, level);
-  return most;
-}
-
-static std::atomic<CpuLevel> limit{kCpuLevels[std::size (kCpuLevels) - 1]};
-
 CpuLevel
 cpu_level ()
 {
-  static const CpuLevel found = find_level ();
+  static const CpuLevel found = [] {
+    CpuLevel level = cpu_supports ();
+    if (const char *asked = std::getenv ("RANGECAST_CPU"))
+      for (CpuLevel lower : kCpuLevels)
+        if (std::strcmp (asked, cpu_level_name (lower)) == 0)
+          level = std::min (level, lower);
+    return level;
+  }();
   return std::min (found, limit.load (std::memory_order_relaxed));
 }
 
@@ -60,26 +59,22 @@ limit_cpu (CpuLevel most)
   limit.store (most, std::memory_order_relaxed);
 }
 
-static int
-count_cores ()
-{
-#if defined __linux__
-  cpu_set_t cores;
-  /* Of the first thread, so that a thread that is bound to a core does not count for all. */
-  if (sched_getaffinity (getpid (), sizeof cores, &cores) == 0)
-    return std::max (CPU_COUNT (&cores), 1);
-#endif
-#if defined __wasm__
-  return 1;
-#else
-  return std::max (static_cast<int> (std::thread::hardware_concurrency ()), 1);
-#endif
-}
-
 int
 core_count ()
 {
-  static const int count = count_cores ();
+  static const int count = [] {
+#if defined __linux__
+    cpu_set_t cores;
+    /* Of the first thread, so that a thread that is bound to a core does not count for all. */
+    if (sched_getaffinity (getpid (), sizeof cores, &cores) == 0)
+      return std::max (CPU_COUNT (&cores), 1);
+#endif
+#if defined __wasm__
+    return 1;
+#else
+    return std::max (static_cast<int> (std::thread::hardware_concurrency ()), 1);
+#endif
+  }();
   return count;
 }
 

@@ -3,28 +3,27 @@
 
 namespace rangecast {
 
-/** What code may take for granted, in rungs: each holds all before it. */
+/** Instruction sets that code may use; each includes those before it. */
 enum class CpuLevel : int {
-  kScalar, ///< what the compiler was told to build for
+  kScalar, ///< the compiler's target
   kAvx2,   ///< x86-64 with AVX2, BMI1, BMI2 and POPCNT
 };
 inline constexpr CpuLevel kCpuLevels[] = {CpuLevel::kScalar, CpuLevel::kAvx2};
 
 const char *cpu_level_name (CpuLevel level);
 
-/** The highest rung that this machine has. */
+/** The highest level that this machine supports. */
 CpuLevel cpu_supports ();
 
-/** The rung to use: the machine's, or a lower one that RANGECAST_CPU (`scalar`, `avx2`) or
- *  limit_cpu() asks for. Any thread. */
+/** The level to use: the machine's, or a lower one set by the environment variable RANGECAST_CPU
+ *  (`scalar`, `avx2`) or by limit_cpu(). Any thread. */
 CpuLevel cpu_level ();
 
-/** For tests: no rung above this one from now on. */
+/** For tests: limits cpu_level() from now on. */
 void limit_cpu (CpuLevel most);
 
-/** How many threads can run at a time: the processors that the process may use (its affinity, as
- *  taskset and containers with a set of processors have it), counted once; at least 1. A share of
- *  processor time that a container grants does not count. */
+/** Number of processors that the process may use (its affinity mask, as taskset and container
+ * cpusets set it), counted once; at least 1. CPU quotas of containers are not considered. */
 int core_count ();
 
 } // namespace rangecast

@@ -9,11 +9,11 @@
 
 namespace rangecast {
 
-/** Runs work (), which returns a Status, and makes one of whatever it throws: where exceptions must
- *  not go further, at the core's border and in functions that C calls.
- *  @param what  of whom the text speaks, as "cylinder"
- *  @return what work () returns, kNoSpace if there was no memory, else kInternal with the
- * exception's what () */
+/** Runs work (), which returns a Status, and converts exceptions to one: for the core's interface
+ * and for functions that C calls, which exceptions must not leave.
+ *  @param what  subject of the text, such as "cylinder"
+ *  @return the status of work (), kNoSpace if memory ran out, else kInternal with the exception's
+ *  what () */
 template <typename Work>
 [[nodiscard]] Status
 guarded (const char *what, const Work &work) noexcept

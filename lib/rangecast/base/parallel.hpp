@@ -13,10 +13,10 @@
 
 namespace rangecast {
 
-/** Calls work (context, worker) on this thread with worker 0 and, where threads of the pool are
- * free, on them with other numbers below `workers`, each number at most once; returns when all
- * these calls have returned. One such call at a time has the pool: a nested one, and one from
- * another thread meanwhile, gets worker 0 alone. Allocates only when the pool has to grow.
+/** Calls work (context, worker) on this thread with worker 0 and on free threads of the pool with
+ *  other numbers below `workers`, each number at most once; returns when all these calls have
+ *  returned. One such call at a time uses the pool: a nested one, and one from another thread
+ *  meanwhile, gets worker 0 alone. Allocates only when the pool has to grow.
  *
  *  The pool is the process's only one, so its definition is not part of the core, which several
  *  plugins link: libgstrange exports it, programs without libgstrange link rangecast_threads.
@@ -24,20 +24,19 @@ namespace rangecast {
 [[gnu::visibility ("default")]] void run_workers (
     std::size_t workers, void (*work) (void *context, std::size_t worker), void *context);
 
-/** How many of n jobs in_parallel() runs at a time, at most.
- *  @param threads  at a time; 0 = core_count() */
+/** Greatest number of n jobs that in_parallel() runs concurrently.
+ *  @param threads  limit; 0 = core_count() */
 inline std::size_t
 workers_for (std::size_t n, int threads)
 {
   return std::min (n, static_cast<std::size_t> (threads > 0 ? threads : core_count ()));
 }
 
-/** Runs work (i), or work (i, worker), for each i below n, some at a time, and waits for all of
- *  them. Each begins when a thread is free, in order of i. Calls of different i must not touch the
- *  same memory, but for that of their worker: a number below workers_for() that no two calls have
- *  at the same time. If one throws, calls that have not begun are left out, and its exception is
- *  thrown here.
- *  @param threads  at a time; 0 = core_count() */
+/** Runs work (i), or work (i, worker), for each i below n concurrently, and waits for all. They
+ * begin in order of i as threads become free. Calls must not write the same memory, except that of
+ * their worker: a number below workers_for() that no two concurrent calls share. If one throws,
+ * calls that have not begun are skipped, and its exception is rethrown here.
+ *  @param threads  limit of concurrent calls; 0 = core_count() */
 template <typename Work>
 void
 in_parallel (std::size_t n, int threads, const Work &work)
@@ -59,7 +58,7 @@ in_parallel (std::size_t n, int threads, const Work &work)
     const std::size_t count;
     std::atomic<std::size_t> next{0};
     std::atomic<bool> failed{false};
-    std::exception_ptr error{}; /* whoever sets `failed` writes it */
+    std::exception_ptr error{}; /* written by the call that sets `failed` */
 
     void run (std::size_t worker) noexcept
     {
@@ -82,11 +81,10 @@ in_parallel (std::size_t n, int threads, const Work &work)
     std::rethrow_exception (loop.error);
 }
 
-/** Memory that jobs need while they run and that nobody needs afterwards; one for each worker, kept
- *  for the jobs to come. */
+/** Temporary memory of jobs, one for each worker, which is kept for later jobs. */
 template <typename T> class WorkerMemory {
 public:
-  /** Makes room for so many workers; not while any of them runs. */
+  /** Makes room for so many workers; must not be called while any of them runs. */
   void reserve (std::size_t workers)
   {
     if (workers > memory_.size ())
@@ -95,7 +93,7 @@ public:
   T &of (std::size_t worker)
   {
     std::unique_ptr<T> &memory = memory_[worker];
-    if (!memory) /* a worker that never comes to a job needs none */
+    if (!memory) /* made on first use: some workers never get a job */
       memory = std::make_unique<T> ();
     return *memory;
   }

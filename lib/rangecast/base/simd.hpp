@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Code for several processors from one text. for_this_cpu() runs a loop in a version compiled for
- * the processor at hand; Lanes are the vectors of numbers of loops that cannot be left to the
- * compiler's vectoriser. All versions do the same operations in the same order, without fused
- * multiplication and addition (meson.build says -ffp-contract=off), so their results are equal bit
- * by bit. */
+/* One source for several processors. for_this_cpu() runs a loop in a version compiled for the
+ * current processor; Lanes are vectors for loops that the compiler does not vectorise. All versions
+ * do the same operations in the same order, without fused multiplication and addition (meson.build
+ * says -ffp-contract=off), so their results are equal bit by bit. */
 #pragma once
 
 #include <cmath>
@@ -18,8 +17,8 @@
 
 namespace rangecast {
 
-/** Vectors of some 32-bit numbers, which may lie anywhere in memory (hence aligned (4)). Functions
- *  take and return them by reference: how they are passed by value depends on the processor. */
+/** Vectors of 32-bit numbers without alignment (hence aligned (4)). Functions take and return them
+ * by reference, because the calling convention for values depends on the processor. */
 template <int kNumbers> struct Lanes {
   static constexpr int kLanes = kNumbers;
   typedef float F __attribute__ ((vector_size (4 * kNumbers), aligned (4), may_alias));
@@ -83,9 +82,10 @@ private:
 /** Lanes of the widest version, AVX2's. Others have four: SSE2, NEON. */
 inline constexpr int kMaxLanes = 8;
 
-/* gnu::flatten: all that work () calls and whose text is at hand becomes part of the version; not
- * through a function that both versions share, as GCC 12 gives up on what an inlined one calls.
- * gnu::noinline: that happens before it could become part of its caller instead. */
+/* gnu::flatten: everything that work () calls is inlined, if its definition is visible, and so
+ * compiled for the target; not through a function shared by both versions, as GCC 12 does not
+ * flatten what an inlined function calls. gnu::noinline: else this could be inlined into its caller
+ * before. */
 template <typename Work>
 [[gnu::flatten, gnu::noinline]] auto
 run_for_any_cpu (const Work &work)

@@ -6,22 +6,22 @@
 
 namespace rangecast {
 
-/** What went wrong, coarsely: enough for a caller to decide what to do next. */
+/** Kinds of failure, as far as callers act differently on them. */
 enum class StatusCode {
   kOk,
-  kBadSize,     ///< an image or table has not the size that was promised
+  kBadSize,     ///< an image or table does not have the expected size
   kBadValue,    ///< a parameter or field is outside its range
-  kBadData,     ///< foreign bytes (file, blob, slice) that are not what they should be
-  kTruncated,   ///< foreign bytes that end too early
-  kUnsupported, ///< well-formed, but of a version or profile that this code does not know
+  kBadData,     ///< malformed input (file, blob, slice)
+  kTruncated,   ///< input that ends too early
+  kUnsupported, ///< well-formed input of an unknown version or profile
   kNotFound,    ///< a file, view or field that should be there is not
   kNoSpace,     ///< the caller's output is too small; its contents are unspecified
   kInterrupted, ///< the caller asked to stop
-  kInternal,    ///< an exception that no caller can do anything about
+  kInternal,    ///< an unexpected exception
 };
 
 /** The result of a core function: kOk, or a code and one sentence that names the thing and what
- *  was expected. An ok Status holds no text and costs no allocation. */
+ *  was expected. An ok Status holds no text and does not allocate. */
 class [[nodiscard]] Status {
 public:
   Status () = default;

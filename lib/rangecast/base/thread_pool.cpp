@@ -33,15 +33,15 @@ public:
     work (context, 0);
     {
       std::unique_lock guard (lock_);
-      end_ = next_; /* who has not begun need not any more */
+      end_ = next_; /* helpers that have not begun are no longer needed */
       idle_.wait (guard, [this] { return running_ == 0; });
     }
     busy_.store (false, std::memory_order_release);
   }
 
 private:
-  /* Called by whoever has the pool. More threads than cores would only take turns.
-   * @return how many there are, at most `wanted`; fewer if the system has no more */
+  /* Called by the thread that has set busy_. Starts no more threads than there are cores.
+   * @return how many threads there are, at most `wanted`; fewer if the system has no more */
   std::size_t start_threads (std::size_t wanted)
   {
     wanted = std::min (wanted, std::size_t (core_count ()) - 1);
@@ -74,7 +74,7 @@ private:
   }
 
   std::atomic<bool> busy_ = false;
-  std::size_t threads_ = 0; /* of whoever has the pool */
+  std::size_t threads_ = 0; /* owned by the thread that has set busy_ */
 
   std::mutex lock_; /* of all below; not held while work runs */
   std::condition_variable wake_, idle_;
@@ -86,8 +86,8 @@ private:
 
 } // namespace
 
-/* Never destroyed: its threads wait until the process ends. In a child of fork() there are none,
- * and whoever calls does all of the work. */
+/* The pool is never destroyed: its threads wait until the process ends. In a child of fork() there
+ * are none, and the caller does all of the work. */
 void
 run_workers (std::size_t workers, void (*work) (void *, std::size_t), void *context)
 {

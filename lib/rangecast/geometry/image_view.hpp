@@ -7,8 +7,8 @@
 
 namespace rangecast {
 
-/** A picture that somebody else owns: a pointer, a size, and the distance between its rows.
- *  An empty view (width or height 0) may have a null pointer. */
+/** Non-owning view of an image: pointer, size and row stride. An empty view (width or height 0) may
+ *  have a null pointer. */
 template <typename T> struct ImageView {
   T *data = nullptr;
   int width = 0;             ///< pixels
@@ -29,7 +29,7 @@ template <typename T> struct ImageView {
     return width == other.width && height == other.height;
   }
 
-  /** The part that starts at (x, y); the caller keeps it inside. */
+  /** The part that starts at (x, y); it must lie inside. */
   [[nodiscard]] ImageView crop (int x, int y, int crop_width, int crop_height) const
   {
     return {row (y) + x, crop_width, crop_height, stride};
@@ -38,7 +38,7 @@ template <typename T> struct ImageView {
   operator ImageView<const T> () const { return {data, width, height, stride}; }
 };
 
-/** One colour pixel, memory order R G B x; x is padding and carries nothing. */
+/** One colour pixel, memory order R G B x; x is padding. */
 struct Rgbx {
   std::uint8_t r = 0, g = 0, b = 0, x = 0;
 };

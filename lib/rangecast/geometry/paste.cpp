@@ -6,8 +6,8 @@
 namespace rangecast {
 namespace {
 
-/* The part of the ROI that lies in the full picture, and row(from, to, full_row) for each of its
- * rows; everything else is cleared. */
+/* Calls copy_row (y, begin, end, to) for each row of the ROI with the columns that lie in the full
+ * picture, and clears everything else. */
 template <typename T, typename CopyRow>
 void
 paste (const Roi &roi, ImageView<T> full, CopyRow copy_row)

@@ -5,7 +5,7 @@
 
 namespace rangecast {
 
-/** Puts a range image's depth where its ROI lies in the view's full picture; 0 around it.
+/** Copies a range image's depth to its place in the view's full picture; 0 around it.
  *  @param image      its ROI is clipped to the full picture
  *  @param[out] full  H x W of the view, depth units. Reentrant. */
 void paste_depth (const ConstRangeImage &image, ImageView<std::uint16_t> full);

@@ -5,9 +5,9 @@
 
 namespace rangecast {
 
-/** Where one view's plane has what a pixel of another view's plane sees. Column, row and depth d of
- *  a pixel are, in the other plane's pixels times depth and in its depth:
- *  origin + d * (corner + column * right + row * down). Planes are cut to their ROIs. */
+/** Maps pixels of one view's plane to another view's plane. The pixel at column, row with depth d
+ * is mapped to origin + d * (corner + column * right + row * down): column times depth, row times
+ * depth, and depth in the other plane. Planes are cropped to their ROIs. */
 struct PixelTransfer {
   PixelTransfer () = default;
   PixelTransfer (const PixelRays &rays, const Roi &from, const PixelLookup &lookup, const Roi &to)

@@ -49,10 +49,10 @@ rescale_depth (ImageView<const std::uint16_t> in, double factor, std::uint16_t n
 
 /* ---- normals ---- */
 
-/* The pixels that the plane is laid through: this far to each side. */
-static constexpr int kNormalRadius = 2;
-/* Of the depth: farther apart is another surface. */
-static constexpr double kNormalDepthStep = 0.03;
+namespace {
+
+constexpr int kNormalRadius = 2; /* pixels to each side through which the plane is fitted */
+constexpr double kNormalDepthStep = 0.03; /* share of the depth; beyond it is another surface */
 
 /* Sums for the plane 1 / depth = a u + b v + c, u and v from the pixel in the middle. */
 struct PlaneSums {
@@ -72,7 +72,7 @@ struct PlaneSums {
   }
 };
 
-static PlaneSums
+PlaneSums
 sum_around (const ConstRangeImage &image, int x, int y)
 {
   const double depth = image.depth.at (x, y);
@@ -90,11 +90,7 @@ sum_around (const ConstRangeImage &image, int x, int y)
   return sums;
 }
 
-static Vec3
-towards_camera (Vec3 point)
-{
-  return -1.0 / norm (point) * point;
-}
+} // namespace
 
 Vec3
 surface_normal (const ConstRangeImage &image, const Intrinsics &intrinsics, int x, int y)
@@ -107,8 +103,9 @@ surface_normal (const ConstRangeImage &image, const Intrinsics &intrinsics, int 
   const double uu = s.n * s.uu - s.u * s.u, vv = s.n * s.vv - s.v * s.v,
                uv = s.n * s.uv - s.u * s.v;
   const double determinant = uu * vv - uv * uv;
+  const Vec3 to_camera = -1.0 / norm (ray) * ray;
   if (determinant < 0.5)
-    return towards_camera (ray);
+    return to_camera;
   const double uw = s.n * s.uw - s.u * s.w, vw = s.n * s.vw - s.v * s.w;
   const double a = (uw * vv - vw * uv) / determinant, b = (vw * uu - uw * uv) / determinant;
   const double c = (s.w - a * s.u - b * s.v) / s.n; /* 1 / depth at the pixel itself */
@@ -117,12 +114,14 @@ surface_normal (const ConstRangeImage &image, const Intrinsics &intrinsics, int 
   const double nx = a * intrinsics.fx, ny = b * intrinsics.fy;
   const Vec3 away = {nx, ny, c - nx * ray.x - ny * ray.y};
   const double length = norm (away);
-  return dot (away, ray) > 0 && length > 0 ? -1.0 / length * away : towards_camera (ray);
+  return dot (away, ray) > 0 && length > 0 ? -1.0 / length * away : to_camera;
 }
 
 /* ---- files ---- */
 
-static std::string
+namespace {
+
+std::string
 ply_header (const PointCloudFormat &format, const std::string &points)
 {
   std::string text = "ply\nformat binary_little_endian 1.0\ncomment world, metres, y up\n"
@@ -136,8 +135,8 @@ ply_header (const PointCloudFormat &format, const std::string &points)
   return text + "end_header\n";
 }
 
-/* rgb is a float by its name only: its bytes are blue, green, red and 0. */
-static std::string
+/* rgb is declared as a float, but its bytes are blue, green, red and 0. */
+std::string
 pcd_header (const PointCloudFormat &format, const std::string &points)
 {
   std::string fields = "x y z", sizes = "4 4 4", types = "F F F", counts = "1 1 1";
@@ -162,6 +161,17 @@ pcd_header (const PointCloudFormat &format, const std::string &points)
          "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + points + "\nDATA binary\n";
 }
 
+std::uint8_t *
+write_vector (Vec3 vector, std::uint8_t *to)
+{
+  const float xyz[] = {
+      static_cast<float> (vector.x), static_cast<float> (vector.y), static_cast<float> (vector.z)};
+  std::memcpy (to, xyz, sizeof xyz);
+  return to + sizeof xyz;
+}
+
+} // namespace
+
 std::string
 PointCloudWriter::header (std::size_t points) const
 {
@@ -171,25 +181,12 @@ PointCloudWriter::header (std::size_t points) const
 }
 
 std::size_t
-PointCloudWriter::point_size () const
-{
-  return 12 + (format_.with_normals ? 12 : 0) + (format_.kind == PointCloudFormat::kPcd ? 4 : 3) +
-         (format_.with_view_id ? 1 : 0);
-}
-
-std::size_t
 PointCloudWriter::size (std::size_t points) const
 {
-  return header (points).size () + points * point_size ();
-}
-
-static std::uint8_t *
-write_vector (Vec3 vector, std::uint8_t *to)
-{
-  const float xyz[] = {
-      static_cast<float> (vector.x), static_cast<float> (vector.y), static_cast<float> (vector.z)};
-  std::memcpy (to, xyz, sizeof xyz);
-  return to + sizeof xyz;
+  const std::size_t point_size = 12 + (format_.with_normals ? 12 : 0) +
+                                 (format_.kind == PointCloudFormat::kPcd ? 4 : 3) +
+                                 (format_.with_view_id ? 1 : 0);
+  return header (points).size () + points * point_size;
 }
 
 std::uint8_t *

@@ -9,7 +9,7 @@
 
 namespace rangecast {
 
-/** How many pixels of a range image are valid. */
+/** Number of valid pixels of a range image. */
 std::size_t count_points (const ConstRangeImage &image);
 
 /** A distance in whole depth units, the nearest from 1 to 65535. */
@@ -26,17 +26,17 @@ std::size_t count_points (const ConstRangeImage &image);
 Status rescale_depth (ImageView<const std::uint16_t> in, double factor, std::uint16_t near,
     std::uint16_t far, ImageView<std::uint16_t> out);
 
-/** Which way the surface faces at a pixel: a plane through the valid pixels of the 5x5 around it
- * that differ by less than 3 % of its depth, by least squares. On a plane 1 / depth is linear in
- * the pixel's column and row, so the fit is exact there, however slanted it is.
+/** Surface normal at a pixel, from a least-squares plane through the valid pixels of the
+ * surrounding 5x5 that differ by less than 3 % of its depth. On a plane 1 / depth is linear in the
+ * pixel's column and row, so the fit is exact there, at any slant.
  *  @param x, y  column and row of a valid pixel in the range image
- *  @return length 1, in the view's frame (x right, y down, z forward), facing the camera; towards
- * the camera where too few pixels are around it. Reentrant. */
+ *  @return length 1, in the view's frame (x right, y down, z forward), facing the camera; the
+ *  direction to the camera if there are too few pixels. Reentrant. */
 [[nodiscard]] Vec3 surface_normal (
     const ConstRangeImage &image, const Intrinsics &intrinsics, int x, int y);
 
-/** What a file of points looks like, and what each of them has besides x y z (float, world, metres)
- *  and its colour. */
+/** File format of point clouds, and the fields of a point besides x y z (float, world, metres) and
+ *  its colour. */
 struct PointCloudFormat {
   enum Kind {
     kPly, ///< binary little-endian PLY: x y z [nx ny nz] red green blue (uchar) [view_id (uchar)]
@@ -64,7 +64,6 @@ public:
 
 private:
   [[nodiscard]] std::string header (std::size_t points) const;
-  [[nodiscard]] std::size_t point_size () const;
   std::uint8_t *write_point (
       const RangeImage &image, const View &view, int x, int y, std::uint8_t *to) const;
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "point_cloud.hpp"
+
 namespace rangecast {
 
 void
@@ -27,7 +29,8 @@ DepthQuantiser::fill_inverse (std::uint32_t last)
     const std::uint64_t bottom = std::uint64_t{far_} * last - code * range;
     depths_[code] = static_cast<std::uint16_t> ((top + bottom / 2) / bottom);
   }
-  /* The nearest in depth, not in 1 / depth: a decoded depth so keeps its value if coded again. */
+  /* The nearest in depth, not in 1 / depth, so that coding a decoded depth again does not change
+   * it. */
   std::uint32_t code = 0;
   for (std::uint32_t d = near_; d <= far_; d++) {
     const auto distance = [&] (std::uint32_t c) { return std::abs (int (depths_[c]) - int (d)); };
@@ -64,11 +67,8 @@ DepthQuantiser::set (std::uint16_t near, std::uint16_t far, int bits, DepthScale
 Status
 DepthQuantiser::set (const View &view, int bits, DepthScale scale)
 {
-  const auto units = [&] (double metres) {
-    return static_cast<std::uint16_t> (
-        std::clamp (std::round (metres / view.depth_unit_m), 1.0, 65535.0));
-  };
-  Status status = set (units (view.near_m), units (view.far_m), bits, scale);
+  Status status = set (depth_units (view.near_m, view.depth_unit_m),
+      depth_units (view.far_m, view.depth_unit_m), bits, scale);
   if (!status.ok ())
     return {status.code (),
         "view " + std::to_string (view.id) + ": near and far are less than one depth unit apart"};
@@ -79,14 +79,14 @@ int
 DepthQuantiser::max_error (int threshold) const
 {
   const int last = codes () - 1;
-  int most = 0;
+  int error = 0;
   for (int d = near_; d <= far_ && last > 0; d++) {
     const int code = codes_[static_cast<std::size_t> (d)];
-    const int least = depths_[static_cast<std::size_t> (std::max (code - threshold, 0))];
-    const int greatest = depths_[static_cast<std::size_t> (std::min (code + threshold, last))];
-    most = std::max ({most, d - least, greatest - d});
+    const int low = depths_[static_cast<std::size_t> (std::max (code - threshold, 0))];
+    const int high = depths_[static_cast<std::size_t> (std::min (code + threshold, last))];
+    error = std::max ({error, d - low, high - d});
   }
-  return most;
+  return error;
 }
 
 ColourQuantiser::ColourQuantiser (int bits) : bits_ (std::clamp (bits, 1, 8))

@@ -10,17 +10,16 @@
 
 namespace rangecast {
 
-/** What depth codes are linear in, between near and far. */
+/** The scale on which depth codes are linear, between near and far. */
 enum class DepthScale : std::uint8_t {
   kLinear,  ///< in depth
-  kInverse, ///< in 1 / depth: steps grow with the square of the depth, as errors of stereo do
+  kInverse, ///< in 1 / depth: steps grow with the square of the depth, like errors of stereo
 };
 
 /** Depth to codes of `bits` bits and back; near is code 0 and far the greatest, on either scale.
- *  Formulas: docs/formats/bitstream.md, "Quantisation". Codes beyond those that make every depth
- * unit a code of its own are not used; then nothing is lost. On the inverse scale several codes may
- * have one depth: code() gives the least of them, decoders take all. Tables: 128 KiB and up to 128
- * KiB more. */
+ *  Formulas: docs/formats/bitstream.md, "Quantisation". No more codes are used than give each depth
+ *  unit its own, which is lossless. On the inverse scale several codes may have one depth: code()
+ *  returns the least of them, decoders accept all. Tables: 128 KiB and up to 128 KiB more. */
 class DepthQuantiser {
 public:
   /** @param near, far  depth units, 1 <= near < far; @param bits  6 to 16 */
@@ -29,18 +28,18 @@ public:
   /** The view's near and far. */
   Status set (const View &view, int bits, DepthScale scale = DepthScale::kLinear);
 
-  /** Depth units in near..far. */
+  /** Whether a depth, depth units, is in near..far. */
   [[nodiscard]] bool valid (std::uint16_t depth) const { return depth >= near_ && depth <= far_; }
-  /** Of a valid depth. Greater depths have no smaller codes. */
+  /** The code of a valid depth; monotonic. */
   [[nodiscard]] std::uint16_t code (std::uint16_t depth) const { return codes_[depth]; }
-  /** Of a code below codes(). */
+  /** The depth of a code below codes(), depth units. */
   [[nodiscard]] std::uint16_t depth (std::uint16_t code) const { return depths_[code]; }
-  /** Codes that depths have: decoders refuse others. */
+  /** Number of codes; decoders refuse others. */
   [[nodiscard]] int codes () const { return static_cast<int> (depths_.size ()); }
-  /** Depth units by which a depth changes at most where its code changes by up to `threshold`; of
-   *  0: by quantisation alone. Looks at all depths. */
+  /** Greatest change of a depth, depth units, by quantisation and a change of its code by up to
+   *  `threshold`. Examines all depths. */
   [[nodiscard]] int max_error (int threshold = 0) const;
-  /** Depth units from one code to the next, at far, where it is most. */
+  /** Depth units from one code to the next at far, where they are most. */
   [[nodiscard]] double step () const { return step_; }
 
 private:

@@ -12,7 +12,7 @@ constexpr std::uint8_t kMagic[4] = {'R', 'C', 'R', 'G'};
 constexpr std::uint8_t kVersion = 1;
 constexpr std::uint8_t kHasRight = 1, kHasThird = 2;
 
-class Writer {
+class BlobWriter {
 public:
   void u8 (std::uint8_t v) { bytes.push_back (v); }
   void u16 (std::uint16_t v)
@@ -34,10 +34,10 @@ public:
   std::vector<std::uint8_t> bytes;
 };
 
-/** Reads past the end give zeros and set failed. */
-class Reader {
+/* Reads beyond the end return zeros and set failed. */
+class BlobReader {
 public:
-  explicit Reader (std::span<const std::uint8_t> bytes) : bytes_ (bytes) {}
+  explicit BlobReader (std::span<const std::uint8_t> bytes) : bytes_ (bytes) {}
   std::uint8_t u8 ()
   {
     if (position_ >= bytes_.size ()) {
@@ -74,7 +74,7 @@ private:
 };
 
 void
-put_pose (Writer &out, const Pose &pose)
+put_pose (BlobWriter &out, const Pose &pose)
 {
   for (double v : pose.rotation)
     out.f64 (v);
@@ -83,7 +83,7 @@ put_pose (Writer &out, const Pose &pose)
 }
 
 Pose
-get_pose (Reader &in)
+get_pose (BlobReader &in)
 {
   Pose pose;
   for (double &v : pose.rotation)
@@ -94,7 +94,7 @@ get_pose (Reader &in)
 }
 
 void
-put_lens (Writer &out, const Intrinsics &k, const Distortion &distortion)
+put_lens (BlobWriter &out, const Intrinsics &k, const Distortion &distortion)
 {
   for (double v : {k.fx, k.fy, k.cx, k.cy})
     out.f64 (v);
@@ -104,7 +104,7 @@ put_lens (Writer &out, const Intrinsics &k, const Distortion &distortion)
 }
 
 void
-get_lens (Reader &in, Intrinsics &k, Distortion &distortion)
+get_lens (BlobReader &in, Intrinsics &k, Distortion &distortion)
 {
   for (double *v : {&k.fx, &k.fy, &k.cx, &k.cy})
     *v = in.f64 ();
@@ -114,7 +114,7 @@ get_lens (Reader &in, Intrinsics &k, Distortion &distortion)
 }
 
 void
-put_partner (Writer &out, const std::optional<PartnerCamera> &partner)
+put_partner (BlobWriter &out, const std::optional<PartnerCamera> &partner)
 {
   if (!partner)
     return;
@@ -123,7 +123,7 @@ put_partner (Writer &out, const std::optional<PartnerCamera> &partner)
 }
 
 PartnerCamera
-get_partner (Reader &in)
+get_partner (BlobReader &in)
 {
   PartnerCamera partner;
   get_lens (in, partner.intrinsics, partner.distortion);
@@ -132,7 +132,7 @@ get_partner (Reader &in)
 }
 
 void
-put_view (Writer &out, const View &view)
+put_view (BlobWriter &out, const View &view)
 {
   out.u8 (static_cast<std::uint8_t> (view.id));
   out.u8 ((view.right ? kHasRight : 0) | (view.third ? kHasThird : 0));
@@ -148,7 +148,7 @@ put_view (Writer &out, const View &view)
 }
 
 View
-get_view (Reader &in)
+get_view (BlobReader &in)
 {
   View view;
   view.id = in.u8 ();
@@ -173,7 +173,7 @@ get_view (Reader &in)
 std::vector<std::uint8_t>
 encode_rig (const Rig &rig)
 {
-  Writer out;
+  BlobWriter out;
   for (std::uint8_t c : kMagic)
     out.u8 (c);
   out.u8 (kVersion);
@@ -196,7 +196,7 @@ decode_rig (std::span<const std::uint8_t> blob, Rig &rig)
   const int n_views = blob[5];
   if (n_views > kMaxViews)
     return {StatusCode::kBadData, "rig blob: " + std::to_string (n_views) + " views, at most 64"};
-  Reader in (blob.subspan (6));
+  BlobReader in (blob.subspan (6));
   Rig decoded;
   for (int i = 0; i < n_views && !in.failed; i++)
     decoded.views.push_back (get_view (in));

@@ -11,8 +11,8 @@
 
 namespace rangecast {
 
-/** Something of each pair of views that were there together, by view-id. T has the members `first`
- *  and `second`, the view-ids, the smaller one first. Keeps its memory. */
+/** A map from pairs of views to T, which has the members `first` and `second`, the view-ids, the
+ *  smaller one first. Keeps its memory. */
 template <typename T> class ViewPairs {
 public:
   ViewPairs () { clear (); }
@@ -21,8 +21,8 @@ public:
     all_.clear ();
     slots_.fill (-1);
   }
-  /** The pair, made if it was not there. @param a, b  view-ids, different
-   *  @param[out] added  set to true if it was made, else untouched */
+  /** The pair, added if it is new. @param a, b  view-ids, different
+   *  @param[out] added  set to true if it was added, else untouched */
   T &get (int a, int b, bool *added = nullptr)
   {
     std::int16_t &slot = slots_[place (a, b)];
@@ -68,7 +68,7 @@ private:
   std::array<std::int16_t, kMaxViews *(kMaxViews - 1) / 2> slots_;
 };
 
-/** The number of a view among some views, counted without gaps. */
+/** Index of a view among a set of views (bit i: view-id i). */
 inline std::size_t
 number_among (std::uint64_t views, int view_id)
 {

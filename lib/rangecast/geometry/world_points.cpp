@@ -6,63 +6,14 @@
 #include "../base/simd.hpp"
 
 namespace rangecast {
+namespace {
 
-static void
+void
 store (float *out, Vec3 v)
 {
   out[0] = static_cast<float> (v.x);
   out[1] = static_cast<float> (v.y);
   out[2] = static_cast<float> (v.z);
-}
-
-PixelRays::PixelRays (const View &view)
-{
-  const Intrinsics &k = view.intrinsics;
-  const Mat3 &r = view.world_from_view.rotation;
-  const double unit = view.depth_unit_m;
-  store (origin, view.world_from_view.translation);
-  store (corner, unit * (r * k.unproject (0, 0, 1)));
-  store (right, unit / k.fx * (r * Vec3{1, 0, 0}));
-  store (down, unit / k.fy * (r * Vec3{0, 1, 0}));
-  store (optical_axis, r * Vec3{0, 0, 1});
-}
-
-PixelLookup::PixelLookup (const View &view)
-{
-  const Intrinsics &k = view.intrinsics;
-  const Mat3 r = transposed (view.world_from_view.rotation);
-  const Vec3 t = r * view.world_from_view.translation;
-  const double per_metre = 1 / view.depth_unit_m;
-  for (int i = 0; i < 4; i++) {
-    /* column i of view_from_world */
-    const double x = i < 3 ? r[i] : -t.x, y = i < 3 ? r[3 + i] : -t.y, z = i < 3 ? r[6 + i] : -t.z;
-    rows[0][i] = static_cast<float> ((k.fx * x + k.cx * z) * per_metre);
-    rows[1][i] = static_cast<float> ((k.fy * y + k.cy * z) * per_metre);
-    rows[2][i] = static_cast<float> (z * per_metre);
-  }
-}
-
-Status
-WorldPoints::reset (std::span<const RangeImage> images)
-{
-  std::size_t pixels = 0;
-  parts_.clear ();
-  for (const RangeImage &image : images) {
-    parts_.push_back ({pixels, pixels});
-    if (!image.depth.empty ())
-      pixels += static_cast<std::size_t> (image.depth.width) * image.depth.height;
-  }
-  if (pixels > UINT32_MAX) {
-    parts_.clear ();
-    return {StatusCode::kBadSize,
-        "frame set: " + std::to_string (pixels) + " pixels, expected less than 2^32"};
-  }
-  if (pixel.size () < pixels) { /* the last to grow: all have grown */
-    for (auto *array : {&x, &y, &z})
-      array->resize (pixels);
-    pixel.resize (pixels);
-  }
-  return {};
 }
 
 /* Makes points of an image's valid pixels. */
@@ -79,7 +30,7 @@ template <typename L> struct FillLoop {
   typedef std::uint16_t Block __attribute__ ((vector_size (2 * kBlock), aligned (2), may_alias));
   typedef std::int16_t Mask __attribute__ ((vector_size (2 * kBlock)));
 
-  /* Of most pictures a person fills a small part, and most of that without holes. */
+  /* Shortcuts for blocks: a person mostly fills a small part of a picture, with few holes. */
   static bool all_are (const Mask &mask)
   {
     std::uint64_t four[4];
@@ -87,14 +38,14 @@ template <typename L> struct FillLoop {
     return (four[0] & four[1] & four[2] & four[3]) == ~std::uint64_t{0};
   }
 
-  /* The valid pixels of a row: their place, and their depth as a number. */
+  /* Writes place and depth of the valid pixels of a row. @return how many */
   std::size_t compact_row (const std::uint16_t *depth, int width, std::uint32_t row,
       std::uint32_t *to, float *depths) const
   {
     std::size_t n = 0;
     const auto take = [&] (int u) {
-      /* Always written, kept only if valid: a branch here would be a coin toss at every edge. At
-       * most `width` elements, so this never leaves the part. */
+      /* Always written, kept only if valid: a branch would be unpredictable at edges. At most
+       * `width` elements are written, so this never leaves the part. */
       to[n] = row << 16 | static_cast<std::uint32_t> (u);
       depths[n] = depth[u];
       n += depth[u] != kInvalidDepth;
@@ -151,6 +102,58 @@ template <typename L> struct FillLoop {
     return end;
   }
 };
+
+} // namespace
+
+PixelRays::PixelRays (const View &view)
+{
+  const Intrinsics &k = view.intrinsics;
+  const Mat3 &r = view.world_from_view.rotation;
+  const double unit = view.depth_unit_m;
+  store (origin, view.world_from_view.translation);
+  store (corner, unit * (r * k.unproject (0, 0, 1)));
+  store (right, unit / k.fx * (r * Vec3{1, 0, 0}));
+  store (down, unit / k.fy * (r * Vec3{0, 1, 0}));
+  store (optical_axis, r * Vec3{0, 0, 1});
+}
+
+PixelLookup::PixelLookup (const View &view)
+{
+  const Intrinsics &k = view.intrinsics;
+  const Mat3 r = transposed (view.world_from_view.rotation);
+  const Vec3 t = r * view.world_from_view.translation;
+  const double per_metre = 1 / view.depth_unit_m;
+  for (int i = 0; i < 4; i++) {
+    /* column i of view_from_world */
+    const double x = i < 3 ? r[i] : -t.x, y = i < 3 ? r[3 + i] : -t.y, z = i < 3 ? r[6 + i] : -t.z;
+    rows[0][i] = static_cast<float> ((k.fx * x + k.cx * z) * per_metre);
+    rows[1][i] = static_cast<float> ((k.fy * y + k.cy * z) * per_metre);
+    rows[2][i] = static_cast<float> (z * per_metre);
+  }
+}
+
+Status
+WorldPoints::reset (std::span<const RangeImage> images)
+{
+  std::size_t pixels = 0;
+  parts_.clear ();
+  for (const RangeImage &image : images) {
+    parts_.push_back ({pixels, pixels});
+    if (!image.depth.empty ())
+      pixels += static_cast<std::size_t> (image.depth.width) * image.depth.height;
+  }
+  if (pixels > UINT32_MAX) {
+    parts_.clear ();
+    return {StatusCode::kBadSize,
+        "frame set: " + std::to_string (pixels) + " pixels, expected less than 2^32"};
+  }
+  if (pixel.size () < pixels) { /* the last to grow: all have grown */
+    for (auto *array : {&x, &y, &z})
+      array->resize (pixels);
+    pixel.resize (pixels);
+  }
+  return {};
+}
 
 void
 WorldPoints::fill (std::size_t index, const ConstRangeImage &image, const PixelRays &rays)

@@ -53,27 +53,27 @@ struct PixelLookup {
  *  memory from frame to frame: 16 bytes a pixel of all ROIs of the largest frame set so far. */
 class WorldPoints {
 public:
-  /** The points of one range image: elements begin .. end - 1, row by row. */
+  /** The points of one range image: elements begin to end - 1, row by row. */
   struct Part {
     std::size_t begin = 0, end = 0;
     [[nodiscard]] std::size_t size () const { return end - begin; }
   };
 
-  /** Forgets all points and makes a part of no points for each image. Allocates only if the images
-   *  have more pixels than ever before.
+  /** Removes all points and makes an empty part for each image. Allocates only if the images have
+   * more pixels than ever before.
    *  @return kBadSize if the images have 2^32 pixels or more together */
   Status reset (std::span<const RangeImage> images);
 
-  /** Fills part `index` from its image. Different parts may be filled in parallel. */
+  /** Fills part `index` from its image. Threads may fill different parts concurrently. */
   void fill (std::size_t index, const ConstRangeImage &image, const PixelRays &rays);
 
   [[nodiscard]] std::span<const Part> parts () const { return parts_; }
   /** Points of all parts. */
   [[nodiscard]] std::size_t size () const;
 
-  /** Metres, world. Parts do not touch: elements between them mean nothing. */
+  /** World coordinates, metres. Elements between parts are undefined. */
   std::vector<float> x, y, z;
-  /** Where the point comes from: row << 16 | column, counted from the ROI's first pixel. */
+  /** The point's pixel in the ROI: row << 16 | column. */
   std::vector<std::uint32_t> pixel;
 
 private:

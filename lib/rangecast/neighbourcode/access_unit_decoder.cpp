@@ -6,13 +6,20 @@
 #include "bitstream/slice_place.hpp"
 
 namespace rangecast {
+namespace {
+
+/* A view is decoded in at most so many jobs: each has enough slices that a hostile stream cannot
+ * make too many jobs, and threads end at about the same time. */
+constexpr std::uint64_t kJobsOfView = 32;
+
+} // namespace
 
 Status
 AccessUnitDecoder::set_rig (const Rig &rig)
 {
   if (Status s = decoder_.set_rig (rig); !s.ok ())
     return s;
-  references_ = {}; /* memory, too: views may be others */
+  references_ = {}; /* frees memory, too: the views may differ */
   rig_ = rig;
   count_ = 0;
   return {};
@@ -25,7 +32,7 @@ AccessUnitDecoder::reset_references ()
     pair.reset ();
 }
 
-/* Slices of one place: the first sound one counts, the others are copies of it. */
+/* Slices of one place: the first intact one counts, the others are repetitions. */
 AccessUnitDecoder::Place
 AccessUnitDecoder::decode_place (std::span<const PlannedSlice> same, const RangeImage &image,
     const ConstRangeImage &older, DecoderResult &result, SliceMemory &memory)
@@ -43,7 +50,7 @@ AccessUnitDecoder::decode_place (std::span<const PlannedSlice> same, const Range
       result.slices++;
       result.points += decoded.points;
       result.unknown_pixels += decoded.unknown;
-      return Place::kSound;
+      return Place::kIntact;
     }
     result.bad_slices++;
     if (slice.too_short)
@@ -57,8 +64,8 @@ AccessUnitDecoder::decode_place (std::span<const PlannedSlice> same, const Range
   return place;
 }
 
-/* Where slices overlap, the sum of their points is not what is there. Touches only pixels that
- * came: a few small slices can claim a large image. */
+/* Counts each pixel once where slices overlap. Touches only pixels that arrived: a few small slices
+ * can claim a large image. */
 void
 AccessUnitDecoder::cover (Coverage &covered, Place place, const Roi &part, const RangeImage &image)
 {
@@ -66,7 +73,7 @@ AccessUnitDecoder::cover (Coverage &covered, Place place, const Roi &part, const
     for (int x = part.x; x < part.x + part.width; x++) {
       const auto i = static_cast<std::size_t> (y) * static_cast<std::size_t> (image.roi.width) +
                      static_cast<std::size_t> (x);
-      const bool valid = place == Place::kSound && image.depth.at (x, y) != kInvalidDepth;
+      const bool valid = place == Place::kIntact && image.depth.at (x, y) != kInvalidDepth;
       covered.seen_pixels += !covered.seen[i];
       covered.points += valid;
       covered.points -= covered.valid[i];
@@ -75,7 +82,7 @@ AccessUnitDecoder::cover (Coverage &covered, Place place, const Roi &part, const
     }
 }
 
-/* Does what all slices of a view need, before any of them is decoded. */
+/* Prepares a view before any of its slices is decoded. */
 void
 AccessUnitDecoder::begin_view (
     std::size_t index, const RangeImage &image, const ConstRangeImage &older)
@@ -84,7 +91,8 @@ AccessUnitDecoder::begin_view (
   decoder_.prepare (planned.reference);
   if (planned.reference.reference)
     references_[planned.view_id].begin (planned.reference);
-  if (!is_tiled (planned))
+  if (planned.overlaps ||
+      planned.held_pixels != area_of (planned.roi)) /* not every pixel is coded */
     fill_from (older, image);
   if (planned.overlaps) {
     Coverage &covered = covered_[index];
@@ -94,11 +102,7 @@ AccessUnitDecoder::begin_view (
   }
 }
 
-/* So many jobs have enough slices each that a hostile stream cannot make too many, and threads end
- * at about the same time. */
-constexpr std::uint64_t kJobsOfView = 32;
-
-/* Of slices that overlap the later replaces the earlier: they are one job. */
+/* Slices that overlap are one job, because the later replaces the earlier. */
 void
 AccessUnitDecoder::add_jobs (std::size_t view)
 {
@@ -135,7 +139,7 @@ AccessUnitDecoder::run (
   }
 }
 
-/* What the jobs of a view came to. */
+/* The result of a view's jobs. */
 DecoderResult
 AccessUnitDecoder::sum_up (std::size_t index) const
 {
@@ -155,28 +159,18 @@ AccessUnitDecoder::sum_up (std::size_t index) const
   return sum;
 }
 
-static ConstRangeImage
-image_of (std::span<const RangeImage> images, int view_id)
-{
-  for (const RangeImage &image : images)
-    if (image.view_id == view_id)
-      return image;
-  return {}; /* an empty one: everything becomes invalid */
-}
-
-static bool
-belongs_to (const RangeImage &image, const AccessUnitDecoder::PlannedView &planned)
-{
-  return image.view_id == planned.view_id && image.roi == planned.roi;
-}
-
 Status
 AccessUnitDecoder::decode (std::span<const RangeImage> images, int threads, DecoderResult &result,
     std::span<const RangeImage> older)
 {
-  if (!std::ranges::equal (images, views (), belongs_to))
+  if (!std::ranges::equal (images, views (), [] (const RangeImage &image, const PlannedView &view) {
+        return image.view_id == view.view_id && image.roi == view.roi;
+      }))
     return {StatusCode::kBadSize, "decoder: the images are not those of the planned views"};
-  const auto older_of = [&] (std::size_t i) { return image_of (older, planned_[i].view_id); };
+  const auto older_of = [&] (std::size_t i) {
+    const auto found = std::ranges::find (older, planned_[i].view_id, &RangeImage::view_id);
+    return found == older.end () ? ConstRangeImage () : ConstRangeImage (*found);
+  };
   in_parallel (count_, threads, [&] (std::size_t i) { begin_view (i, images[i], older_of (i)); });
   jobs_.clear ();
   for (std::size_t i = 0; i < count_; i++)

@@ -27,7 +27,7 @@ AccessUnitEncoder::set_thresholds (int depth, int colour)
     find_max_depth_error ();
 }
 
-/* Mostly all views have the same near and far, and one is enough. */
+/* Usually all views have the same near and far, and the error is computed once. */
 void
 AccessUnitEncoder::find_max_depth_error ()
 {
@@ -46,45 +46,22 @@ AccessUnitEncoder::find_max_depth_error ()
 Status
 AccessUnitEncoder::check_views (std::span<const RangeImage> images)
 {
-  std::uint64_t there = 0;
+  std::uint64_t present = 0; /* by view-id */
   for (const RangeImage &image : images) {
     if (!rig_.find (image.view_id))
       return {StatusCode::kNotFound, "range buffer: view " + std::to_string (image.view_id) +
                                          " is not in the rig of the caps"};
-    if (there >> image.view_id & 1)
+    if (present >> image.view_id & 1)
       return {StatusCode::kBadData,
           "range buffer: view " + std::to_string (image.view_id) + " is there twice"};
-    there |= std::uint64_t{1} << image.view_id;
+    present |= std::uint64_t{1} << image.view_id;
   }
-  /* A view that is not there has nothing to refer to when it comes again: else a frame set of key
-   * slices would not be one at which a decoder can begin. */
+  /* A view that is absent begins with key slices when it returns: otherwise a frame set of key
+   * slices might not be one at which a decoder can begin. */
   for (const View &view : rig_.views)
-    if (!(there >> view.id & 1))
+    if (!(present >> view.id & 1))
       views_[view.id].request_key ();
   return {};
-}
-
-Status
-AccessUnitEncoder::begin_views (
-    std::span<const RangeImage> images, std::uint32_t frame_number, int threads)
-{
-  in_parallel (images.size (), threads, [&] (std::size_t i) {
-    begun_[i] = views_[images[i].view_id].begin (images[i], frame_number);
-  });
-  for (std::size_t i = 0; i < images.size (); i++)
-    if (!begun_[i].ok ()) {
-      request_key (); /* what the others have begun is never sent */
-      return begun_[i];
-    }
-  return {};
-}
-
-void
-AccessUnitEncoder::add_jobs (ViewEncoder &view)
-{
-  view.for_open_partitions ([&] (ViewEncoder::PartitionId partition) {
-    jobs_.push_back ({&view, partition});
-  });
 }
 
 Status
@@ -95,8 +72,19 @@ AccessUnitEncoder::encode (std::span<const RangeImage> images, std::uint32_t fra
   jobs_.clear ();
   if (Status s = check_views (images); !s.ok ())
     return s;
-  if (Status s = begin_views (images, frame_number, threads); !s.ok ())
-    return s;
+  in_parallel (images.size (), threads, [&] (std::size_t i) {
+    begun_[i] = views_[images[i].view_id].begin (images[i], frame_number);
+  });
+  for (std::size_t i = 0; i < images.size (); i++)
+    if (!begun_[i].ok ()) {
+      request_key (); /* the other views' references are of a frame set that is never sent */
+      return begun_[i];
+    }
+  const auto add_jobs = [this] (ViewEncoder &view) {
+    view.for_open_partitions ([&] (ViewEncoder::PartitionId partition) {
+      jobs_.push_back ({&view, partition});
+    });
+  };
   for (const RangeImage &image : images)
     add_jobs (views_[image.view_id]);
   do {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Which views there are in an access unit, and where their slices lie. */
+/* Finds the views of an access unit and the places of their slices. */
 #include "access_unit.hpp"
 
 #include <algorithm>
@@ -9,9 +9,19 @@
 #include "bitstream/slice_place.hpp"
 
 namespace rangecast {
+namespace {
 
-/* What slices of one view agree in, then where they lie, then when they came. */
-static auto
+/* An encoder codes no pixel in two slices, and a network repeats packets a few times at most. A few
+ * bytes each of more would keep the decoder busy for minutes. */
+constexpr std::uint64_t kMaxRepeats = 8;
+
+/* An encoder of profile plain codes at most 8/3 pixels a byte, so a ROI beyond this has lost more
+ * than nine tenths; others keep their size from one frame set to the next. In other profiles a ROI
+ * may shrink with fewer losses where little moves. */
+constexpr std::uint64_t kMaxPixelsPerByte = 32;
+
+/* First the fields in which slices of a view agree, then their place. */
+auto
 sort_key (const SliceHeader &h)
 {
   return std::tuple{h.view_id, h.roi.x, h.roi.y, h.roi.width, h.roi.height, h.depth_bits,
@@ -19,7 +29,7 @@ sort_key (const SliceHeader &h)
       h.first_column, h.first_row, h.columns, h.rows};
 }
 
-static bool
+bool
 agrees (const SliceHeader &a, const SliceHeader &b)
 {
   return a.roi == b.roi && a.depth_bits == b.depth_bits && a.inverse_depth == b.inverse_depth &&
@@ -28,7 +38,9 @@ agrees (const SliceHeader &a, const SliceHeader &b)
          (a.profile == Profile::kPlain) == (b.profile == Profile::kPlain);
 }
 
-/* @return false if there is damage after which nothing can be read */
+} // namespace
+
+/* @return false at damage after which nothing can be read */
 bool
 AccessUnitDecoder::read_slices (std::span<const std::uint8_t> bytes, DecoderResult &result)
 {
@@ -72,7 +84,8 @@ AccessUnitDecoder::plan (
   }
 }
 
-/* Most slices of a view are right, also where a stray one of another frame set came first. */
+/* The largest group of slices that agree is right, even if a stray slice of another frame set
+ * arrived first. */
 void
 AccessUnitDecoder::plan_view (std::span<const PlannedSlice> slices, DecoderResult &result)
 {
@@ -97,10 +110,6 @@ AccessUnitDecoder::plan_view (std::span<const PlannedSlice> slices, DecoderResul
   limit_pixels (planned_[count_ - 1]);
 }
 
-/* An encoder gives no pixel to two slices, and a network repeats packets a few times at most. Of
- * more than that a few bytes each would keep the decoder busy for minutes. */
-constexpr std::uint64_t kMaxRepeats = 8;
-
 void
 AccessUnitDecoder::limit_pixels (const PlannedView &planned)
 {
@@ -108,16 +117,10 @@ AccessUnitDecoder::limit_pixels (const PlannedView &planned)
   for (PlannedSlice &slice : std::span (&slices_[planned.first_slice], planned.slice_count)) {
     if (slice.too_short)
       continue;
-    pixels += static_cast<std::uint64_t> (slice.header.rows) *
-              static_cast<std::uint64_t> (slice.header.columns);
+    pixels += area_of (place_of (slice.header));
     slice.too_short = pixels > kMaxRepeats * planned.coded_pixels;
   }
 }
-
-/* An encoder of profile plain gives at most 8/3 pixels a byte, so this is no ROI of which less than
- * nine tenths are lost: it stays as it is, the same from one frame set to the next. In other
- * profiles it may shrink with fewer losses where little moves. */
-static constexpr std::uint64_t kMaxPixelsPerByte = 32;
 
 void
 AccessUnitDecoder::crop_to_slices (PlannedView &planned)
@@ -147,8 +150,8 @@ AccessUnitDecoder::crop_to_slices (PlannedView &planned)
   }
 }
 
-/* The slices lie in the order of their columns: one overlaps another before it if that reaches
- * further in a row of both. */
+/* Slices are sorted by their columns: one overlaps an earlier one if that reaches beyond its first
+ * column in a row of both. */
 void
 AccessUnitDecoder::find_overlaps (PlannedView &planned)
 {
@@ -167,12 +170,6 @@ AccessUnitDecoder::find_overlaps (PlannedView &planned)
     planned.held_pixels += area_of (place_of (h));
     last = &h;
   }
-}
-
-bool
-AccessUnitDecoder::is_tiled (const PlannedView &planned)
-{
-  return !planned.overlaps && planned.held_pixels == area_of (planned.roi);
 }
 
 std::uint64_t

@@ -15,17 +15,17 @@
 
 namespace rangecast {
 
-/** What slices need while they are decoded. Nothing of one has an effect on the next. */
+/** Memory to decode slices, one after another. */
 struct SliceMemory {
   PlainDecoder plain;
   PlainTemporalDecoder plain_temporal;
   CompactDecoder compact; ///< profiles packed and entropy
 };
 
-/** Decodes slices into range images, and keeps tables between them. */
+/** Decodes slices into range images; keeps quantiser tables between them. */
 class SliceDecoder {
 public:
-  /** The cameras whose views may come. Forgets the tables. */
+  /** Sets the rig whose views are decoded. Forgets the tables. @return validate()'s status */
   Status set_rig (const Rig &rig);
   [[nodiscard]] const Rig &rig () const { return rig_; }
 
@@ -35,10 +35,10 @@ public:
   /** Decodes one slice into the planes of its view. Writes only pixels of its own rows and
    *  columns; where it returns an error, those may be partly written.
    *  @param unit    the whole unit
-   *  @param header  as read_header() gave it
+   *  @param header  from read_header()
    *  @param image   has the slice's ROI
-   *  @param reference  of this view; pixels that refer to what is not there become invalid
-   *  @param[out] pixels  grows
+   *  @param reference  of this view; pixels that refer to missing ones become invalid
+   *  @param[in,out] pixels  is added to
    *  @return kBadData or kTruncated for damaged symbols, kBadSize for another ROI */
   Status decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
       const DecoderReference &reference, const RangeImage &image, DecodedPixels &pixels)
@@ -47,11 +47,11 @@ public:
     return decode (unit, header, reference, image, pixels, memory_);
   }
 
-  /** Makes the tables for slices of this view and these bits, unless they are there. Different
-   *  views may be prepared at the same time. */
+  /** Builds the tables for slices of this view and these bits, unless they exist. Threads may
+   * prepare different views concurrently. */
   void prepare (const SliceHeader &header);
-  /** The same as above for what has been prepared; at the same time for slices that have no pixel
-   *  in common, each with memory of its own. */
+  /** decode() after prepare(). Threads may decode slices that share no pixel concurrently, each
+   * with its own memory. */
   Status decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
       const DecoderReference &reference, const RangeImage &image, DecodedPixels &pixels,
       SliceMemory &memory) const;

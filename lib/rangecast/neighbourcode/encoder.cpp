@@ -3,8 +3,49 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
+
+#include "bitstream/symbols.hpp"
 
 namespace rangecast {
+namespace {
+
+/* Profile plain: the fewest partitions for which every possible row fits into a slice. */
+int
+plain_partitions (const SliceHeader &header, int max_slice_size)
+{
+  const int bits = kSymbolBits + header.depth_bits + 3 * header.colour_bits;
+  /* Symbols and full pixels may each end within a byte; slices that refer to others have a longer
+   * header. */
+  const int overhead = int (kSliceHeaderSize) + 2 + header.reference;
+  const int max_columns = (max_slice_size - overhead) * 8 / bits;
+  return (header.roi.width + max_columns - 1) / max_columns;
+}
+
+/* Profiles packed and entropy: an estimate, as a row may still not fit. Without a reference a slice
+ * has so many columns for each byte^(1/2) of its size; the factors were found by experiment.
+ * Entropy slices are about as wide as high, so that few pixels lack their upper neighbours; packed
+ * ones are wider, so that few runs begin. Without loss rows are long and slices low. With a
+ * reference slices are as high as their band, if the last bands tell how wide that is.
+ * @param is_exact  all residuals are coded without loss
+ * @param delta_bytes_per_pixel  of the last bands with a reference; 0: there was none */
+int
+compact_partitions (const SliceHeader &header, const RowBand &band, int max_slice_size,
+    bool is_exact, double delta_bytes_per_pixel)
+{
+  constexpr double kFillOfDeltaSlice = 0.8; /* so that few of them exceed their size */
+  const double columns_of_slice =
+      header.profile == Profile::kPacked ? (is_exact ? 1.4 : 4.5) : (is_exact ? 1 : 2.4);
+  const int width = header.roi.width;
+  double side = columns_of_slice * std::sqrt (max_slice_size);
+  if (!band.key && delta_bytes_per_pixel > 0) {
+    const double columns = kFillOfDeltaSlice * max_slice_size / (delta_bytes_per_pixel * band.rows);
+    side = std::clamp (columns, side, double (std::max (width, int (side) + 1)));
+  }
+  return std::clamp (int (std::lround (width / side)), 1, width);
+}
+
+} // namespace
 
 Status
 validate (const EncoderSettings &s)
@@ -61,22 +102,7 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
   return {};
 }
 
-void
-ViewEncoder::fill_header (const ConstRangeImage &image, std::uint32_t frame_number)
-{
-  header_ = {};
-  header_.view_id = static_cast<std::uint8_t> (view_.id);
-  header_.depth_bits = static_cast<std::uint8_t> (settings_.depth_bits);
-  header_.colour_bits = static_cast<std::uint8_t> (settings_.colour_bits);
-  header_.profile = settings_.profile;
-  header_.inverse_depth = settings_.depth_scale == DepthScale::kInverse;
-  header_.frame_number = frame_number;
-  header_.capture_time_ns = image.capture_time_ns;
-  if (!image.roi.empty ())
-    header_.roi = image.roi;
-}
-
-/* Begins to keep the coded pixels, if later frame sets are to refer to them, and plans which rows
+/* Begins to store the coded pixels if later frame sets may refer to them, and plans which rows
  * refer to the frame set before. */
 void
 ViewEncoder::plan_references ()
@@ -125,34 +151,29 @@ ViewEncoder::partitions_of (const Plan &plan) const
       header_, plan.rows, settings_.max_slice_size, is_exact, delta_bytes_per_pixel_);
 }
 
-/* Room for what partitions mostly come to, and for ROIs that grow, so that frame sets need no
- * memory anew. With a reference there may be fewer partitions than without, but no more; and a
- * partition behind i others is no wider than one of i + 1. */
+/* Cuts a band into partitions. Reserves memory for their usual size and for ROIs that grow, so that
+ * frame sets allocate nothing in the steady state: with a reference there are at most as many
+ * partitions as without, and partition i is no wider than one of i + 1. */
 void
-ViewEncoder::make_room (Band &band, int partitions)
+ViewEncoder::cut (Band &band, int partitions)
 {
   constexpr std::size_t kUsualBytesOfPixel = 2;
+  const int width = header_.roi.width;
   Plan key = band.plan;
   key.rows.key = true;
-  const int most = std::max (partitions, band.plan.rows.key ? 0 : partitions_of (key));
+  const auto reserved = static_cast<std::size_t> (
+      std::max (partitions, band.plan.rows.key ? 0 : partitions_of (key)));
   const int rows = std::max (band.plan.rows.rows, settings_.temporal ? refresh_.band_rows () : 0);
-  if (band.partitions.size () < static_cast<std::size_t> (most))
-    band.partitions.resize (static_cast<std::size_t> (most));
-  for (std::size_t i = 0; i < static_cast<std::size_t> (most); i++) {
-    const std::size_t columns = static_cast<std::size_t> (header_.roi.width) / (i + 1) + 1;
+  if (band.partitions.size () < reserved)
+    band.partitions.resize (reserved);
+  for (std::size_t i = 0; i < reserved; i++) {
+    const std::size_t columns = static_cast<std::size_t> (width) / (i + 1) + 1;
     const std::size_t usual = kUsualBytesOfPixel * columns * static_cast<std::size_t> (rows);
     std::vector<std::uint8_t> &bytes = band.partitions[i].bytes;
     bytes.clear ();
     if (bytes.capacity () < usual)
       bytes.reserve (usual + usual / 2);
   }
-}
-
-void
-ViewEncoder::cut (Band &band, int partitions)
-{
-  const int width = header_.roi.width;
-  make_room (band, partitions);
   band.count = static_cast<std::size_t> (partitions);
   band.is_open = true;
   band.misfits = false;
@@ -212,28 +233,27 @@ ViewEncoder::begin (const ConstRangeImage &image, std::uint32_t frame_number)
     return {StatusCode::kBadSize,
         "view " + std::to_string (view_.id) + ": the ROI does not lie in the view's image"};
   image_ = image;
-  fill_header (image, frame_number);
+  header_ = {};
+  header_.view_id = static_cast<std::uint8_t> (view_.id);
+  header_.depth_bits = static_cast<std::uint8_t> (settings_.depth_bits);
+  header_.colour_bits = static_cast<std::uint8_t> (settings_.colour_bits);
+  header_.profile = settings_.profile;
+  header_.inverse_depth = settings_.depth_scale == DepthScale::kInverse;
+  header_.frame_number = frame_number;
+  header_.capture_time_ns = image.capture_time_ns;
   if (roi.empty ()) {
     references_.reset (); /* as if it were absent */
     make_empty_slice ();
     return {};
   }
+  header_.roi = roi;
   plan_references ();
   cut_bands ();
   return {};
 }
 
-bool
-ViewEncoder::code_compact (
-    const Band &band, const SliceHeader &header, Partition &partition, CompactEncoder &with)
-{
-  const CompactPicture picture = {
-      image_, reference_, {depth_, colour_}, compact_settings (band.plan.fine), motions_};
-  return with.code_partition (picture, band.plan.rows, header, partition.bytes, partition.result);
-}
-
 void
-ViewEncoder::code (PartitionId id, PartitionEncoder &with)
+ViewEncoder::code (PartitionId id, PartitionEncoder &memory)
 {
   Band &band = bands_[id.band];
   Partition &partition = band.partitions[id.partition];
@@ -241,7 +261,7 @@ ViewEncoder::code (PartitionId id, PartitionEncoder &with)
   partition.bytes.clear ();
   partition.result = {};
   if (misfits.load (std::memory_order_relaxed))
-    return; /* all of the band is to be coded again */
+    return; /* the whole band has to be coded again */
   SliceHeader header = header_;
   header.key = band.plan.rows.key;
   header.reference_distance = header.key ? std::uint8_t{0} : header_.reference_distance;
@@ -250,13 +270,16 @@ ViewEncoder::code (PartitionId id, PartitionEncoder &with)
   const PlainSettings plain = {
       settings_.depth_threshold, settings_.colour_threshold, settings_.max_slice_size};
   if (settings_.profile != Profile::kPlain) {
-    if (!code_compact (band, header, partition, with.compact))
+    const CompactPicture picture = {
+        image_, reference_, {depth_, colour_}, compact_settings (band.plan.fine), motions_};
+    if (!memory.compact.code_partition (
+            picture, band.plan.rows, header, partition.bytes, partition.result))
       misfits.store (true, std::memory_order_relaxed);
   } else if (reference_.now) {
-    with.plain_temporal.code_partition (image_, band.plan.rows, reference_, depth_, colour_, plain,
-        header, partition.bytes, partition.result);
+    memory.plain_temporal.code_partition (image_, band.plan.rows, reference_, depth_, colour_,
+        plain, header, partition.bytes, partition.result);
   } else {
-    with.plain.code_partition (
+    memory.plain.code_partition (
         image_, plain_codes_, plain, header, partition.bytes, partition.result);
   }
 }
@@ -277,9 +300,9 @@ ViewEncoder::pixels_of (const Band &band) const
          static_cast<std::size_t> (header_.roi.width);
 }
 
-/* Goes on with a trial whose partitions have been coded. @return false if that was all */
+/* Evaluates a trial whose partitions are coded. @return false if the band is complete */
 bool
-ViewEncoder::go_on (Band &band)
+ViewEncoder::continue_trial (Band &band)
 {
   const bool was_key = band.plan.rows.key;
   if (band.plan.trial == Trial::kFirst) {
@@ -289,7 +312,7 @@ ViewEncoder::go_on (Band &band)
     const std::size_t bytes = bytes_of (band);
     const std::size_t key_bytes = was_key ? bytes : band.first_bytes;
     const std::size_t delta_bytes = was_key ? band.first_bytes : bytes;
-    reference_choice_.tried (band.plan.rows, delta_bytes, {key_bytes, pixels_of (band)});
+    reference_choice_.record_trial (band.plan.rows, delta_bytes, {key_bytes, pixels_of (band)});
     band.plan.trial = Trial::kAgain;
     if (was_key == (key_bytes <= delta_bytes))
       return false;
@@ -313,7 +336,7 @@ ViewEncoder::finish ()
     if (band.misfits)
       cut (band, std::min (2 * static_cast<int> (band.count), header_.roi.width));
     else
-      band.is_open = go_on (band);
+      band.is_open = continue_trial (band);
     is_done = is_done && !band.is_open;
   }
   if (is_done)
@@ -321,7 +344,7 @@ ViewEncoder::finish ()
   return is_done;
 }
 
-/* What bands come to says how wide the next slices with a reference may be, and whether a reference
+/* The sizes of bands tell how wide the next slices with a reference may be, and whether a reference
  * still pays. */
 void
 ViewEncoder::record_bytes ()
@@ -329,7 +352,7 @@ ViewEncoder::record_bytes ()
   std::size_t bytes = 0, pixels = 0;
   for (const Band &band : std::span (bands_).first (band_count_)) {
     if (band.plan.fine && band.plan.trial == Trial::kNone)
-      reference_choice_.coded (band.plan.rows, {bytes_of (band), pixels_of (band)});
+      reference_choice_.record_coded (band.plan.rows, {bytes_of (band), pixels_of (band)});
     if (band.plan.rows.key)
       continue;
     bytes += bytes_of (band);

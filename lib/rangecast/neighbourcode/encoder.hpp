@@ -7,7 +7,7 @@
 
 #include "../geometry/quantiser.hpp"
 #include "../geometry/range_image.hpp"
-#include "bitstream/slice_partition.hpp"
+#include "bitstream/encoder_result.hpp"
 #include "bitstream/unit.hpp"
 #include "compact/encoder.hpp"
 #include "plain/encoder.hpp"
@@ -16,10 +16,10 @@
 
 namespace rangecast {
 
-/** Which of the neighbours that are near enough replaces a pixel, if any. */
+/** The neighbour that replaces a pixel, of those that are near enough. */
 enum class NeighbourChoice : std::uint8_t {
   kFirst, ///< the first: left, upper-left, upper, upper-right
-  kBest,  ///< what costs least in error and bits, in full too; profiles packed and entropy
+  kBest,  ///< the one of least error and bits, or the pixel in full; profiles packed and entropy
 };
 
 struct EncoderSettings {
@@ -31,12 +31,12 @@ struct EncoderSettings {
   Profile profile = Profile::kPlain;
   NeighbourChoice choice = NeighbourChoice::kFirst;
   DepthScale depth_scale = DepthScale::kLinear;
-  /** A pixel may equal the same one of the frame set before, too. */
+  /** Pixels may also equal one of the frame set before. */
   bool temporal = false;
-  /** Within this time every pixel is coded without reference to earlier frame sets; 0: only in key
-   * frame sets. */
+  /** Within this time every pixel is coded once without reference to earlier frame sets; 0: only in
+   *  key frame sets. */
   std::uint64_t refresh_period_ns = 1'000'000'000;
-  /** Of frame sets whose capture times do not grow. */
+  /** Time between frame sets, used where capture times do not grow. */
   std::uint64_t frame_interval_ns = 1'000'000'000 / 30;
 
   friend bool operator== (const EncoderSettings &, const EncoderSettings &) = default;
@@ -44,60 +44,61 @@ struct EncoderSettings {
 
 Status validate (const EncoderSettings &settings);
 
-/** Codes partitions of any view. Nothing of one partition has an effect on the next. */
+/** Memory to code partitions of any view, one after another. */
 struct PartitionEncoder {
   PlainEncoder plain;
   PlainTemporalEncoder plain_temporal;
   CompactEncoder compact; ///< profiles packed and entropy
 };
 
-/** Codes range images of one view, in partitions that do not depend on one another: in whatever
- * order and with whatever helper they are coded, their bytes are the same. Keeps its memory. */
+/** Codes range images of one view in independent partitions: their bytes do not depend on order,
+ *  thread or PartitionEncoder. Keeps its memory. */
 class ViewEncoder {
 public:
-  /** Sets up for a view. Builds tables only if something changed. */
+  /** Sets the view and the settings. Builds tables only if something changed.
+   *  @return validate()'s status, or kBadValue if depth cannot be quantised */
   Status configure (const View &view, const EncoderSettings &settings);
-  /** Changes nothing but the thresholds: at no cost. They must be within their ranges. */
+  /** Changes the thresholds only, codes; they must be in range. No tables are built. */
   void set_thresholds (int depth, int colour)
   {
     settings_.depth_threshold = depth;
     settings_.colour_threshold = colour;
   }
 
-  /** Begins a range image: finds into which partitions it is cut.
+  /** Begins a range image and cuts it into partitions.
    *
    *  Pixels are scanned row by row. A valid one is compared with its left, upper-left, upper and
    *  upper-right neighbours, as they are after quantisation and replacement; the first that is near
    *  enough in depth and in each of R, G, B replaces it. Neighbours outside the slice do not exist.
    *  An empty ROI gives one slice without pixels. Depths outside near..far are invalid.
-   *  @param image  must live until all partitions are coded
+   *  @param image  must stay valid until all partitions are coded
    *  @return kBadSize if the ROI does not lie in the view's image */
   Status begin (const ConstRangeImage &image, std::uint32_t frame_number);
 
   struct PartitionId {
     std::size_t band, partition;
   };
-  /** Calls take (id) for each partition that is to be coded. */
-  template <typename Take> void for_open_partitions (const Take &take) const
+  /** Calls visit (id) for each partition that has to be coded. */
+  template <typename Visit> void for_open_partitions (const Visit &visit) const
   {
     for (std::size_t b = 0; b < band_count_; b++)
       for (std::size_t p = 0; bands_[b].is_open && p < bands_[b].count; p++)
-        take (PartitionId{b, p});
+        visit (PartitionId{b, p});
   }
-  /** Codes a partition. Different ones may be coded at the same time. */
-  void code (PartitionId id, PartitionEncoder &with);
-  /** To be called when all open partitions have been coded. @return false if some bands had to be
-   * cut into more partitions, or are to be coded another way: these are open now */
+  /** Codes a partition. Threads may code different ones concurrently. */
+  void code (PartitionId id, PartitionEncoder &memory);
+  /** To be called when all open partitions are coded. @return false if some bands had to be cut
+   * into more partitions, or have to be coded the other way (see Trial): these are open now */
   bool finish ();
 
-  /** What the range image came to. */
+  /** Statistics of the range image. */
   [[nodiscard]] EncoderResult result () const;
-  /** Calls take (bytes) for each partition, in order; valid until the next begin(). */
-  template <typename Take> void for_coded_partitions (const Take &take) const
+  /** Calls visit (bytes) for each partition, in order; valid until the next begin(). */
+  template <typename Visit> void for_coded_partitions (const Visit &visit) const
   {
     for (std::size_t b = 0; b < band_count_; b++)
       for (std::size_t p = 0; p < bands_[b].count; p++)
-        take (std::span<const std::uint8_t> (bands_[b].partitions[p].bytes));
+        visit (std::span<const std::uint8_t> (bands_[b].partitions[p].bytes));
   }
 
   /** The next range image is coded without reference to earlier ones. */
@@ -111,36 +112,32 @@ private:
     std::vector<std::uint8_t> bytes;
     EncoderResult result;
   };
-  /* Whether a band is coded with a reference and without one, to see which is smaller. What is
-   * coded last is what later frame sets refer to, so the way that is expected to be comes second,
-   * and the other one once more if it has been. */
+  /* A band may be coded with a reference and without one, to see which is smaller. Later frame sets
+   * refer to what is coded last, so the way that is expected to win comes second; if the first one
+   * wins it is coded again. */
   enum class Trial : std::uint8_t { kNone, kFirst, kSecond, kAgain };
   struct Plan { /* of a band */
     RowBand rows;
-    bool fine = false; /* pixels are finer than need be, for later frame sets to take them */
+    bool fine = false; /* see CompactSettings::fine */
     Trial trial = Trial::kNone;
   };
   struct Band {
     Plan plan;
-    std::size_t first_bytes = 0;       /* of a trial */
-    std::vector<Partition> partitions; /* those behind the first `count` are memory for later */
+    std::size_t first_bytes = 0;       /* of the first way of a trial */
+    std::vector<Partition> partitions; /* those after the first `count` are spare memory */
     std::size_t count = 0;
     bool is_open = false;
     bool misfits = false; /* a row of a partition is longer than a slice may be */
   };
-  void fill_header (const ConstRangeImage &image, std::uint32_t frame_number);
   void make_empty_slice ();
   void plan_references ();
   void cut_bands ();
   void cut (Band &band, int partitions);
-  void make_room (Band &band, int partitions);
   [[nodiscard]] int partitions_of (const Plan &plan) const;
   [[nodiscard]] CompactSettings compact_settings (bool fine) const;
+  [[nodiscard]] static std::size_t bytes_of (const Band &band);
   [[nodiscard]] std::size_t pixels_of (const Band &band) const;
-  static std::size_t bytes_of (const Band &band);
-  bool go_on (Band &band);
-  bool code_compact (
-      const Band &band, const SliceHeader &header, Partition &partition, CompactEncoder &with);
+  bool continue_trial (Band &band);
   void record_bytes ();
 
   View view_;
@@ -155,13 +152,14 @@ private:
   MotionMemory motions_;
   double delta_bytes_per_pixel_ = 0; /* of the last bands with a reference; 0: there was none */
 
-  /* Of the range image that was begun last. */
+  /* Of the current range image. */
   ConstRangeImage image_;
   SliceHeader header_;
   CodingReference reference_;
-  std::vector<RowBand> rows_, fine_, coarse_, both_; /* what refresh asks for, and sorted */
-  std::vector<Plan> plans_;                          /* from top to bottom */
-  std::vector<Band> bands_; /* those behind the first band_count_ are memory for later */
+  std::vector<RowBand> rows_, fine_, coarse_,
+      both_;                /* see RefreshSchedule::plan(), ReferenceChoice::sort() */
+  std::vector<Plan> plans_; /* from top to bottom */
+  std::vector<Band> bands_; /* those after the first band_count_ are spare memory */
   std::size_t band_count_ = 0;
 };
 

@@ -6,12 +6,12 @@
 namespace rangecast {
 namespace {
 
-/* What does not pay is tried again after 1, 2, 4... frame sets: a second at 30 a second in the end.
- */
+/* A reference that does not pay is tried again after 1, 2, 4... frame sets, up to this many: about
+ * a second at 30 frame sets a second. */
 constexpr int kLongestWait = 32;
 
-/* With a reference a band has doubts from this part of what it took without one on: that was made
- * finer than need be, and would be smaller. */
+/* A reference is doubtful from this share of the key size on: key bands are coded finer than the
+ * thresholds ask, and would be smaller otherwise. */
 constexpr double kDoubt = 0.85;
 
 } // namespace
@@ -23,9 +23,9 @@ ReferenceChoice::sort (std::span<const RowBand> bands, std::vector<RowBand> &fin
   fine.clear ();
   coarse.clear ();
   both.clear ();
-  bool has_tried = false; /* one of those that are known, so that no frame set takes much longer */
+  bool has_tried = false; /* one retry a frame set, which bounds its time */
   for (const RowBand &band : bands) {
-    Band &known = of (band);
+    Band &known = bands_[band.index];
     known.waited = std::min (known.waited + 1, kLongestWait);
     const bool is_due = known.waited >= known.wait && !has_tried;
     const bool may_try = known.state == State::kUnknown ||
@@ -52,9 +52,9 @@ ReferenceChoice::expects_delta (const RowBand &band) const
 }
 
 void
-ReferenceChoice::tried (const RowBand &band, std::size_t delta_bytes, const Cost &key)
+ReferenceChoice::record_trial (const RowBand &band, std::size_t delta_bytes, const Cost &key)
 {
-  Band &known = of (band);
+  Band &known = bands_[band.index];
   const bool pays = delta_bytes < key.bytes;
   const State state = pays ? State::kPays : State::kPaysNot;
   const bool is_new = pays && known.state == State::kPaysNot;
@@ -63,15 +63,15 @@ ReferenceChoice::tried (const RowBand &band, std::size_t delta_bytes, const Cost
   known.waited = 0;
   known.key_bytes = double (key.bytes) / double (std::max<std::size_t> (key.pixels, 1));
   known.is_doubtful = false;
-  if (is_new) /* then in others, too, as it seems */
+  if (is_new) /* probably it pays in others, too */
     for (Band &other : bands_)
       other.wait = 1;
 }
 
 void
-ReferenceChoice::coded (const RowBand &band, const Cost &cost)
+ReferenceChoice::record_coded (const RowBand &band, const Cost &cost)
 {
-  Band &known = of (band);
+  Band &known = bands_[band.index];
   const double bytes = double (cost.bytes) / double (std::max<std::size_t> (cost.pixels, 1));
   if (band.key)
     known.key_bytes = bytes;

@@ -12,7 +12,7 @@
 namespace rangecast {
 namespace {
 
-/** Thrown and caught in this file only: what is wrong with the file's contents. */
+/* Thrown and caught in this file only: what is wrong with the file's contents. */
 struct BadFile {
   std::string what;
 };
@@ -36,11 +36,11 @@ numbers (const YamlNode &node, const std::string &name, std::size_t count)
 }
 
 double
-number (const YamlNode &parent, const std::string &name, double fallback)
+number (const YamlNode &parent, const std::string &name, double default_value)
 {
   const YamlNode &node = parent[name];
   if (node.type == YamlNode::Type::kNone)
-    return fallback;
+    return default_value;
   const std::optional<double> value = node.number ();
   if (!value)
     throw BadFile{name + ": expected a number"};
@@ -70,7 +70,7 @@ read_lens (const YamlNode &node, Intrinsics &intrinsics, Distortion &distortion)
     distortion = numbers (node["distortion"], "distortion", 0);
 }
 
-/** A serial number without quotes is a number to YAML, which may have lost digits of it. */
+/* A serial number without quotes is a number to YAML, and may have lost digits. */
 std::string
 read_camera (const YamlNode &parent)
 {

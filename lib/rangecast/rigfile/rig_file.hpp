@@ -10,15 +10,15 @@
 
 namespace rangecast {
 
-/** What the name of a rig file may end in; see check_output_path(). */
+/** Extensions of rig files; see check_output_path(). */
 inline constexpr std::string_view kRigExtensions[] = {".yml", ".yaml", ".json"};
 
-/** Bytes of the longest rig file that is read: many times what 64 views with three cameras take. */
+/** Greatest size of a rig file, bytes: many times that of 64 views with three cameras. */
 inline constexpr std::uintmax_t kMaxRigFileSize = std::uintmax_t{4} << 20;
 
-/** Reads a rig from a file that cv::FileStorage opens, too: YAML or JSON by the file's ending,
+/** Reads a rig from a file that cv::FileStorage opens, too: YAML or JSON by the file's extension,
  *  possibly with .gz; layout in docs/formats/rig.md. The rig is validated.
- *  @return kNotFound, kBadData or what validate() says; the message begins with the path */
+ *  @return kNotFound, kBadData or validate()'s code; the message begins with the path */
 Status load_rig (const std::string &path, Rig &rig);
 /** Writes the same text that cv::FileStorage would. @return kBadValue, kNotFound; the message
  * begins with the path */

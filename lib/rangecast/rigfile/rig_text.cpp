@@ -24,18 +24,24 @@ public:
     end ("]");
   }
 
-  void add (const char *name, const std::string &value) { add_value (name, quoted (value)); }
-  void add (const char *name, int value) { add_value (name, std::to_string (value)); }
-  void add (const char *name, double value) { add_value (name, digits (value)); }
+  void add (const char *name, const std::string &value) { begin_value (name) += quoted (value); }
+  void add (const char *name, int value) { begin_value (name) += std::to_string (value); }
+  void add (const char *name, double value) { begin_value (name) += digits (value); }
   void add (const char *name, std::span<const double> values)
   {
+    constexpr std::size_t kMargin = 71, kIndent = 4; /* where a line is too long */
     begin_value (name) += '[';
     bool first = true;
     for (double value : values) {
       if (!first)
         text_ += ',';
       first = false;
-      add_item (digits (value));
+      const std::string item = digits (value);
+      if (text_.size () - line_ + item.size () > kMargin)
+        begin_line ().append (kIndent, ' ');
+      else
+        text_ += ' ';
+      text_ += item;
     }
     text_ += " ]";
   }
@@ -43,13 +49,11 @@ public:
   [[nodiscard]] std::string finish () { return text_ + (json_ ? "\n}\n" : "\n"); }
 
 private:
-  [[nodiscard]] std::size_t indent () const { return json_ ? 4 * (depth_ + 1) : 3 * depth_; }
-
   std::string &begin_line ()
   {
     text_ += '\n';
     line_ = text_.size ();
-    return text_.append (indent (), ' ');
+    return text_.append (json_ ? 4 * (depth_ + 1) : 3 * depth_, ' ');
   }
 
   /* @param name  "" for an item of a list */
@@ -62,20 +66,6 @@ private:
     if (json_)
       return name.empty () ? text_ : text_ += '"' + name + "\": ";
     return text_ += name.empty () ? "-" : name + ':' + space;
-  }
-
-  void add_value (const char *name, const std::string &value) { begin_value (name) += value; }
-
-  /* Of a list in one line, which goes on in the next where it gets too long. */
-  void add_item (const std::string &item)
-  {
-    constexpr std::size_t kMargin = 71, kIndent = 4;
-    if (text_.size () - line_ + item.size () > kMargin) {
-      begin_line ().append (kIndent, ' ');
-    } else {
-      text_ += ' ';
-    }
-    text_ += item;
   }
 
   void begin (const char *name, const char *bracket)
@@ -161,19 +151,13 @@ write_lens (StorageWriter &file, const Intrinsics &k, const Distortion &distorti
 }
 
 void
-write_camera (StorageWriter &file, const std::string &camera)
-{
-  if (!camera.empty ())
-    file.add ("camera", camera);
-}
-
-void
 write_partner (StorageWriter &file, const char *name, const std::optional<PartnerCamera> &partner)
 {
   if (!partner)
     return;
   file.begin_map (name);
-  write_camera (file, partner->camera);
+  if (!partner->camera.empty ())
+    file.add ("camera", partner->camera);
   write_lens (file, partner->intrinsics, partner->distortion);
   write_pose (file, "partner_from_left", partner->partner_from_left);
   file.end_map ();
@@ -187,7 +171,8 @@ write_view (StorageWriter &file, const View &view)
   file.add ("id", view.id);
   if (!view.name.empty ())
     file.add ("name", view.name);
-  write_camera (file, view.camera);
+  if (!view.camera.empty ())
+    file.add ("camera", view.camera);
   file.add ("image_size", size);
   write_lens (file, view.intrinsics, view.distortion);
   write_pose (file, "world_from_view", view.world_from_view);

@@ -14,7 +14,7 @@
 namespace rangecast {
 namespace {
 
-/** Thrown and caught in this file only: what is wrong with the file. */
+/* Thrown and caught in this file only: what is wrong with the file. */
 struct BadYaml {
   std::string what;
 };
@@ -31,7 +31,7 @@ unpacked (const std::string &path, gzFile file, std::uint64_t max_bytes)
     text.resize (size + kBlock);
     got = gzread (file, text.data () + size, kBlock);
     text.resize (size + std::size_t (std::max (got, 0)));
-    int error = Z_OK; /* a compressed file that ends early is one only behind its last byte */
+    int error = Z_OK; /* reports a truncated compressed file after its last byte */
     gzerror (file, &error);
     if (got < 0 || error != Z_OK)
       throw BadYaml{"cannot be read to its end"};
@@ -63,12 +63,6 @@ standard_text (std::string_view text)
   return standard;
 }
 
-bool
-is_digit (char c)
-{
-  return c >= '0' && c <= '9';
-}
-
 /* std::from_chars() takes no plus sign. */
 std::string_view
 without_plus (std::string_view text)
@@ -78,22 +72,22 @@ without_plus (std::string_view text)
   return text;
 }
 
-/* All of it is a decimal number, which "inf" is not. */
+/* Whether the whole text is a decimal number; "inf" is not. */
 bool
 is_number (std::string_view text)
 {
   text = without_plus (text);
   const std::size_t sign = text.starts_with ('-'), point = text.substr (sign).starts_with ('.');
-  if (text.size () <= sign + point || !is_digit (text[sign + point]))
+  if (text.size () <= sign + point || text[sign + point] < '0' || text[sign + point] > '9')
     return false;
   double value = 0;
   const char *const end = text.data () + text.size ();
   return std::from_chars (text.data (), end, value).ptr == end;
 }
 
-class Parser {
+class YamlParser {
 public:
-  explicit Parser (std::string_view text)
+  explicit YamlParser (std::string_view text)
   {
     if (!yaml_parser_initialize (&parser_))
       throw std::bad_alloc ();
@@ -101,13 +95,13 @@ public:
         &parser_, reinterpret_cast<const unsigned char *> (text.data ()), text.size ());
     yaml_parser_set_encoding (&parser_, YAML_UTF8_ENCODING);
   }
-  ~Parser ()
+  ~YamlParser ()
   {
     yaml_event_delete (&event_);
     yaml_parser_delete (&parser_);
   }
-  Parser (const Parser &) = delete;
-  Parser &operator= (const Parser &) = delete;
+  YamlParser (const YamlParser &) = delete;
+  YamlParser &operator= (const YamlParser &) = delete;
 
   void document (YamlNode &root)
   {
@@ -145,7 +139,7 @@ private:
     throw BadYaml{line (event_.start_mark) + what};
   }
 
-  /* What the event at hand begins, to its end. */
+  /* Reads the value that begins with the current event. */
   void value (YamlNode &node, int depth)
   {
     if (++nodes_ > kMaxYamlNodes)
@@ -235,7 +229,7 @@ read_yaml (const std::string &path, std::uint64_t max_bytes, YamlNode &root)
   root = {};
   try {
     const std::string text = standard_text (unpacked (path, file.get (), max_bytes));
-    Parser (text).document (root);
+    YamlParser (text).document (root);
   } catch (const BadYaml &bad) {
     return {StatusCode::kBadData, path + ": " + bad.what};
   } catch (const std::bad_alloc &) {

@@ -11,11 +11,11 @@
 
 namespace rangecast {
 
-/** A value of a YAML or JSON file. A field that is not there is a value of type kNone, so that a
- *  chain of look-ups needs one test at its end. */
+/** A value of a YAML or JSON file. A missing field is a value of type kNone, so that a chain of
+ *  look-ups needs one test at its end. */
 struct YamlNode {
   enum class Type {
-    kNone,   ///< not there, or a field without a value
+    kNone,   ///< missing, or a field without a value
     kNumber, ///< a decimal number without quotes
     kText,
     kList,
@@ -23,19 +23,19 @@ struct YamlNode {
   };
 
   Type type = Type::kNone;
-  std::string text;               ///< of a text, UTF-8; of a number, as it is written
+  std::string text;               ///< of a text, UTF-8; of a number, as written
   std::vector<YamlNode> items;    ///< of a list; of a map, its fields' values
   std::vector<std::string> names; ///< of a map, its fields' names
 
   /** The field of that name, the first if there are several. */
   [[nodiscard]] const YamlNode &operator[] (std::string_view name) const;
-  /** The value of a number; one that no double can hold is infinite. */
+  /** The value of a number; infinite if it is beyond the range of double. */
   [[nodiscard]] std::optional<double> number () const;
-  /** The value of a number that is written as an integer and fits. */
+  /** The value of a number that is written as an integer and fits into int. */
   [[nodiscard]] std::optional<int> integer () const;
 };
 
-/** What a file may hold. Nothing in a rig comes near these. */
+/** Limits of a file, far beyond any rig. */
 inline constexpr int kMaxYamlDepth = 32;
 inline constexpr int kMaxYamlNodes = 100000;
 

@@ -16,7 +16,7 @@ namespace {
 constexpr int kSide = 3, kDiagonal = 4;
 constexpr int kFarthest = kSide * kFeatherPixels;
 
-/* Metres by which a view has to see farther than a place to see through it. */
+/* A view sees through a point if it sees something farther by this, metres. */
 constexpr double kClearance = 0.01;
 /* A view sees the background at an invalid pixel if there is no valid one this near: matching
  * leaves holes in surfaces, too. */
@@ -26,9 +26,10 @@ constexpr int kBackgroundRadius = 1;
  */
 constexpr int kCopyRange = 7, kCopyReach = 2;
 
-class Planes {
+class PlaneBuilder {
 public:
-  Planes (std::span<const SurfaceView> views, std::size_t which, double depth_step, BlendPlanes &to)
+  PlaneBuilder (
+      std::span<const SurfaceView> views, std::size_t which, double depth_step, BlendPlanes &to)
       : views_ (views), which_ (which), image_ (views[which].image), view_ (*views[which].view),
         depth_step_ (static_cast<float> (depth_step)),
         steep_ (static_cast<float> (kSteepSlope / view_.intrinsics.fx)), to_ (to),
@@ -114,10 +115,10 @@ private:
   {
     const int a = image_.depth.at (x, y), b = image_.depth.at (u, v);
     const auto step = static_cast<float> (std::abs (a - b)),
-               least = static_cast<float> (std::min (a, b));
-    if (b == kInvalidDepth || step > depth_step_ * least)
+               min = static_cast<float> (std::min (a, b));
+    if (b == kInvalidDepth || step > depth_step_ * min)
       return false;
-    return step <= steep_ * least ||
+    return step <= steep_ * min ||
            !is_seen_through (0.5 * (world_of (x, y, a) + world_of (u, v, b)));
   }
 
@@ -137,7 +138,7 @@ private:
     }
   }
 
-  /* One step for pixels at a depth edge. */
+  /* Initial distances: one step for pixels at a depth edge. */
   void begin_distances (int y)
   {
     for (int x = 0; x < width_; x++) {
@@ -155,9 +156,9 @@ private:
     const auto sweep = [this] (int x, int y, int way) {
       std::uint8_t *at = &to_.weight[place (x, y)];
       const std::ptrdiff_t row = way * width_;
-      const int least = std::min (
+      const int min = std::min (
           std::min (at[way], at[row]) + kSide, std::min (at[row - 1], at[row + 1]) + kDiagonal);
-      *at = static_cast<std::uint8_t> (std::min<int> (*at, least));
+      *at = static_cast<std::uint8_t> (std::min<int> (*at, min));
     };
     for (int y = 1; y + 1 < height_; y++)
       for (int x = 1; x + 1 < width_; x++)
@@ -180,7 +181,8 @@ private:
     smooth (width_, [this] (int, int y) { return std::pair (y, height_); });
   }
 
-  /* Pixels that equal the left, upper-left, upper or upper-right one. */
+  /* Finds pixels that equal the left, upper-left, upper or upper-right one. @return whether any
+   * does */
   bool find_copies (int y)
   {
     std::uint8_t *copied = &to_.copied[place (0, y)];
@@ -246,8 +248,8 @@ private:
     int before, after;         /* of the depth */
     int has_before, has_after; /* 1: joined */
   };
-  /* What depth changes by from one pixel to the next: the mean of both sides, or the steeper step,
-   * if that is a steep one. */
+  /* Change of depth from one pixel to the next: the mean of both sides, or the steeper step if that
+   * is steep. */
   [[nodiscard]] float slope (Steps s, float steep_share) const
   {
     const int before = s.has_before * s.before, after = s.has_after * s.after;
@@ -259,8 +261,8 @@ private:
     return mean + part * (static_cast<float> (steeper) - mean);
   }
 
-  /* The square root of what a place weighs: of the distance to the edge, times the cosine between
-   * the surface's normal and the ray to the camera. */
+  /* The square root of the weight: of the distance to the edge times the squared cosine between the
+   * surface's normal and the ray to the camera. */
   void weigh_row (int y)
   {
     const std::uint16_t *depth = image_.depth.row (y);
@@ -293,8 +295,8 @@ private:
       const int distance = weight[x];
       const float share = static_cast<float> (distance) * (1.f / kFarthest);
       const auto root = static_cast<int> (255 * std::sqrt (share * squared) + 0.5f);
-      const int least = distance > 0 ? 1 : 0, most = root > 255 ? 255 : root;
-      weight[x] = static_cast<std::uint8_t> (most > least ? most : least);
+      const int min = distance > 0 ? 1 : 0, max = root > 255 ? 255 : root;
+      weight[x] = static_cast<std::uint8_t> (max > min ? max : min);
     };
     weigh (0, 0, width > 1 ? 1 : 0);
     for (int x = 1; x < width - 1; x++)
@@ -318,7 +320,7 @@ void
 make_blend_planes (
     std::span<const SurfaceView> views, std::size_t which, double depth_step, BlendPlanes &to)
 {
-  for_this_cpu ([&] { Planes (views, which, depth_step, to).make (); });
+  for_this_cpu ([&] { PlaneBuilder (views, which, depth_step, to).make (); });
 }
 
 } // namespace rangecast

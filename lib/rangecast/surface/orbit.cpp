@@ -35,8 +35,8 @@ solve (const Mat3 &a, Vec3 b, Vec3 &x)
   return true;
 }
 
-/* The point with the least sum of squared distances to all optical axes; of many, where cameras
- * face each other, that nearest to the middle of all cameras. */
+/* The point with the least sum of squared distances to all optical axes; if there are many, because
+ * cameras face each other, the one nearest to the middle of all cameras. */
 bool
 meeting_point (const Rig &rig, Vec3 &point)
 {
@@ -83,8 +83,8 @@ product (const std::array<double, 16> &a, const std::array<double, 16> &b)
   return c;
 }
 
-/* Where the camera stands, and its axes. */
-struct Stand {
+/* Position and axes of the camera, world. */
+struct CameraPose {
   Vec3 position, right, up, back;
 
   [[nodiscard]] std::array<double, 16> eye_from_world () const
@@ -94,21 +94,22 @@ struct Stand {
   }
 };
 
-struct Planes {
+struct ClipDistances {
   double near_m, far_m;
 };
 
-/* Room for what is drawn beside its points, as the ends of bands. Twice the range costs a bit of
- * the depth buffer, which has 24. */
+/* Factor of the range for what is drawn beside its points, such as ends of bands. It costs one bit
+ * of the depth buffer's 24. */
 constexpr double kRoom = 2;
 constexpr double kMaxFarToNear = 2000;
 
-Planes
-planes_round (std::span<const Vec3> hull, const Stand &stand, double distance_m, double room_m)
+ClipDistances
+clip_distances (
+    std::span<const Vec3> hull, const CameraPose &camera, double distance_m, double room_m)
 {
   double nearest = 1e30, farthest = 0;
   for (const Vec3 &p : hull) {
-    const double depth = dot (stand.position - p, stand.back);
+    const double depth = dot (camera.position - p, camera.back);
     nearest = std::min (nearest, depth);
     farthest = std::max (farthest, depth);
   }
@@ -116,6 +117,26 @@ planes_round (std::span<const Vec3> hull, const Stand &stand, double distance_m,
     return {distance_m / 50, distance_m * 20};
   const double far_m = kRoom * farthest + room_m;
   return {std::max (nearest / kRoom, far_m / kMaxFarToNear), far_m};
+}
+
+/* Orbit::pan's axes in the world. */
+Vec3
+world_from_pan (const SceneFrame &scene, Vec3 p)
+{
+  const Vec3 right = normalised (cross (scene.up, scene.to_first));
+  return p.x * right + p.y * scene.up + p.z * scene.to_first;
+}
+
+/* The camera's axes in those of Orbit::pan. */
+OrbitAxes
+axes_in_pan (const SceneFrame &scene, const Orbit &orbit)
+{
+  const double azimuth = orbit.azimuth_deg * kDegree;
+  const double elevation =
+      std::clamp (scene.elevation_deg + orbit.elevation_deg, -89.0, 89.0) * kDegree;
+  const double sa = std::sin (azimuth), ca = std::cos (azimuth);
+  const double se = std::sin (elevation), ce = std::cos (elevation);
+  return {{ca, 0, -sa}, {-se * sa, ce, -se * ca}, {ce * sa, se, ce * ca}};
 }
 
 } // namespace
@@ -147,26 +168,6 @@ scene_frame (const Rig &rig)
   return scene;
 }
 
-/* Orbit::pan's axes in the world. */
-static Vec3
-world_from_pan (const SceneFrame &scene, Vec3 p)
-{
-  const Vec3 right = normalised (cross (scene.up, scene.to_first));
-  return p.x * right + p.y * scene.up + p.z * scene.to_first;
-}
-
-/* The camera's axes in those of Orbit::pan. */
-static OrbitAxes
-axes_in_pan (const SceneFrame &scene, const Orbit &orbit)
-{
-  const double azimuth = orbit.azimuth_deg * kDegree;
-  const double elevation =
-      std::clamp (scene.elevation_deg + orbit.elevation_deg, -89.0, 89.0) * kDegree;
-  const double sa = std::sin (azimuth), ca = std::cos (azimuth);
-  const double se = std::sin (elevation), ce = std::cos (elevation);
-  return {{ca, 0, -sa}, {-se * sa, ce, -se * ca}, {ce * sa, se, ce * ca}};
-}
-
 OrbitAxes
 orbit_axes (const SceneFrame &scene, const Orbit &orbit)
 {
@@ -181,13 +182,13 @@ orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect, bool
 {
   const double distance = orbit.distance_m > 0 ? orbit.distance_m : scene.distance_m;
   const OrbitAxes axes = orbit_axes (scene, orbit), pan = axes_in_pan (scene, orbit);
-  Stand stand{{}, axes.right, axes.up, axes.back};
-  stand.position = scene.target + world_from_pan (scene, orbit.pan) + distance * stand.back +
-                   eye.right_m * stand.right;
+  CameraPose camera{{}, axes.right, axes.up, axes.back};
+  camera.position = scene.target + world_from_pan (scene, orbit.pan) + distance * camera.back +
+                    eye.right_m * camera.right;
 
   const double fov = (orbit.fov_deg > 0 ? orbit.fov_deg : scene.fov_deg) * kDegree;
   const double half = std::tan (fov / 2); /* of the picture's height, at a distance of 1 */
-  const auto [near, far] = planes_round (hull, stand, distance, room_m);
+  const auto [near, far] = clip_distances (hull, camera, distance, room_m);
   const double down = flip_y ? -1 : 1;
   /* eyes look in parallel; their pictures are shifted, not turned, so that no eye's is higher */
   const double converged = eye.convergence_m > 0 ? eye.convergence_m : distance;
@@ -196,7 +197,7 @@ orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect, bool
       -shift, down * scene.off_centre_y, (far + near) / (near - far), -1, 0, 0,
       2 * far * near / (near - far), 0};
   const double height = 2 * half * distance;
-  return {product (clip_from_eye, stand.eye_from_world ()), distance, height * aspect * pan.right,
+  return {product (clip_from_eye, camera.eye_from_world ()), distance, height * aspect * pan.right,
       -height * pan.up};
 }
 

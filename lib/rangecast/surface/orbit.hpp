@@ -9,9 +9,9 @@
 
 namespace rangecast {
 
-/** What a rig's pictures are of, as far as its cameras tell. */
+/** The scene in front of a rig's cameras. */
 struct SceneFrame {
-  Vec3 target;              ///< what the cameras look at, world, metres
+  Vec3 target;              ///< point that the cameras look at, world, metres
   Vec3 to_first;            ///< unit vector from the target to the first view, level
   Vec3 up;                  ///< unit vector
   double distance_m = 1;    ///< of the first view from the target
@@ -28,7 +28,7 @@ struct SceneFrame {
  *  but upright if there are several views and the first is rolled. */
 SceneFrame scene_frame (const Rig &rig);
 
-/** Where an orbiting camera stands. */
+/** Position of an orbiting camera. */
 struct Orbit {
   double azimuth_deg = 0;   ///< from the first view, to the right as seen from there
   double elevation_deg = 0; ///< above the first view's elevation, kept within 89 degrees of level
@@ -37,7 +37,7 @@ struct Orbit {
   Vec3 pan;                 ///< moves the target: right, up, towards the first view; metres
 };
 
-/** Unit vectors of the orbiting camera, world: to its right, up, and away from what it looks at. */
+/** Unit vectors of the orbiting camera, world: to its right, up, and away from the target. */
 struct OrbitAxes {
   Vec3 right, up, back;
 };
@@ -48,16 +48,16 @@ using Mat4 = std::array<float, 16>;
 
 struct OrbitMatrices {
   Mat4 clip_from_world;
-  double distance_m = 0;    ///< that is in force
+  double distance_m = 0;    ///< the effective Orbit::distance_m
   Vec3 pan_right, pan_down; ///< the Orbit::pan that goes right by the picture's width, down by its
                             ///< height, as seen at the target
 };
 
-/** One of two eyes that look at the scene side by side. */
+/** One eye of a stereoscopic camera. */
 struct Eye {
-  double right_m = 0;       ///< where it is, to the right of the camera that orbits; metres
-  double convergence_m = 0; ///< from the camera: what is there is in the same place of both eyes'
-                            ///< pictures; 0 = the target's distance
+  double right_m = 0;       ///< offset to the right of the orbiting camera, metres
+  double convergence_m = 0; ///< distance from the camera at which both eyes' pictures agree; 0 =
+                            ///< the target's distance
 };
 
 /** @param aspect  width / height of the picture
@@ -70,15 +70,15 @@ struct Eye {
 OrbitMatrices orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect,
     bool flip_y, const Eye &eye = {}, std::span<const Vec3> hull = {}, double room_m = 0);
 
-/** A part of a picture: its share of the width and height, and where its middle is, from -1 (left,
- *  or where clip coordinates begin) to 1. */
+/** A part of a picture: its share of the width and height, and its middle in clip coordinates, -1
+ * to 1. */
 struct PicturePart {
   double width = 1, height = 1;
   double x = 0, y = 0;
 };
 
-/** The matrix that draws into that part what `clip_from_world` draws into the whole picture. What
- *  lies beyond the part has to be cut off by scissors. */
+/** The matrix that draws into a part of the picture what `clip_from_world` draws into the whole.
+ * The caller sets scissors to clip at the part's borders. */
 Mat4 in_part (const Mat4 &clip_from_world, const PicturePart &part);
 
 /** The pixels of part of a framebuffer of width x height pixels that a hull covers, and two more on

@@ -67,10 +67,10 @@ fitted_frame (
   };
   /* From farther away than sides ask for, the same with less slope is in the middle. */
   const auto centred = [&] (Vec3 axis, double slope, double distance) {
-    double least = 0;
+    double low = 0;
     for (int i = 0; i < 12; i++) {
-      const double between = (least + slope) / 2;
-      (sides (axis, between).distance > distance ? least : slope) = between;
+      const double between = (low + slope) / 2;
+      (sides (axis, between).distance > distance ? low : slope) = between;
     }
     return sides (axis, slope).middle;
   };

@@ -9,28 +9,16 @@
 namespace rangecast {
 namespace {
 
-/* Depth, R, G, B of a pixel, or how far they are from another's. */
-using Lanes = float __attribute__ ((vector_size (16)));
-
-Lanes
-lanes_of (std::uint16_t depth, Rgbx colour)
-{
-  return Lanes{float (depth), float (colour.r), float (colour.g), float (colour.b)};
-}
+/* Depth, R, G, B of a pixel, or differences or tolerances of them. */
+using PixelLanes = float __attribute__ ((vector_size (16)));
 
 /* Whether any lane of a comparison is true. */
 bool
-any (decltype (Lanes{} < Lanes{}) test)
+any (decltype (PixelLanes{} < PixelLanes{}) test)
 {
   using Halves = long long __attribute__ ((vector_size (16)));
   const auto halves = reinterpret_cast<Halves> (test);
   return (halves[0] | halves[1]) != 0;
-}
-
-bool
-same_colour (Rgbx a, Rgbx b)
-{
-  return a.r == b.r && a.g == b.g && a.b == b.b;
 }
 
 /* 1 / n */
@@ -46,33 +34,33 @@ constexpr auto kShares = [] {
  * Recognition 12, 1980). */
 class Cone {
 public:
-  void begin (Lanes from)
+  void begin (PixelLanes from)
   {
     from_ = from;
-    least_ = Lanes{-1e9f, -1e9f, -1e9f, -1e9f};
-    most_ = -least_;
+    min_slope_ = PixelLanes{-1e9f, -1e9f, -1e9f, -1e9f};
+    max_slope_ = -min_slope_;
   }
-  /** Whether a line from the first pixel to that one, n further on, passes all between. If so, it
-   *  is one more to pass. */
-  bool take (Lanes to, int n, Lanes tolerance)
+  /** Whether a line from the first pixel to that one, n pixels on, passes all between within their
+   *  tolerances. If so, later lines must pass this one, too. */
+  bool extend (PixelLanes to, int n, PixelLanes tolerance)
   {
     const float share = kShares[static_cast<std::size_t> (n)];
-    const Lanes way = to - from_, slope = way * share;
-    if (any ((slope < least_) | (slope > most_)))
+    const PixelLanes way = to - from_, slope = way * share;
+    if (any ((slope < min_slope_) | (slope > max_slope_)))
       return false;
-    const Lanes low = (way - tolerance) * share, high = (way + tolerance) * share;
-    least_ = low > least_ ? low : least_;
-    most_ = high < most_ ? high : most_;
+    const PixelLanes low = (way - tolerance) * share, high = (way + tolerance) * share;
+    min_slope_ = low > min_slope_ ? low : min_slope_;
+    max_slope_ = high < max_slope_ ? high : max_slope_;
     return true;
   }
 
 private:
-  Lanes from_{}, least_{}, most_{};
+  PixelLanes from_{}, min_slope_{}, max_slope_{};
 };
 
-class Builder {
+class StripBuilder {
 public:
-  Builder (const ConstRangeImage &image, const StripSettings &settings,
+  StripBuilder (const ConstRangeImage &image, const StripSettings &settings,
       std::vector<StripVertex> &to, StripResult &result, const BlendPlanes *planes)
       : image_ (image), colour_ (planes ? planes->colour_plane () : image.colour), planes_ (planes),
         settings_ (settings), to_ (to), result_ (result),
@@ -106,10 +94,10 @@ public:
 
 private:
   /* Lane 0 as a share of the depth. More than 0, so that rounding is within them. */
-  static Lanes tolerances (double depth, double colour)
+  static PixelLanes tolerances (double depth, double colour)
   {
     const auto c = static_cast<float> (colour) + 1e-3f;
-    return Lanes{static_cast<float> (depth) + 1e-7f, c, c, c};
+    return PixelLanes{static_cast<float> (depth) + 1e-7f, c, c, c};
   }
 
   [[nodiscard]] bool is_banded () const
@@ -135,8 +123,8 @@ private:
                    : near (depth_[x], image_.depth.at (x, row_ + 1));
   }
 
-  /* Where the lower vertex of a pixel is: on the pixel that many rows below, or, 0, at a place of
-   * its own. */
+  /* The lower vertex of a pixel: on the pixel so many rows below, or, if 0, at `place` about the
+   * pixel itself. */
   struct Lower {
     std::uint16_t rows = 0;
     StripPlace place = kCentre;
@@ -158,7 +146,7 @@ private:
     return {0, kFarAfter, depth_[x]};
   }
 
-  /* What is above and below each pixel of the row. */
+  /* Finds what is above and below each pixel of the row. */
   void look_below ()
   {
     const std::uint16_t *below = row_ + 1 < height_ ? image_.depth.row (row_ + 1) : nullptr;
@@ -185,14 +173,6 @@ private:
     return -1;
   }
 
-  /* How far a pixel may be off a line that leaves it out. One that equals the pixel before it may
-   * be a copy, which the neighbour code put there for something near. */
-  [[nodiscard]] Lanes tolerance (bool copy, std::uint16_t depth) const
-  {
-    const Lanes &t = copy ? copy_tolerance_ : tolerance_;
-    return Lanes{t[0] * float (depth), t[1], t[2], t[3]};
-  }
-
   /* Which pixels of a row stay when those on lines between them are left out. */
   void choose_kept (int y, bool *kept) const
   {
@@ -202,7 +182,7 @@ private:
     if (settings_.merge <= 0)
       return;
     Cone cone;
-    Lanes before{};
+    PixelLanes before{};
     int first = -1; /* where the piece begins; -1: none does */
     for (int x = 0; x < width_; x++) {
       const bool on = first >= 0 && depth[x] != kInvalidDepth && joins_pixel_right (x - 1, y);
@@ -212,7 +192,8 @@ private:
       }
       if (depth[x] == kInvalidDepth)
         continue;
-      const Lanes here = lanes_of (depth[x], colour[x]);
+      const PixelLanes here = {
+          float (depth[x]), float (colour[x].r), float (colour[x].g), float (colour[x].b)};
       if (!on) {
         kept[x] = true;
         cone.begin (here);
@@ -220,13 +201,17 @@ private:
         before = here;
         continue;
       }
-      const bool copy = depth[x] == depth[x - 1] && same_colour (colour[x], colour[x - 1]);
-      const Lanes off = tolerance (copy, depth[x]);
+      const bool copy = depth[x] == depth[x - 1] && colour[x].r == colour[x - 1].r &&
+                        colour[x].g == colour[x - 1].g && colour[x].b == colour[x - 1].b;
+      /* How far the pixel may be off a line that omits it. One that equals the pixel before it may
+       * be a copy, which the neighbour code put there for something near. */
+      const PixelLanes &shares = copy ? copy_tolerance_ : tolerance_;
+      const PixelLanes off = {shares[0] * float (depth[x]), shares[1], shares[2], shares[3]};
       if (x - first > kLongestPiece || !near (depth[first], depth[x]) ||
-          !cone.take (here, x - first, off) || weight_steps (first, x, y)) {
+          !cone.extend (here, x - first, off) || weight_steps (first, x, y)) {
         kept[x - 1] = true;
         cone.begin (before);
-        cone.take (here, 1, off);
+        cone.extend (here, 1, off);
         first = x - 1;
       }
       before = here;
@@ -325,7 +310,7 @@ private:
                         is_plain_step (p.before, p.x, p.fits_before) &&
                         is_plain_step (p.x, p.after, p.fits_after);
     if (inside) {
-      go_on (p.x, joined);
+      add_inner (p.x, joined);
       return;
     }
     pair (p.x, joined && p.fits_before);
@@ -336,9 +321,9 @@ private:
     }
   }
 
-  /* Goes on to a pixel of which either vertex, or both, may be left out. One alone makes one
-   * triangle, and one of no size with the other repeated. */
-  void go_on (int x, bool joined)
+  /* Adds a pixel inside the band, of which either vertex or both may be omitted. One vertex alone
+   * makes one triangle, and a degenerate one with the other vertex repeated. */
+  void add_inner (int x, bool joined)
   {
     const bool keeps_upper = kept_[x], keeps_lower = joined ? kept_below_[x] : kept_[x];
     if (!keeps_upper && !keeps_lower)
@@ -409,7 +394,8 @@ private:
     result_.triangles += 2;
   }
 
-  /* What nearer pixels of this row hide, between two steps down of one surface. */
+  /* Bridges what nearer pixels of this row hide of a surface that is joined to the row below on
+   * both sides of them. */
   void bridge_right (int x)
   {
     if (row_ + 1 >= height_ || joins_pixel_right (x, row_) || !joins_pixel_below (x))
@@ -422,7 +408,7 @@ private:
       bridge (x, n, row_, row_ + 1);
   }
 
-  /* The same of two columns. */
+  /* The same with nearer pixels of two columns. */
   void bridge_down (int x)
   {
     if (row_ + 1 >= height_ || !joins_pixel_right (x, row_) || joins_pixel_below (x))
@@ -457,7 +443,7 @@ private:
   StripResult &result_;
   const int width_, height_;
   const int step_; /* of 65536 */
-  const Lanes tolerance_, copy_tolerance_;
+  const PixelLanes tolerance_, copy_tolerance_;
   const std::uint16_t *depth_ = nullptr;
   int row_ = 0;
   /* by column */
@@ -477,7 +463,7 @@ build_strips (const ConstRangeImage &image, const StripSettings &settings,
 {
   to.clear ();
   if (!image.roi.empty ())
-    Builder (image, settings, to, result, planes).build ();
+    StripBuilder (image, settings, to, result, planes).build ();
 }
 
 void

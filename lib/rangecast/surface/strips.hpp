@@ -40,8 +40,8 @@ inline constexpr double kMergeCopyColour = 12;
  *  29-31: vertical StripPlace. */
 using StripVertex = std::uint32_t;
 
-/** Where a vertex lies about its pixel, on the surface that the pixel and its neighbours make:
- *  quarters of a pixel, counted from 3. */
+/** Offset of a vertex from its pixel, along the surface of the pixel and its neighbours: quarters
+ * of a pixel, counted from 3. */
 enum StripPlace : std::uint32_t {
   kFarBefore = 0, ///< three quarters: an end of a band, so that it meets what another camera saw
   kBefore = 1,    ///< half a pixel left or up: the edge of the pixel
@@ -57,11 +57,11 @@ strip_offset (StripPlace place)
 {
   return 0.25f * (static_cast<float> (place) - 3);
 }
-/** Pixels in a row that one piece stands for, at most. */
+/** Greatest number of pixels in a row that one piece replaces. */
 inline constexpr int kLongestPiece = 32;
-/** Pixels that hide a surface which goes on behind them, in a row or a column, at most. */
+/** Greatest number of pixels, in a row or a column, behind which a hidden surface is bridged. */
 inline constexpr int kWidestHidden = 8;
-/** No image that is drawn is larger, pixels. */
+/** Greatest side of an image that is drawn, pixels. */
 inline constexpr int kMaxStripSide = 8192;
 
 constexpr StripVertex

@@ -46,7 +46,7 @@ in_half_of_depths (Mat4 clip_matrix, bool farther)
   return clip_matrix;
 }
 
-/* What the matrix makes x = y = w = 0 of. */
+/* The point that the matrix maps to x = y = w = 0. */
 Vec3
 viewer_position (const Mat4 &clip_from_world)
 {

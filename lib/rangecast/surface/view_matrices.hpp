@@ -14,19 +14,19 @@ Mat4 clip_from_pixel (const Mat4 &clip_from_world, const View &view, const Roi &
  */
 Mat4 in_half_of_depths (Mat4 clip_matrix, bool farther);
 
-/** Where the camera of a perspective matrix stands, world, metres. */
+/** Position of the camera of a perspective matrix, world, metres. */
 Vec3 viewer_position (const Mat4 &clip_from_world);
 
 /** Cosine of the angle between the directions in which the viewer and a view look. */
 double view_alignment (const Mat4 &clip_from_world, const View &view);
 
-/** Whether a matrix of pixels mirrors: pieces that are counter-clockwise in their view's picture,
- *  whose y points down, are so for OpenGL, too, where it does not. */
+/** Whether a clip matrix of pixels mirrors. If it does not, triangles that are counter-clockwise in
+ *  their view's picture (y down) are so for OpenGL, too. */
 bool mirrors (const Mat4 &clip_from_world);
 
-/** How z in normalised device coordinates, a + b / w, becomes that of what is g farther from the
- *  viewer, a + b / (w + g). It never leaves the far plane as a shift of z by the like would, where
- *  the near plane is close. */
+/** Moves z in normalised device coordinates, a + b / w, to that of a point g farther from the
+ * viewer, a + b / (w + g). Unlike an equivalent offset of z it never crosses the far plane when the
+ * near plane is close. */
 struct DepthShift {
   float a, b, g;
 };

@@ -6,40 +6,28 @@
 
 namespace rangecast {
 
-/* A delay that changes by more than this at once is no jitter: the camera's clock was set. */
-static constexpr std::int64_t kJump = 1'000'000'000;
-
-void
-CameraClock::begin (std::int64_t delay)
-{
-  least_.fill (delay);
-  windows_ = 1;
-  current_ = in_window_ = 0;
-}
-
-std::int64_t
-CameraClock::least () const
-{
-  return *std::min_element (least_.begin (), least_.begin () + windows_);
-}
-
 std::int64_t
 CameraClock::host_time (std::int64_t camera_ns, std::int64_t arrival_ns)
 {
   if (camera_ns <= 0)
     return arrival_ns;
+  constexpr std::int64_t kJump_ns = 1'000'000'000; /* more is not jitter: the clock was set */
   const std::int64_t delay = arrival_ns - camera_ns;
-  if (windows_ == 0 || camera_ns < last_camera_ns_ || std::abs (delay - least ()) > kJump)
-    begin (delay);
+  const auto min = [this] { return *std::min_element (min_.begin (), min_.begin () + windows_); };
+  if (windows_ == 0 || camera_ns < last_camera_ns_ || std::abs (delay - min ()) > kJump_ns) {
+    min_.fill (delay);
+    windows_ = 1;
+    current_ = in_window_ = 0;
+  }
   last_camera_ns_ = camera_ns;
   if (++in_window_ > kWindowFrames) {
     in_window_ = 1;
     current_ = (current_ + 1) % kWindows;
     windows_ = std::max (windows_, current_ + 1);
-    least_[current_] = delay;
+    min_[current_] = delay;
   }
-  least_[current_] = std::min (least_[current_], delay);
-  return camera_ns + least ();
+  min_[current_] = std::min (min_[current_], delay);
+  return camera_ns + min ();
 }
 
 std::int64_t

@@ -7,33 +7,28 @@
 
 namespace rangecast {
 
-/** Puts the time stamps of a camera that runs by its own clock on the host's clock: the least delay
- *  between stamp and arrival within the last windows is taken for the way of a frame that nothing
- *  held up. Jitter of the host and of the network then shifts nothing, and the drift of
- *  the camera's clock (100 ppm are 1 ms in 10 s) is followed. One a camera; nothing is allocated.
- */
+/** Converts the time stamps of a camera with its own clock to the host's clock: the least delay
+ *  between stamp and arrival within the last windows is assumed to be that of an undelayed frame.
+ *  Jitter of the host and of the network then has no effect, and the drift of the camera's clock
+ * (100 ppm are 1 ms in 10 s) is followed. One instance for each camera; nothing is allocated. */
 class CameraClock {
 public:
   void reset () { *this = {}; }
 
-  /** When the picture was taken, or as long after as the shortest way takes, ns of the host's
-   * clock.
-   *  @param camera_ns  the camera's time stamp; 0: it has none, then this is the arrival
+  /** Capture time plus the least delay, ns of the host's clock.
+   *  @param camera_ns  the camera's time stamp; 0: none, then the result is the arrival
    *  @param arrival_ns on the host's clock */
   std::int64_t host_time (std::int64_t camera_ns, std::int64_t arrival_ns);
 
 private:
   static constexpr int kWindows = 4, kWindowFrames = 64;
 
-  void begin (std::int64_t delay);
-  [[nodiscard]] std::int64_t least () const;
-
-  std::array<std::int64_t, kWindows> least_{}; ///< delay of each window
+  std::array<std::int64_t, kWindows> min_{}; ///< least delay of each window, ns
   int windows_ = 0, current_ = 0, in_window_ = 0;
   std::int64_t last_camera_ns_ = 0;
 };
 
-/** The last few values of something, for its median and its tail. Nothing is allocated. */
+/** The last kMax values, for their median and other quantiles. Nothing is allocated. */
 class RecentValues {
 public:
   static constexpr std::size_t kMax = 512;

@@ -39,14 +39,6 @@ FrameAssociator::numbered (std::uint64_t number) const
   return nullptr;
 }
 
-/* Until it is learnt, one that differs begins anew. */
-void
-FrameAssociator::agree (std::int64_t difference)
-{
-  agreed_ = agreed_ > 0 && difference == difference_ ? agreed_ + 1 : 1;
-  difference_ = difference;
-}
-
 std::optional<std::int64_t>
 FrameAssociator::place (std::uint64_t number, std::optional<std::int64_t> taken_ns, bool stamped)
 {
@@ -54,8 +46,10 @@ FrameAssociator::place (std::uint64_t number, std::optional<std::int64_t> taken_
   const bool near = by_time && std::llabs (by_time->taken_ns - *taken_ns) < period_ns_ / 4;
   const auto difference = near ? static_cast<std::int64_t> (number - by_time->number) : 0;
   if (!learnt ()) {
-    if (near)
-      agree (difference);
+    if (near) { /* a different one begins again */
+      agreed_ = agreed_ > 0 && difference == difference_ ? agreed_ + 1 : 1;
+      difference_ = difference;
+    }
     return taken_ns;
   }
   const Leader *by_number = numbered (number);
@@ -66,7 +60,7 @@ FrameAssociator::place (std::uint64_t number, std::optional<std::int64_t> taken_
   if (near) {
     contradictions_ = difference == contradiction_ ? contradictions_ + 1 : 1;
     contradiction_ = difference;
-    if (contradictions_ >= kContradictions) { /* it missed signals, or counts anew */
+    if (contradictions_ >= kContradictions) { /* it missed signals, or its counter restarted */
       difference_ = difference;
       contradictions_ = 0;
       return taken_ns;
@@ -74,7 +68,7 @@ FrameAssociator::place (std::uint64_t number, std::optional<std::int64_t> taken_
     if (stamped)
       return taken_ns;
   }
-  /* the leading camera's frame may only come yet */
+  /* the leading camera's frame may not have arrived yet */
   return by_number ? std::optional (by_number->taken_ns) : taken_ns;
 }
 

@@ -7,31 +7,33 @@
 
 namespace rangecast {
 
-/** Cameras that one signal fires, which nobody here sees: finds the leading camera's frame that a
- *  frame of another one belongs to. One a camera but the leading one.
+/** For cameras that are triggered by one external signal, which this host does not see: finds the
+ *  leading camera's frame that a frame of another camera belongs to. One instance for each camera
+ * but the leading one.
  *
- *  Mostly time tells: both were taken within half a period. Where cameras count alike, numbers
- * tell, too: their difference is learnt from frames whose times agree, and then finds the partner
- * of a frame whose stamp is wrong or that arrived late. A camera that misses a signal does not
- * count what it did not take, so a time that lies within a quarter of a period of another frame of
- * the leading camera wins: a stamp at once, an arrival when it says the same three times. Nothing
- * is allocated. */
+ *  Usually times suffice: those of partners differ by less than half a period. Frame numbers help
+ *  too: their difference is learnt from frames whose times agree, and then finds the partner of a
+ *  frame whose stamp is wrong or that arrived late. A camera does not count signals that it missed,
+ *  so a time within a quarter of a period of another frame of the leading camera overrides the
+ *  number: a stamp at once, an arrival when it has disagreed the same way three times. Nothing is
+ *  allocated. */
 class FrameAssociator {
 public:
   /** @param period_ns  between two signals, > 0 */
   void start (std::int64_t period_ns);
 
-  /** A frame of the leading camera. Numbers count up, and so do times mostly. */
+  /** Records a frame of the leading camera. Numbers increase, and usually times. */
   void leader (std::uint64_t number, std::int64_t taken_ns);
 
-  /** When a frame of the other camera was taken, as far as is known now.
-   *  @param taken_ns  by its time; absent: nothing tells
-   *  @param stamped   that is the camera's stamp, not its arrival
-   *  @return the leading camera's time where its number knows better; absent: nothing tells */
+  /** Capture time of a frame of the other camera.
+   *  @param taken_ns  from its stamp or arrival; absent: unknown
+   *  @param stamped   taken_ns is the camera's stamp, not its arrival
+   *  @return taken_ns, or the leading camera's time if the number is more reliable; absent: unknown
+   */
   std::optional<std::int64_t> place (
       std::uint64_t number, std::optional<std::int64_t> taken_ns, bool stamped);
 
-  /** The cameras count alike, as far as was seen. */
+  /** The difference of the numbers is known. */
   [[nodiscard]] bool learnt () const { return agreed_ >= kAgreed; }
 
 private:
@@ -44,7 +46,6 @@ private:
 
   [[nodiscard]] const Leader *nearest (std::int64_t taken_ns) const;
   [[nodiscard]] const Leader *numbered (std::uint64_t number) const;
-  void agree (std::int64_t difference);
 
   std::int64_t period_ns_ = 1;
   std::array<Leader, kLeaders> leaders_{};

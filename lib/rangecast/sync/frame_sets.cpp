@@ -14,7 +14,7 @@ FrameSets::start (int cameras, std::int64_t tolerance, int waiting)
   waiting_ = std::clamp (waiting, 1, kMaxWaiting);
 }
 
-/* next() takes away what exceeds waiting_, so the ring has room. */
+/* next() removes frames beyond waiting_, so the ring has room. */
 FrameSets::Frame
 FrameSets::put (int camera, std::int64_t key, Frame frame)
 {
@@ -40,34 +40,17 @@ FrameSets::take_head (int camera, Set &set)
   lane.count--;
 }
 
-void
-FrameSets::drop_head (int camera, Set &set)
-{
-  take_head (camera, set);
-  lanes_[camera].dropped += set.frames[camera] != nullptr;
-}
-
-/* @param[out] oldest  the camera whose head cannot have a partner any more, if the heads are no set
- */
-bool
-FrameSets::complete (int &oldest) const
-{
-  oldest = 0;
-  std::int64_t newest = head (0).key;
-  for (int c = 1; c < cameras_; c++) {
-    if (head (c).key < head (oldest).key)
-      oldest = c;
-    newest = std::max (newest, head (c).key);
-  }
-  return newest - head (oldest).key <= tolerance_;
-}
-
 FrameSets::Step
 FrameSets::next (Set &set)
 {
   set = {};
   int longest = 0, oldest = 0;
   bool all = true;
+  const auto drop = [&] (int camera) {
+    take_head (camera, set);
+    lanes_[camera].dropped += set.frames[camera] != nullptr;
+    return Step::kDrop;
+  };
   for (int c = 0; c < cameras_; c++) {
     const Lane &lane = lanes_[c];
     all &= lane.count > 0;
@@ -77,13 +60,16 @@ FrameSets::next (Set &set)
   if (!all) {
     if (lanes_[longest].count <= waiting_)
       return Step::kWait;
-    drop_head (longest, set);
-    return Step::kDrop;
+    return drop (longest);
   }
-  if (!complete (oldest)) {
-    drop_head (oldest, set);
-    return Step::kDrop;
+  std::int64_t newest = head (0).key;
+  for (int c = 1; c < cameras_; c++) {
+    if (head (c).key < head (oldest).key)
+      oldest = c;
+    newest = std::max (newest, head (c).key);
   }
+  if (newest - head (oldest).key > tolerance_) /* the oldest cannot have partners any more */
+    return drop (oldest);
   bool lost = false;
   for (int c = 0; c < cameras_; c++) {
     take_head (c, set);

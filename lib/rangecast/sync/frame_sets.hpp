@@ -8,12 +8,12 @@ namespace rangecast {
 
 inline constexpr int kMaxCameras = 3; ///< left, right, third
 
-/** Puts the frames of two or three cameras together that belong to one moment. A frame has a key:
- *  the number of its trigger, or its time. Keys of one camera grow. What waits is bounded,
- *  nothing is allocated. */
+/** Combines the frames of two or three cameras that belong together. A frame has a key: the number
+ *  of its trigger, or its time. Keys of one camera increase. The number of waiting frames is
+ * bounded; nothing is allocated. */
 class FrameSets {
 public:
-  using Frame = void *; ///< the caller's; null: it was lost, its partners need not wait
+  using Frame = void *; ///< owned by the caller; null: lost, its partners need not wait
 
   /** @param cameras    2 to kMaxCameras
    *  @param tolerance  how far the keys of one set may lie apart: 0 for trigger numbers
@@ -21,30 +21,31 @@ public:
   void start (int cameras, std::int64_t tolerance, int waiting = kMaxWaiting);
 
   struct Set {
-    std::array<Frame, kMaxCameras> frames{}; ///< by camera; the caller's again
+    std::array<Frame, kMaxCameras> frames{}; ///< by camera; returned to the caller
     std::array<std::int64_t, kMaxCameras> keys{};
   };
 
   enum class Step {
-    kWait, ///< nothing to hand out
+    kWait, ///< no set yet
     kSet,  ///< one frame of each camera
-    kDrop, ///< frames (not null ones only) that will have no partner
+    kDrop, ///< frames that will have no partner; some may be null
   };
 
-  /** Follow it with next() until that says kWait.
-   *  @return null, or the frame itself if it is one too many: its key did not grow, or next() was
-   *  not called. It is the caller's again, and counted as dropped */
+  /** Adds a frame. The caller must call next() afterwards until it returns kWait.
+   *  @return null, or the frame itself if it is refused, because its key did not increase or next()
+   *  was not called: it is returned to the caller and counted as dropped */
   [[nodiscard]] Frame put (int camera, std::int64_t key, Frame frame);
   Step next (Set &set);
-  /** For keys that are times: from now on. */
+  /** Changes the tolerance, for keys that are times. */
   void set_tolerance (std::int64_t tolerance) { tolerance_ = tolerance; }
-  /** Everything that waits, one call after the other: to let it go. @return kDrop or kWait */
+  /** Returns waiting frames to the caller. To be repeated until it returns kWait instead of kDrop.
+   */
   Step take_rest (Set &set);
 
-  /** Frames without partner so far; lost ones (null) are not among them. */
+  /** Frames dropped so far, without lost ones (null). */
   [[nodiscard]] std::uint64_t dropped (int camera) const { return lanes_[camera].dropped; }
 
-  /** A partner that comes more than so many frames behind never comes. */
+  /** A partner more than so many frames late is not waited for. */
   static constexpr int kMaxWaiting = 8;
 
 private:
@@ -64,9 +65,7 @@ private:
   {
     return lanes_[camera].ring[lanes_[camera].first];
   }
-  void drop_head (int camera, Set &set);
   void take_head (int camera, Set &set);
-  [[nodiscard]] bool complete (int &oldest) const;
 
   std::array<Lane, kMaxCameras> lanes_{};
   int cameras_ = 2, waiting_ = kMaxWaiting;

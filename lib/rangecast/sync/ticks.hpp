@@ -5,9 +5,8 @@
 
 namespace rangecast {
 
-/** Frames a second as a fraction, and the ticks of a clock at which all hosts that share it take
- *  their pictures: the multiples of the frame period since the clock's 0. Nothing is agreed upon
- *  between hosts but the rate. */
+/** Frame rate as a fraction, and its ticks: the multiples of the frame period since the 0 of a
+ * clock, at which all hosts that share the clock capture. Hosts need to agree on the rate only. */
 struct TickRate {
   int frames = 0;  ///< > 0 where there is a rate
   int seconds = 1; ///< > 0

@@ -5,8 +5,8 @@
 
 namespace rangecast {
 
-/* GigE Vision numbers blocks with 16 bits and leaves 0 out; its extended mode and USB3 Vision have
- * 64. A number beyond 16 bits says which it is; below, 64-bit numbers do not wrap either. */
+/* GigE Vision numbers blocks with 16 bits, without 0; its extended mode and USB3 Vision use 64
+ * bits. A number beyond 16 bits identifies the latter; below that, 64-bit numbers do not wrap. */
 std::int64_t
 frame_id_step (std::uint64_t from, std::uint64_t to)
 {
@@ -40,7 +40,7 @@ TriggerMatcher::trigger_at (std::int64_t number) const
   return nullptr;
 }
 
-/* The trigger whose frame is due nearest to that time. */
+/* The trigger whose frame is expected nearest to a time. */
 TriggerMatcher::Found
 TriggerMatcher::nearest (std::int64_t time_ns) const
 {
@@ -82,8 +82,8 @@ TriggerMatcher::no_match ()
   return {};
 }
 
-/* Only one trigger is under way: it is that one. The first picture of a stream often comes late, so
- * the least delay counts, and two must agree. */
+/* Only one trigger is pending: the frame answers it. The first frame of a stream often arrives
+ * late, so two must agree. */
 TriggerMatcher::Found
 TriggerMatcher::learn (std::uint64_t frame_id, std::int64_t time_ns)
 {
@@ -108,7 +108,7 @@ TriggerMatcher::find (std::uint64_t frame_id, std::int64_t camera_ns, std::int64
   if (count_ > 0 && !learnt_)
     stamped_ = camera_ns > 0;
   if (stamped_ && camera_ns <= 0)
-    return no_match (); /* its head was lost */
+    return no_match (); /* the stamp was lost with the frame's leader */
   const std::int64_t time_ns = stamped_ ? camera_ns : arrival_ns;
   if (!settled_)
     return learn (frame_id, time_ns);

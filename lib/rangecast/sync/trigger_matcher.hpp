@@ -8,29 +8,29 @@ namespace rangecast {
 
 /** Finds the trigger that a camera's frame belongs to. One instance for each camera.
  *
- *  There are two clues: the frame's number, which grows by one with each frame, and its time stamp,
- * which lies a fixed delay after the trigger on the camera's own clock. Numbers alone would shift
- * for good when a camera misses a trigger, because it does not count what it did not take; stamps
- * alone would shift a frame that a busy camera took late. So numbers and stamps are compared, and
- * where they differ the stamp wins if it lies within a quarter of a period of a trigger. Cameras
- * without time stamps are known by arrival, which wins only when it says the same thing three
- * times.
+ *  It combines the frame's number, which increases by one with each frame, and its time stamp,
+ * which follows the trigger by a fixed delay on the camera's own clock. Numbers alone would be off
+ * for good after a missed trigger, which cameras do not count; stamps alone would misplace a frame
+ * that a busy camera took late. If the two disagree, the stamp wins if it is within a quarter of a
+ * period of a trigger. For cameras without time stamps the arrival is used, which wins only after
+ * three equal disagreements.
  *
- *  What is fixed is learnt from triggers that were fired alone, with all before answered or given
- * up: fire such ones until settled() says that two of them agreed. Nothing is allocated. */
+ *  Delay and number are learnt from triggers that were fired alone, when all before were answered
+ * or given up: fire such ones until settled(), when two of them have agreed. Nothing is allocated.
+ */
 class TriggerMatcher {
 public:
-  /** @param period_ns  between two triggers, > 0; decides what is near */
+  /** @param period_ns  between two triggers, > 0; the scale of the tolerances */
   void start (std::int64_t period_ns);
 
-  /** A trigger was sent. Numbers and times increase.
-   *  @param alone  no other trigger is under way */
+  /** Records a trigger that was sent. Numbers and times increase.
+   *  @param alone  no other trigger is pending */
   void fired (std::int64_t trigger, std::int64_t time_ns, bool alone);
 
   struct Found {
-    bool known = false;           ///< else the frame answers no trigger that is known
+    bool known = false;           ///< false: the frame answers no known trigger
     std::int64_t trigger = 0;     ///< if known
-    std::int64_t residual_ns = 0; ///< how late the frame is against its usual delay
+    std::int64_t residual_ns = 0; ///< delay of the frame less the usual delay
   };
 
   /** @param frame_id   the camera's number; 16 bits without 0, or 64; 0: it has none
@@ -38,12 +38,12 @@ public:
    *  @param arrival_ns by the clock of fired() */
   Found find (std::uint64_t frame_id, std::int64_t camera_ns, std::int64_t arrival_ns);
 
-  /** Enough is learnt to fire one trigger after the other. */
+  /** Enough is learnt to fire triggers continuously. */
   [[nodiscard]] bool settled () const { return settled_; }
   /** The camera is out of sync (restarted, its clock set): its frames match no trigger. Call
    * start() again. */
   [[nodiscard]] bool lost_sync () const { return unmatched_ >= kMaxUnmatched; }
-  /** A camera that does not answer lone triggers is settled by what it said so far. */
+  /** Settles for what is learnt so far, for a camera that does not answer single triggers. */
   void settle () { settled_ = learnt_; }
 
 private:
@@ -69,11 +69,11 @@ private:
   std::int64_t delay_ns_ = 0; ///< from trigger to stamp, usually
   std::uint64_t last_id_ = 0;
   std::int64_t last_trigger_ = 0, learnt_trigger_ = -1;
-  std::int64_t contradiction_ = 0; ///< by how many triggers arrival differs from the number
+  std::int64_t contradiction_ = 0; ///< triggers between arrival and number
   int contradictions_ = 0, unmatched_ = 0;
 };
 
-/** How far one frame number lies behind another: 16-bit numbers go from 65535 to 1.
+/** Difference of two frame numbers; 16-bit numbers wrap from 65535 to 1.
  *  @return 1 for the next one, 0 if it is the same, negative if it is older */
 std::int64_t frame_id_step (std::uint64_t from, std::uint64_t to);
 

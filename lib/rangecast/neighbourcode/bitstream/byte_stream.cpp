@@ -11,33 +11,33 @@ using Bytes = std::span<const std::uint8_t>;
 
 /* Files are searched in such blocks. */
 constexpr std::size_t kBlock = 65536;
-/* Bisection ends, and walking begins, when so few bytes are left. */
+/* Bisection ends and linear search begins when so few bytes are left. */
 constexpr std::uint64_t kWalkBytes = 4 * kBlock;
-/* Rigs come once a second: walking begins so much earlier that it meets one. */
+/* Rigs come once a second: linear search begins so much earlier that it finds one. */
 constexpr std::uint64_t kRigWindow_ns = 2'000'000'000;
 
 enum class End { kSound, kDamaged, kOpen };
 
-/* How far the sizes of units lead through an access unit that is said to end at `told`. */
+/* How far the sizes of units lead through an access unit whose declared end is `declared`. */
 struct Extent {
   std::size_t end = kStreamPrefixSize;
   End state = End::kSound;
 };
 
 Extent
-follow_units (Bytes bytes, std::size_t told)
+follow_units (Bytes bytes, std::size_t declared)
 {
   Extent extent;
-  while (extent.end < told) {
+  while (extent.end < declared) {
     const std::size_t left = bytes.size () - std::min (bytes.size (), extent.end);
-    const std::size_t said = told - extent.end;
+    const std::size_t rest = declared - extent.end;
     UnitHeader unit;
-    if (left < kUnitHeaderSize && said >= kUnitHeaderSize)
+    if (left < kUnitHeaderSize && rest >= kUnitHeaderSize)
       return {extent.end, End::kOpen};
     const Status status =
-        read_unit_header (bytes.subspan (extent.end, std::min (left, said)), unit);
+        read_unit_header (bytes.subspan (extent.end, std::min (left, rest)), unit);
     const bool truncated = status.code () == StatusCode::kTruncated;
-    if (truncated && said >= kUnitHeaderSize && unit.size <= said)
+    if (truncated && rest >= kUnitHeaderSize && unit.size <= rest)
       return {extent.end, End::kOpen};
     if (!status.ok ())
       return {extent.end, End::kDamaged};
@@ -46,8 +46,8 @@ follow_units (Bytes bytes, std::size_t told)
   return extent;
 }
 
-/* The first place from `from` on, before `limit`, where an access unit begins; else `limit`. With
- * `or_candidate` places too near the end to tell count. */
+/* The first position from `from` on, before `limit`, where an access unit begins; else `limit`.
+ * With `or_candidate` positions too near the end to be certain count, too. */
 std::size_t
 find_access_unit (Bytes bytes, std::size_t from, std::size_t limit, bool or_candidate)
 {
@@ -66,51 +66,6 @@ find_access_unit (Bytes bytes, std::size_t from, std::size_t limit, bool or_cand
   }
 }
 
-StreamPart
-rubbish (Bytes bytes, bool at_end)
-{
-  StreamPart part;
-  part.rubbish = find_access_unit (bytes, 1, bytes.size (), !at_end);
-  /* Half a start code may be at the end. */
-  if (part.rubbish == bytes.size () && !at_end)
-    part.rubbish -= std::min (bytes.size () - 1, kStartCode.size () - 1);
-  return part;
-}
-
-/* A start code inside: bytes were lost in front of it, or it is chance. What is at the end that
- * the sizes say decides. */
-StreamPart
-weigh_inner_start (Bytes bytes, std::size_t inner, std::size_t told, bool at_end, StreamPart part)
-{
-  AccessUnitHeader next;
-  if (bytes.size () < told + kStreamPrefixSize && !at_end)
-    part.wanted = told + kStreamPrefixSize;
-  else if (begins_access_unit (bytes.subspan (told), next) || bytes.size () == told)
-    part.length = told;
-  else
-    part.length = inner;
-  return part;
-}
-
-StreamPart
-access_unit (Bytes bytes, bool at_end, StreamPart part)
-{
-  const std::size_t told = kStreamPrefixSize + part.header.size;
-  const Extent extent = follow_units (bytes, told);
-  if (extent.state == End::kOpen && !at_end) {
-    part.wanted = std::min (told, std::max (2 * bytes.size (), kBlock));
-    return part;
-  }
-  std::size_t limit = extent.end;
-  if (extent.state == End::kOpen)
-    limit = std::min (bytes.size (), told);
-  const std::size_t inner = find_access_unit (bytes, kStreamPrefixSize, limit, false);
-  if (extent.state == End::kSound && inner < limit)
-    return weigh_inner_start (bytes, inner, told, at_end, part);
-  part.length = inner;
-  return part;
-}
-
 } // namespace
 
 bool
@@ -126,12 +81,39 @@ StreamPart
 next_part (Bytes bytes, bool at_end)
 {
   StreamPart part;
-  if (bytes.size () < kStreamPrefixSize && !at_end)
+  AccessUnitHeader header, next;
+  if (bytes.size () < kStreamPrefixSize && !at_end) {
     part.wanted = kStreamPrefixSize;
-  else if (begins_access_unit (bytes, part.header))
-    part = access_unit (bytes, at_end, part);
-  else if (!bytes.empty ())
-    part = rubbish (bytes, at_end);
+    return part;
+  }
+  if (bytes.empty ())
+    return part;
+  if (!begins_access_unit (bytes, header)) {
+    part.rubbish = find_access_unit (bytes, 1, bytes.size (), !at_end);
+    if (part.rubbish == bytes.size () && !at_end) /* they may end with a part of a start code */
+      part.rubbish -= std::min (bytes.size () - 1, kStartCode.size () - 1);
+    return part;
+  }
+  part.header = header;
+  const std::size_t declared = kStreamPrefixSize + header.size;
+  const Extent extent = follow_units (bytes, declared);
+  if (extent.state == End::kOpen && !at_end) {
+    part.wanted = std::min (declared, std::max (2 * bytes.size (), kBlock));
+    return part;
+  }
+  const std::size_t limit =
+      extent.state == End::kOpen ? std::min (bytes.size (), declared) : extent.end;
+  const std::size_t inner = find_access_unit (bytes, kStreamPrefixSize, limit, false);
+  /* A start code inside, though all sizes agree: bytes before it were lost, or it is chance. The
+   * bytes after the declared end decide. */
+  if (extent.state != End::kSound || inner == limit)
+    part.length = inner;
+  else if (bytes.size () < declared + kStreamPrefixSize && !at_end)
+    part.wanted = declared + kStreamPrefixSize;
+  else if (begins_access_unit (bytes.subspan (declared), next) || bytes.size () == declared)
+    part.length = declared;
+  else
+    part.length = inner;
   return part;
 }
 
@@ -144,7 +126,7 @@ StreamFile::at (std::uint64_t offset)
     return {};
   UnitHeader unit;
   (void)read_unit_header (
-      Bytes (block_).subspan (kStreamPrefixSize), unit); /* it is not all here */
+      Bytes (block_).subspan (kStreamPrefixSize), unit); /* kTruncated, but the type is read */
   place.has_rig = unit.type == static_cast<std::uint8_t> (UnitType::kRigView);
   return place;
 }
@@ -194,7 +176,7 @@ StreamFile::last ()
   return {};
 }
 
-/* An offset not behind the first access unit that is later than `pts_ns`, and near it. */
+/* An offset at or shortly before the first access unit that is later than `pts_ns`. */
 std::uint64_t
 StreamFile::bisect (std::uint64_t pts_ns)
 {

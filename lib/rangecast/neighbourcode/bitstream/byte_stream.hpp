@@ -20,19 +20,19 @@ inline constexpr std::uint64_t kNoTime = UINT64_MAX;
 /** Whether `bytes` begins with a start code and a sound access-unit unit. */
 bool begins_access_unit (std::span<const std::uint8_t> bytes, AccessUnitHeader &header);
 
-/** What lies at the beginning of some bytes of the stream: one of the three sizes is not 0. */
+/** The beginning of some bytes of the stream: one of the three sizes is not 0. */
 struct StreamPart {
   std::size_t rubbish = 0; ///< bytes before the place where an access unit may begin next
   std::size_t length = 0;  ///< bytes of the access unit, prefix included
-  std::size_t wanted = 0;  ///< bytes, from the same beginning on, to ask again with
+  std::size_t wanted = 0;  ///< bytes needed, from the same beginning, to call next_part() again
   AccessUnitHeader header; ///< of the access unit
 };
 
-/** Tells access units from rubbish. An access unit is as long as its size says if the sizes of its
- *  units agree with that; start codes inside it mean nothing then. If they do not agree, it ends at
- *  the next start code or, if that is not in sight, behind the last unit that could be read: so
- *  nobody waits for megabytes that a damaged size promises. `wanted` doubles, which keeps the work
- *  for an access unit that comes in small parts linear.
+/** Separates access units from rubbish. An access unit has the size that its header declares if the
+ *  sizes of its units agree with that; start codes inside it are ignored then. Otherwise it ends at
+ *  the next start code or, if there is none, after the last readable unit, so that a damaged size
+ *  does not make the reader wait for megabytes. `wanted` doubles, which keeps the work for an
+ * access unit that arrives in small parts linear.
  *  @param at_end  no more bytes will follow; `wanted` is then always 0 */
 StreamPart next_part (std::span<const std::uint8_t> bytes, bool at_end);
 
@@ -40,10 +40,10 @@ StreamPart next_part (std::span<const std::uint8_t> bytes, bool at_end);
 struct AccessUnitPlace {
   std::uint64_t offset = 0; ///< bytes, of its start code
   AccessUnitHeader header;
-  bool has_rig = false; ///< rig views are in front of its slices
+  bool has_rig = false; ///< rig views precede its slices
 };
 
-/** Finds access units by time in a file that need not be read as a whole. */
+/** Finds access units by time in a file without reading all of it. */
 class StreamFile {
 public:
   /** Reads up to `size` bytes at `offset`; fewer at the end, none on failure. */

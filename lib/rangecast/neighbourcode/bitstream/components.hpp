@@ -12,17 +12,23 @@ typedef std::int32_t Components __attribute__ ((vector_size (16)));
 typedef float FloatComponents __attribute__ ((vector_size (16)));
 inline constexpr int kComponents = 4;
 
-/** The depth of an invalid pixel: further than any threshold from every valid one. */
+/** The depth of an invalid pixel: farther than any threshold from every valid one. */
 inline constexpr std::int32_t kNoDepthCode = -(1 << 24);
 
 inline bool
-are_near (Components a, Components b, Components threshold)
+is_zero (Components c)
 {
   typedef std::int64_t Halves __attribute__ ((vector_size (16)));
-  const Components difference = a - b;
-  const Components beyond = (difference > threshold) | (difference < -threshold);
-  const Halves halves = reinterpret_cast<Halves> (beyond);
+  const Halves halves = reinterpret_cast<Halves> (c);
   return (halves[0] | halves[1]) == 0;
+}
+
+/** Whether no component differs by more than its threshold. */
+inline bool
+are_near (Components a, Components b, Components threshold)
+{
+  const Components difference = a - b;
+  return is_zero ((difference > threshold) | (difference < -threshold));
 }
 
 } // namespace rangecast

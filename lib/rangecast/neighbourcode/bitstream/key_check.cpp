@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <tuple>
 
+#include "slice_place.hpp"
+
 namespace rangecast {
 namespace {
 
-/* Slices that memory is kept for: an access unit of far more is not what an encoder makes. */
+/* Slices that memory is kept for; no encoder makes access units of far more. */
 constexpr std::size_t kMaxKept = 4096;
 
 /* By view, then place. */
@@ -36,27 +38,8 @@ KeyCheck::add (const SliceHeader &slice)
     slices_.push_back (slice);
 }
 
-/* Of the view whose slices begin there; an encoder gives no pixel to two slices.
- * @param[in,out] next  then where those of the next view begin */
-bool
-KeyCheck::is_whole (std::size_t &next) const
-{
-  const SliceHeader &first = slices_[next];
-  const auto area = [] (int width, int height) {
-    return static_cast<std::uint64_t> (width) * static_cast<std::uint64_t> (height);
-  };
-  std::uint64_t covered = 0;
-  bool same_roi = true;
-  for (std::size_t begin = next; next < slices_.size () && slices_[next].view_id == first.view_id;
-       next++) {
-    const SliceHeader &slice = slices_[next];
-    same_roi = same_roi && slice.roi == first.roi;
-    if (next == begin || order_of (slice) != order_of (slices_[next - 1])) /* no repeated one */
-      covered += area (slice.columns, slice.rows);
-  }
-  return same_roi && covered == area (first.roi.width, first.roi.height);
-}
-
+/* A view is whole if its slices agree in the ROI and cover it; an encoder codes no pixel in two
+ * slices. */
 bool
 KeyCheck::is_key ()
 {
@@ -65,8 +48,18 @@ KeyCheck::is_key ()
   std::ranges::sort (slices_, {}, order_of);
   bool whole = true;
   views_ = 0;
-  for (std::size_t next = 0; next < slices_.size (); views_++)
-    whole = is_whole (next) && whole;
+  for (std::size_t next = 0; next < slices_.size (); views_++) {
+    const std::size_t begin = next;
+    const SliceHeader &first = slices_[begin];
+    std::uint64_t covered = 0;
+    for (; next < slices_.size () && slices_[next].view_id == first.view_id; next++) {
+      const SliceHeader &slice = slices_[next];
+      whole = whole && slice.roi == first.roi;
+      if (next == begin || order_of (slice) != order_of (slices_[next - 1])) /* not repeated */
+        covered += area_of (place_of (slice));
+    }
+    whole = whole && covered == area_of (first.roi);
+  }
   return whole;
 }
 

@@ -23,9 +23,9 @@ ReferencePlane::begin (const SliceHeader &header)
   written_.assign (held_ ? height : 0, 0);
 }
 
-/* Of whatever profile that is not plain, codes are the same. */
+/* All profiles but plain use the same codes. */
 bool
-ReferencePlane::means_the_same (const SliceHeader &header) const
+ReferencePlane::has_same_codes (const SliceHeader &header) const
 {
   return header.depth_bits == header_.depth_bits && header.inverse_depth == header_.inverse_depth &&
          header.colour_bits == header_.colour_bits &&
@@ -37,22 +37,14 @@ ReferencePlane::serves (const SliceHeader &header) const
 {
   return held_ && !header.key &&
          header.frame_number - header.reference_distance == header_.frame_number &&
-         means_the_same (header);
+         has_same_codes (header);
 }
 
 bool
 ReferencePlane::is_of (const SliceHeader &header) const
 {
   return held_ && header.frame_number == header_.frame_number && header.roi == header_.roi &&
-         means_the_same (header);
-}
-
-/* Slices side by side have rows in common. */
-bool
-ReferencePlane::is_written (int line)
-{
-  return std::atomic_ref (written_[static_cast<std::size_t> (line)])
-             .load (std::memory_order_relaxed) != 0;
+         has_same_codes (header);
 }
 
 void
@@ -91,16 +83,16 @@ ReferencePlane::clear (const SliceHeader &slice)
   if (!held_ || line < 0 || line + slice.rows > header_.roi.height || column < 0 ||
       column + slice.columns > header_.roi.width)
     return;
-  for (int i = line; i < line + slice.rows; i++)
-    if (is_written (i))
+  for (int i = line; i < line + slice.rows; i++) /* slices side by side share rows */
+    if (std::atomic_ref (written_[static_cast<std::size_t> (i)]).load (std::memory_order_relaxed))
       std::fill_n (row (i) + column, slice.columns, std::uint64_t{0});
 }
 
 void
 ReferencePair::begin (const SliceHeader &header)
 {
-  /* A frame set that comes late is none that a later one refers to. Where an encoder begins anew,
-   * its numbers jump further than that. */
+  /* Later frame sets do not refer to one that arrives late. When an encoder restarts, its numbers
+   * jump by more than that. */
   constexpr std::uint32_t kOld = 255;
   const std::uint32_t age = now ().held () ? now ().frame_number () - header.frame_number : 0;
   keeps_ = age == 0 || age > kOld;

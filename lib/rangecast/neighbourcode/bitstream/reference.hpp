@@ -11,12 +11,12 @@
 
 namespace rangecast {
 
-/** The pixels of a view's last frame set, to which slices of the next one may refer. A pixel is one
- *  number, made as the profile pleases. Places are those of the view's full image. Memory is taken
- *  for the rows that are written: 8 bytes for each pixel of the ROI in them. */
+/** The pixels of a view's last frame set, to which slices of the next one may refer. A pixel is a
+ *  number whose meaning the profile defines. Coordinates are those of the view's full image. Rows
+ *  take memory once they are written: 8 bytes for each pixel of the ROI. */
 class ReferencePlane {
 public:
-  /** Of pixels that are invalid, or were not received. */
+  /** A pixel that is invalid, or was not received. */
   static constexpr std::uint64_t kNone = ~std::uint64_t{0};
 
   /** Begins a frame set: all pixels of the ROI are kNone. Keeps its memory. */
@@ -26,16 +26,14 @@ public:
   [[nodiscard]] bool held () const { return held_; }
   /** Of the frame set that it holds. */
   [[nodiscard]] std::uint32_t frame_number () const { return header_.frame_number; }
-  /** It is what such a slice refers to, pixels mean the same in both. */
+  /** It holds the frame set that such a slice refers to, with the same meaning of pixels. */
   [[nodiscard]] bool serves (const SliceHeader &header) const;
-  /** It holds the frame set of such a slice, or the other slices of it. */
+  /** It holds the frame set of such a slice. */
   [[nodiscard]] bool is_of (const SliceHeader &header) const;
 
-  /** Takes pixels of a row, from column x on. Different pixels may be written at the same
-   *  time. */
+  /** Stores pixels of a row from column x on. Threads may write different pixels concurrently. */
   void keep (int x, int y, std::span<const std::uint64_t> pixels);
-  /** Pixels of the slice become kNone: it turned out to be damaged. Others may be written at the
-   *  same time. */
+  /** Pixels of a slice become kNone because it is damaged. Threads may write others meanwhile. */
   void clear (const SliceHeader &slice);
 
   /** kNone outside the ROI. */
@@ -59,12 +57,11 @@ private:
     return pixels_.get () +
            static_cast<std::size_t> (line) * static_cast<std::size_t> (header_.roi.width);
   }
-  [[nodiscard]] bool is_written (int line);
-  [[nodiscard]] bool means_the_same (const SliceHeader &header) const;
+  [[nodiscard]] bool has_same_codes (const SliceHeader &header) const;
 
   bool held_ = false;
   SliceHeader header_;
-  /* Inverted, so that kNone is 0: of memory that was never written there is none. */
+  /* Inverted, so that kNone is 0: calloc() gives pages that take no memory until written. */
   std::unique_ptr<std::uint64_t, Free> pixels_;
   std::size_t capacity_ = 0;
   std::vector<std::uint8_t> written_; /* rows of the ROI */
@@ -73,18 +70,18 @@ private:
 /** The last frame set of a view and the one that is being coded or decoded. */
 class ReferencePair {
 public:
-  /** Begins a frame set. One of the same number goes on; one that is older is not kept. */
+  /** Begins a frame set, or continues it if the number is the same. An older one is not kept. */
   void begin (const SliceHeader &header);
   void reset ();
 
   [[nodiscard]] const ReferencePlane &before () const { return planes_[1 - now_]; }
-  /** What a frame set of that number may refer to, whether it was begun or not: the latest one that
-   * is of another. */
+  /** The frame set that one of that number may refer to, begun or not: the latest with another
+   *  number. */
   [[nodiscard]] const ReferencePlane &before (std::uint32_t frame_number) const
   {
     return now ().held () && now ().frame_number () != frame_number ? now () : before ();
   }
-  /** Takes the pixels of the frame set that was begun; nullptr if it is not kept. */
+  /** Where to store the frame set that was begun; nullptr if it is not kept. */
   ReferencePlane *now_kept () { return keeps_ ? &planes_[now_] : nullptr; }
   [[nodiscard]] const ReferencePlane &now () const { return planes_[now_]; }
 
@@ -94,7 +91,7 @@ private:
   bool keeps_ = false;
 };
 
-/** What slices may refer to, and where their pixels are kept; nullptr = nothing, nowhere. */
+/** The frame set that slices may refer to, and where their own pixels are stored; or nullptr. */
 struct CodingReference {
   const ReferencePlane *before = nullptr;
   ReferencePlane *now = nullptr;
@@ -104,13 +101,13 @@ struct CodingReference {
 struct DecoderReference {
   const ReferencePlane *before = nullptr;
   ReferencePlane *now = nullptr;
-  /** What is shown of unknown pixels; may be nullptr or have another ROI. */
+  /** The image that replaces unknown pixels; may be nullptr or have another ROI. */
   const ConstRangeImage *older = nullptr;
 };
 
-/** What came of a slice. */
+/** Pixels of decoded slices. */
 struct DecodedPixels {
-  std::uint64_t points = 0;  ///< valid ones
+  std::uint64_t points = 0;  ///< valid
   std::uint64_t unknown = 0; ///< valid, but they refer to pixels that were not received
 };
 

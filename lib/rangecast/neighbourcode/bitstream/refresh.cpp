@@ -16,31 +16,23 @@ RefreshSchedule::reset (int view_height, int view_id)
   view_id_ = view_id;
 }
 
-/* Time since the frame set before. */
-std::uint64_t
-RefreshSchedule::advance (const Time &time)
-{
-  const bool grows = time.now_ns > last_time_ns_;
-  const std::uint64_t elapsed = grows ? time.now_ns - last_time_ns_ : time.interval_ns;
-  last_time_ns_ = time.now_ns;
-  return elapsed;
-}
-
 void
 RefreshSchedule::plan (const Roi &roi, const Time &time, bool key, std::vector<RowBand> &bands)
 {
   const std::uint64_t period_ns = time.period_ns;
   bands.clear ();
-  const std::uint64_t elapsed = advance (time);
+  const std::uint64_t elapsed =
+      time.now_ns > last_time_ns_ ? time.now_ns - last_time_ns_ : time.interval_ns;
+  last_time_ns_ = time.now_ns;
   const std::size_t count = age_ns_.size ();
   for (std::size_t i = 0; i < count; i++) {
     std::uint64_t &age = age_ns_[i];
     age += elapsed;
-    /* It must not be older than the period at the next frame set. */
+    /* A band must not be older than the period at the next frame set. */
     const bool refresh = key || (period_ns > 0 && age + elapsed > period_ns);
     if (key) {
-      /* The bands of all views come evenly spread, though all begin now: with a golden section
-       * between views, whatever their number. */
+      /* All bands are fresh now. The next refreshes of all views are spread evenly over the period:
+       * views are offset by the golden section, which works for any number of views. */
       const double place = double (i) / double (count) + view_id_ * 0.6180339887498949;
       age = static_cast<std::uint64_t> ((place - std::floor (place)) * double (period_ns));
     } else if (refresh) {

@@ -9,7 +9,7 @@
 
 namespace rangecast {
 
-/** Some rows of a ROI, coded without rows of others. */
+/** Some rows of a ROI, coded independently of other rows. */
 struct RowBand {
   int first_row = 0, rows = 0; ///< of the ROI
   bool key = true;             ///< without reference to an earlier frame set
@@ -18,13 +18,13 @@ struct RowBand {
 
 /** Rolling intra refresh of one view. Its full image is cut into bands of rows; each is coded
  *  without reference to earlier frame sets at least once in a period, one after the other. Slices
- *  do not cross bands, so what a lost packet damaged is whole again when its band has been
- *  refreshed: after a period, and a frame interval more where those grow. */
+ *  do not cross bands, so the damage of a lost packet is repaired when its band is refreshed: after
+ *  a period at most, plus a frame interval if intervals grow. */
 class RefreshSchedule {
 public:
   struct Time {
     std::uint64_t now_ns;      ///< of the frame set
-    std::uint64_t interval_ns; ///< of frame sets whose times do not grow
+    std::uint64_t interval_ns; ///< between frame sets, used where times do not grow
     std::uint64_t period_ns;   ///< 0: no refresh
   };
 
@@ -36,13 +36,12 @@ public:
   /** @param view_id  spreads the bands of several views over time */
   void reset (int view_height, int view_id);
 
-  /** Which bands of a ROI are coded how.
-   *  @param key  everything without reference */
+  /** Plans how the bands of a ROI are coded.
+   *  @param key  all without reference
+   *  @param[out] bands  those in the ROI, from top to bottom */
   void plan (const Roi &roi, const Time &time, bool key, std::vector<RowBand> &bands);
 
 private:
-  std::uint64_t advance (const Time &time);
-
   std::vector<std::uint64_t> age_ns_; /* of each band, since it was refreshed */
   std::uint64_t last_time_ns_ = 0;
   int view_id_ = 0, band_rows_ = 1;

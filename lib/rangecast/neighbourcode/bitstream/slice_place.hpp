@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Where slices lie in their ROI. */
+/* Places of slices in their ROI. */
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@ area_of (const Roi &roi)
   return static_cast<std::uint64_t> (roi.width) * static_cast<std::uint64_t> (roi.height);
 }
 
-/** The elements at the beginning of `all` that are like its first one. */
+/** The elements at the beginning of `all` for which like (element, first element) holds. */
 template <typename T, typename Like>
 std::span<const T>
 leading (std::span<const T> all, const Like &like)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What encoder and decoder share: the symbols of a pixel, and bits in memory. */
+/* The symbols of profile plain, and bits in memory. */
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ enum Symbol : std::uint8_t {
 };
 inline constexpr int kSymbolBits = 3;
 
-/** Bytes that so many symbols of profile plain take. */
+/** Bytes that the symbols of so many pixels take in profile plain. */
 constexpr std::size_t
 symbol_bytes (std::size_t pixels)
 {
@@ -55,11 +55,11 @@ inline constexpr std::uint64_t kGroupMask = (std::uint64_t{1} << kGroupBits) - 1
 inline constexpr std::uint64_t kGroupLowBits = 0x249249249249; /* the lowest of each symbol */
 inline constexpr std::uint64_t kInvalidGroup = kGroupLowBits * kInvalid;
 
-/** Writes numbers of up to 56 bits, least significant bit first, into memory that is large enough
- *  plus 8 bytes. What was put is there at any time; the last byte is filled with zeros. */
+/** Writes numbers of up to 56 bits, least significant bit first. The memory needs 8 bytes more than
+ *  the result. It is complete after each call; the last byte is filled with zeros. */
 class BitWriter {
 public:
-  /** Goes on behind the first `bits` of `to`, which another writer put there. */
+  /** Continues after the first `bits` of `to`, which another writer wrote. */
   explicit BitWriter (std::uint8_t *to, std::size_t bits = 0)
       : to_ (to + bits / 8), held_ (bits % 8 ? *to_ : 0), count_ (static_cast<int> (bits % 8))
   {
@@ -71,21 +71,21 @@ public:
     store_little_endian (held_, to_);
     count_ += bits;
     to_ += count_ >> 3;
-    held_ >>= count_ & ~7; /* 56 at most: 7 were held, and 56 came */
+    held_ >>= count_ & ~7; /* 56 at most, as 7 + 56 are held at most */
     count_ &= 7;
   }
 
 private:
   std::uint8_t *to_;
-  std::uint64_t held_; /* bits that fill no byte */
-  int count_;          /* of them; 0 to 7 */
+  std::uint64_t held_; /* bits of the last byte, while it is not full */
+  int count_;          /* how many; 0 to 7 */
 };
 
-/** Bits in memory, at any place; behind the end they are 0. */
+/** Random access to bits in memory; beyond the end they are 0. */
 class LittleEndianBits {
 public:
   explicit LittleEndianBits (std::span<const std::uint8_t> bytes) : bytes_ (bytes) {}
-  /** At least 57 bits from bit `at` on, which lies inside or right behind the end. */
+  /** At least 57 bits from bit `at` on, which is at most the end. */
   [[nodiscard]] std::uint64_t from (std::size_t at) const
   {
     const std::size_t byte = at / 8, rest = bytes_.size () - byte;
@@ -95,8 +95,8 @@ public:
     std::copy_n (bytes_.data () + byte, rest, last);
     return load_little_endian (last) >> at % 8;
   }
-  /** Nothing is behind the first `bits` but zeros that fill the last byte. */
-  [[nodiscard]] bool end_behind (std::size_t bits) const
+  /** The data is `bits` long and zeros fill its last byte. */
+  [[nodiscard]] bool end_after (std::size_t bits) const
   {
     return bytes_.size () == (bits + 7) / 8 && (bits % 8 == 0 || bytes_.back () >> bits % 8 == 0);
   }
@@ -105,7 +105,7 @@ private:
   std::span<const std::uint8_t> bytes_;
 };
 
-/** Reads numbers of up to 40 bits; past the end it gives zeros and says so. */
+/** Reads numbers of up to 40 bits; beyond the end it returns zeros and sets exhausted(). */
 class BitReader {
 public:
   BitReader (const std::uint8_t *from, std::size_t bytes) : from_ (from), end_ (from + bytes) {}
@@ -125,7 +125,7 @@ public:
     return value;
   }
   [[nodiscard]] bool exhausted () const { return exhausted_; }
-  /** Nothing is left but the zero bits that fill the last byte. */
+  /** All is read up to the zero bits that fill the last byte. */
   [[nodiscard]] bool at_clean_end () const { return from_ == end_ && count_ < 8 && held_ == 0; }
 
 private:

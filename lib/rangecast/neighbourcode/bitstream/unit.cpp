@@ -200,11 +200,11 @@ RigCollector::add (std::span<const std::uint8_t> unit)
     fps_d_ = static_cast<int> (fps_d);
   }
   views_[index] = std::move (one.views[0]);
-  return take_if_complete ();
+  return update_if_complete ();
 }
 
 Status
-RigCollector::take_if_complete ()
+RigCollector::update_if_complete ()
 {
   StreamInfo info;
   info.fps_n = fps_n_;
@@ -216,7 +216,7 @@ RigCollector::take_if_complete ()
   }
   if (Status s = validate (info.rig); s.code () == StatusCode::kBadSize)
     return s;
-  else if (!s.ok ()) /* two views with one id: a change half arrived */
+  else if (!s.ok ()) /* two views with one id: a change that has not arrived completely */
     return {};
   if (generation_ > 0 && info.fps_n == info_.fps_n && info.fps_d == info_.fps_d &&
       encode_rig (info.rig) == encode_rig (info_.rig))

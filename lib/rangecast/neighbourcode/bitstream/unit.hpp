@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The units that a coded stream consists of. The format is specified in docs/formats/bitstream.md.
- */
+/* The units of a coded stream. The format is specified in docs/formats/bitstream.md. */
 #pragma once
 
 #include <array>
@@ -26,21 +25,21 @@ enum class UnitType : std::uint8_t {
   kAccessUnit = 3, ///< what follows is one access unit; only in byte streams
 };
 
-/** The first bytes of every unit. Types that a reader does not know are skipped by their size. */
+/** The first bytes of every unit. Readers skip units of unknown types by their size. */
 struct UnitHeader {
   std::uint8_t version = kBitstreamVersion; ///< 1 to 15
-  std::uint8_t type = 0;                    ///< a UnitType, or one of the future
+  std::uint8_t type = 0;                    ///< a UnitType, or an unknown one
   std::uint8_t flags = 0;
   std::uint16_t size = 0; ///< bytes of the whole unit, this header included
 };
 
 enum class Profile : std::uint8_t {
   kPlain = 0,   ///< codes of fixed length
-  kPacked = 1,  ///< run lengths and prefix codes that never change
+  kPacked = 1,  ///< run lengths and fixed prefix codes
   kEntropy = 2, ///< adaptive probabilities and a range coder
 };
 
-/** What a slice says of itself. */
+/** The header of a slice. */
 struct SliceHeader {
   bool key = true;            ///< decodes without any earlier frame set
   bool inverse_depth = false; ///< depth codes are linear in 1 / depth
@@ -54,8 +53,8 @@ struct SliceHeader {
   Roi roi;                           ///< the view's whole ROI, in its full image
   int first_row = 0, rows = 0;       ///< of the ROI
   int first_column = 0, columns = 0; ///< of the ROI
-  /** The frame set that a slice refers to has the number frame_number - reference_distance; 1 to
-   *  255, or 0 in key slices. */
+  /** The slice refers to frame set frame_number - reference_distance; 1 to 255, or 0 in key slices.
+   */
   std::uint8_t reference_distance = 0;
 };
 
@@ -76,7 +75,7 @@ Status read_slice_header (std::span<const std::uint8_t> unit, SliceHeader &heade
 /** Writes a slice header of header_size_of() bytes; the unit is `unit_size` bytes long. */
 void write_slice_header (const SliceHeader &header, std::size_t unit_size, std::uint8_t *to);
 
-/** Goes through the units of an access unit. */
+/** Iterates over the units of an access unit. */
 class UnitReader {
 public:
   explicit UnitReader (std::span<const std::uint8_t> bytes) : rest_ (bytes) {}
@@ -89,7 +88,7 @@ private:
   Status status_;
 };
 
-/** What the units of the rig say together. */
+/** The contents of a stream's rig-view units. */
 struct StreamInfo {
   Rig rig;
   int fps_n = 0, fps_d = 1; ///< frame rate; 0/1 = unknown
@@ -98,19 +97,20 @@ struct StreamInfo {
 /** Appends one rig-view unit for each view. None is longer than 500 bytes for range views. */
 void write_rig_units (const StreamInfo &info, std::vector<std::uint8_t> &to);
 
-/** Gathers rig-view units, in any order and however often, until all views are there. */
+/** Collects rig-view units, in any order and with repetitions, until all views are present. */
 class RigCollector {
 public:
   void reset () { *this = RigCollector (); }
-  /** Takes a rig-view unit. @return kBadData or kUnsupported for a damaged one, kBadSize for one
-   *  that makes the rig larger than kMaxRigPixels; both are ignored */
+  /** Adds a rig-view unit. @return kBadData or kUnsupported for a damaged one, kBadSize for one
+   * that makes the rig larger than kMaxRigPixels; both are ignored */
   Status add (std::span<const std::uint8_t> unit);
-  /** Grows whenever a complete rig differs from the one before; 0: none was complete so far. */
+  /** Incremented whenever a complete rig differs from the one before; 0: none was complete so far.
+   */
   [[nodiscard]] unsigned generation () const { return generation_; }
   [[nodiscard]] const StreamInfo &info () const { return info_; }
 
 private:
-  Status take_if_complete ();
+  Status update_if_complete ();
 
   std::array<std::optional<View>, kMaxViews> views_;
   int total_ = 0, fps_n_ = 0, fps_d_ = 1;
@@ -126,10 +126,10 @@ struct AccessUnitHeader {
   bool key = true;
 };
 inline constexpr std::size_t kAccessUnitHeaderSize = 24;
-/** No access unit is longer. */
+/** Greatest size of an access unit, bytes. */
 inline constexpr std::uint32_t kMaxAccessUnitSize = 32u << 20;
-/** No access unit has more slices: a reader leaves out those beyond, so that short ones do not cost
- *  it several times their bytes in memory. */
+/** Greatest number of slices of an access unit. Readers ignore those beyond, because short slices
+ * take several times their size in memory. */
 inline constexpr std::size_t kMaxSlices = std::size_t{1} << 17;
 /** Comes before each access-unit unit of a byte stream. */
 inline constexpr std::array<std::uint8_t, 4> kStartCode = {0x00, 0x52, 0x43, 0x55};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What encoder and decoder of the profiles packed and entropy know of a pixel, and how they predict
- * one. docs/formats/bitstream.md specifies it. */
+/* Pixels of the profiles packed and entropy as encoder and decoder hold them, and their prediction.
+ * The specification is docs/formats/bitstream.md. */
 #pragma once
 
 #include <algorithm>
@@ -16,17 +16,17 @@
 
 namespace rangecast {
 
-/** Where a pixel came from. Contexts are made of it. */
+/** How a pixel was coded. Contexts depend on it. */
 enum class Origin : std::uint8_t {
   kNone = 0,      ///< invalid, or outside the slice
   kLeft = 1,      ///< equals the left pixel
   kUpper = 2,     ///< equals one of the three above
-  kPredicted = 3, ///< is what the neighbours let expect
-  kCorrected = 4, ///< the same and a residual
+  kPredicted = 3, ///< equals the prediction from its neighbours
+  kCorrected = 4, ///< prediction and residual
 };
 
-/** What a slice of these profiles holds for one pixel. The first four are places of neighbours.
- *  kTakeEarlier is said apart from the others: a pixel of an earlier frame set. */
+/** What a slice of these profiles holds for one pixel. The first four are the neighbours.
+ *  kTakeEarlier, a pixel of an earlier frame set, is coded apart from the others. */
 enum PixelChoice : int {
   kTakeLeft,
   kTakeUpperLeft,
@@ -71,30 +71,23 @@ pack_components (Components c)
 }
 
 inline Components
-cut (Components c, Components least, Components most)
+clamped (Components c, Components min, Components max)
 {
-  c = c < least ? least : c;
-  return c > most ? most : c;
+  c = c < min ? min : c;
+  return c > max ? max : c;
 }
 
-inline bool
-is_zero (Components c)
-{
-  typedef std::int64_t Halves __attribute__ ((vector_size (16)));
-  const Halves halves = reinterpret_cast<Halves> (c);
-  return (halves[0] | halves[1]) == 0;
-}
-
-/** Of an invalid pixel, and of a valid one that refers to something that was not received. No other
- *  has it, because Y is not negative. */
+/** The code of an invalid pixel, and of a valid one that refers to data that was not received. No
+ *  other pixel has it, because Y is not negative. */
 inline constexpr PixelCode kNoPixel = ReferencePlane::kNone;
 
-/** Sizes of a residual, at most 9 each, one a byte from the least significant; 0 for copies. */
+/** Magnitudes of a residual's components, at most 9 each, one a byte from the least significant; 0
+ *  for copies. */
 using Activity = std::uint32_t;
 
-/** What contexts are made of: a pixel's origin, from bit 8 its kind, from bit 16 its choice and one
- *  (see copy_state()), from bit 32 its activity. 0 for invalid pixels only. Several of them are
- * added up at once. */
+/** A pixel as contexts see it: its origin, from bit 8 its kind, from bit 16 its choice plus one
+ * (see copy_state()), from bit 32 its activity. 0 for invalid pixels only. Sums of several do not
+ *  overflow their fields. */
 using PixelState = std::uint64_t;
 
 constexpr PixelState
@@ -105,8 +98,8 @@ state_of (Origin origin, Activity activity = 0)
          PixelState{activity} << 32;
 }
 
-/** Of a pixel that equals another, in a slice that refers to an earlier frame set: there contexts
- *  need to know which one it was. */
+/** State of a pixel that equals another, in a slice that refers to an earlier frame set, where
+ *  contexts depend on which one that is. */
 constexpr PixelState
 copy_state (std::uint64_t choice)
 {
@@ -116,65 +109,64 @@ copy_state (std::uint64_t choice)
 
 /** Whether it is copy_state (choice). */
 constexpr bool
-took (PixelState state, PixelChoice choice)
+is_copy (PixelState state, PixelChoice choice)
 {
   return (state >> 16 & 0xff) == static_cast<PixelState> (choice + 1);
 }
 
 /** All bits set if `v`, which is below 2^63, is 0; else none. */
 [[gnu::always_inline]] inline std::uint64_t
-mask_of_zero (std::uint64_t v)
+zero_mask (std::uint64_t v)
 {
   auto mask = static_cast<std::uint64_t> (static_cast<std::int64_t> (v - 1) >> 63);
-  asm("" : "+r"(mask)); /* else compilers may find a condition in it, and jump */
+  asm("" : "+r"(mask)); /* keeps compilers from making it a condition and a jump */
   return mask;
 }
 
-/** `a` where the mask is set, else `b`. Without a jump: whether it would be taken nobody could
- *  foretell. */
+/** `a` where the mask is set, else `b`; without a jump, which would be unpredictable. */
 constexpr std::uint64_t
-either (std::uint64_t mask, std::uint64_t a, std::uint64_t b)
+select (std::uint64_t mask, std::uint64_t a, std::uint64_t b)
 {
   return b ^ ((a ^ b) & mask);
 }
 
-/** Two plain numbers: it is copied for every pixel, and whole. */
 struct CodedPixel {
   PixelCode code = kNoPixel;
   PixelState state = 0;
 
   [[nodiscard]] constexpr bool valid () const { return state != 0; }
   [[nodiscard]] constexpr int origin () const { return static_cast<int> (state & 7); }
-  /** The same, without a difference between predicted and corrected pixels. */
+  /** The origin, with predicted and corrected pixels as one. */
   [[nodiscard]] constexpr int kind () const { return static_cast<int> (state >> 8 & 3); }
 };
 
 /** Limits of the components, and of depth, R, G, B. */
-struct Limits {
-  Components least{}, most{}; ///< of depth, Y, Co, Cg
-  Components brightest{};     ///< most of depth, R, G, B; the least are 0
-  Components most_steps{};    ///< of a residual: as many as change a component as far as it goes
+struct PixelLimits {
+  Components min{}, max{};   ///< of depth, Y, Co, Cg
+  Components max_rgb{};      ///< of depth, R, G, B; the minima are 0
+  Components max_residual{}; ///< in steps: enough to move a component across its range
 
-  Limits () = default;
+  PixelLimits () = default;
   /** @param last_depth, maximum  greatest codes of depth and colour */
-  Limits (std::int32_t last_depth, std::int32_t maximum, Components steps)
-      : least{0, 0, -maximum, -maximum}, most{last_depth, maximum, maximum, maximum},
-        brightest (most), most_steps ((1 << 17) / steps + 1)
+  PixelLimits (std::int32_t last_depth, std::int32_t maximum, Components steps)
+      : min{0, 0, -maximum, -maximum}, max{last_depth, maximum, maximum, maximum}, max_rgb (max),
+        max_residual ((1 << 17) / steps + 1)
   {
   }
 };
 
-/** The last pixel before the first one of a slice. */
+/** The pixel that predicts the first one of a slice. */
 inline PixelCode
-first_expected (const Limits &limits)
+first_expected (const PixelLimits &limits)
 {
-  return pack_components (Components{limits.most[0] / 2, limits.most[1] / 2, 0, 0});
+  return pack_components (Components{limits.max[0] / 2, limits.max[1] / 2, 0, 0});
 }
 
-/** Depth, R, G, B of depth and YCoCg-R; cut to the limits, because residuals may have been rounded.
+/** Depth, R, G, B of depth and YCoCg-R; clamped to the limits, because residuals may have been
+ * rounded.
  */
 inline Components
-to_rgb (Components c, const Limits &limits)
+to_rgb (Components c, const PixelLimits &limits)
 {
   const Components half =
       c >> 1; /* t = Y - half of Cg; G = t + Cg; B = t - half of Co; R = B + Co */
@@ -184,10 +176,10 @@ to_rgb (Components c, const Limits &limits)
   const Components plus = __builtin_shufflevector (c, c, 2, 2, 3, 3) & Components{0, -1, -1, 0};
   const Components minus =
       __builtin_shufflevector (half, half, 2, 2, 2, 2) & Components{0, -1, 0, -1};
-  return cut (base + plus - minus, Components{}, limits.brightest);
+  return clamped (base + plus - minus, Components{}, limits.max_rgb);
 }
 
-/** The four neighbours that a pixel may equal: the left one, and where those above are. */
+/** The four neighbours that a pixel may equal: the left one, and pointers to the row above. */
 struct Neighbours {
   CodedPixel left;
   const PixelCode *codes;   ///< of the row above, at the upper pixel
@@ -202,17 +194,18 @@ struct Neighbours {
   {
     return (left.state + (states[0] << 2) + (states[1] << 4)) >> 8 & 63;
   }
-  /** Of left, upper and upper-right, added up. */
+  /** Sum over left, upper and upper-right. */
   [[nodiscard]] Activity activities () const
   {
     return static_cast<Activity> ((left.state + states[0] + states[1]) >> 32);
   }
 };
 
-/** What the neighbours let expect: depth on the plane through three of them, colour as their mean.
- *  `last` is the latest valid pixel of the slice, for pixels without a neighbour. */
+/** Prediction from the neighbours: depth on the plane through three of them, colour as their mean.
+ *  @param last  the latest valid pixel of the slice, for pixels without a neighbour
+ *  @param max   of depth, Y, Co, Cg */
 inline Components
-predict (const Neighbours &n, PixelCode last, Components most)
+predict (const Neighbours &n, PixelCode last, Components max)
 {
   const bool l = n.left.valid (), u = n.states[0] != 0, ur = n.states[1] != 0;
   if (!l && !u)
@@ -225,7 +218,7 @@ predict (const Neighbours &n, PixelCode last, Components most)
   const Components plane =
       n.states[-1] != 0 ? left + upper - components_of (n.codes[-1]) : (left + upper + 1) >> 1;
   const Components depth_only = {-1, 0, 0, 0};
-  return (mean & ~depth_only) | (cut (plane, Components{}, most) & depth_only);
+  return (mean & ~depth_only) | (clamped (plane, Components{}, max) & depth_only);
 }
 
 /** Whether predict () uses only pixels that were received. */
@@ -241,7 +234,7 @@ can_predict (const Neighbours &n, PixelCode last)
   return n.left.code != kNoPixel && known (-1) && known (0) && known (1);
 }
 
-/** By how much one step of a residual changes each component. */
+/** Quantiser steps of a residual: what one unit changes in each component, codes. */
 struct Steps {
   std::int32_t depth = 1;  ///< 1 to 65535
   std::int32_t luma = 1;   ///< 1 to 255
@@ -250,28 +243,28 @@ struct Steps {
   [[nodiscard]] Components components () const { return Components{depth, luma, chroma, chroma}; }
 };
 
-/** A predicted pixel and its residual, of any size. */
+/** A predicted pixel plus its residual; the residual may be any number. */
 inline Components
-correct (Components predicted, Components residual, Components steps, const Limits &limits)
+correct (Components predicted, Components residual, Components steps, const PixelLimits &limits)
 {
-  const Components bounded = cut (residual, -limits.most_steps, limits.most_steps);
-  return cut (predicted + bounded * steps, limits.least, limits.most);
+  const Components bounded = clamped (residual, -limits.max_residual, limits.max_residual);
+  return clamped (predicted + bounded * steps, limits.min, limits.max);
 }
 
-/** Residuals of greater size are damage: no pixel needs one. */
+/** Larger residuals are damage: no pixel needs one. */
 inline constexpr std::uint32_t kMaxResidual = 1u << 18;
 
 inline Activity
 activity_of (Components residual)
 {
   const Components size = residual < 0 ? -residual : residual;
-  const Components most = {9, 9, 9, 9}, least = size > most ? most : size;
-  const auto pairs = reinterpret_cast<ComponentPairs> (least << Components{0, 8, 0, 8});
+  const Components max = {9, 9, 9, 9}, bounded = size > max ? max : size;
+  const auto pairs = reinterpret_cast<ComponentPairs> (bounded << Components{0, 8, 0, 8});
   const auto low = pairs[0] | pairs[0] >> 32, high = pairs[1] | pairs[1] >> 32;
   return static_cast<Activity> ((low & 0xffff) | (high & 0xffff) << 16);
 }
 
-/** Where the run that begins at `begin` ends, in a row of one byte a pixel, 0 = invalid. */
+/** End of the run of pixels that begins at `begin`, in a row of one byte a pixel, 0 = invalid. */
 inline int
 run_end (std::span<const std::uint8_t> row, int begin, bool valid)
 {
@@ -281,10 +274,11 @@ run_end (std::span<const std::uint8_t> row, int begin, bool valid)
              : static_cast<int> (row.size ());
 }
 
-/** Bytes behind the slice header: u16 depth step, u8 luma step, u8 chroma step. */
+/** Bytes after the slice header: u16 depth step, u8 luma step, u8 chroma step. */
 inline constexpr std::size_t kStepsSize = 4;
 inline constexpr std::size_t kEntropyHeaderSize = kSliceHeaderSize + kStepsSize;
-/** Packed slices say also the orders of their codes of residual sizes, 0 to 15: four bits each. */
+/** Packed slices also carry the orders of their Golomb codes of residuals, 0 to 15: four bits each.
+ */
 using GolombOrders = std::array<std::uint8_t, kComponents>;
 inline constexpr std::size_t kOrdersSize = 2;
 inline constexpr std::size_t kPackedHeaderSize = kEntropyHeaderSize + kOrdersSize;

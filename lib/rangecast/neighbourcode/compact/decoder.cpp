@@ -8,14 +8,14 @@
 namespace rangecast {
 namespace {
 
-/* An EntropyCode that looks like a PackedReader. */
-class EntropyReader : public EntropyCode<EntropyReading> {
+/* An EntropyCode with the interface of PackedReader. */
+class EntropyReader : public EntropyCode<RangeDecoder> {
 public:
   static constexpr bool kEarlierInRuns = false;
 
   EntropyReader (
       std::span<const std::uint8_t> bytes, EntropyModel &model, const EntropyModel &initial)
-      : EntropyCode (EntropyReading (bytes.data (), bytes.size ()), model)
+      : EntropyCode (RangeDecoder (bytes.data (), bytes.size ()), model)
   {
     model = initial;
   }
@@ -24,13 +24,13 @@ public:
   {
     return EntropyCode::choice<Delta> (n, kNoSymbol);
   }
-  [[nodiscard]] bool overrun () const { return coder ().overrun (); }
-  [[nodiscard]] bool at_clean_end () const { return coder ().at_end (); }
+  [[nodiscard]] bool overrun () const { return coder_.overrun (); }
+  [[nodiscard]] bool at_clean_end () const { return coder_.at_end (); }
 };
 
-/* As it goes into the image: R, G, B in the lower half, depth in the upper. */
+/* A pixel as it goes into the image: R, G, B in the lower half, depth in the upper. */
 inline std::uint64_t
-shown_as (PixelCode code, const CompactQuantisers &quantisers, const Limits &limits)
+shown_as (PixelCode code, const CompactQuantisers &quantisers, const PixelLimits &limits)
 {
   const Components c = to_rgb (components_of (code), limits);
   const std::uint64_t depth = quantisers.depth.depth (static_cast<std::uint16_t> (c[0]));
@@ -66,7 +66,7 @@ template <class Code, bool Delta>
 inline bool
 CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel)
 {
-  const Components expected = predict (n, last_, limits_.most);
+  const Components expected = predict (n, last_, limits_.max);
   const bool known = !Delta || can_predict (n, last_);
   if (!corrected) {
     pixel = {known ? pack_components (expected) : kNoPixel, state_of (Origin::kPredicted)};
@@ -81,8 +81,8 @@ CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected, Co
   return true;
 }
 
-/* Decodes a run of valid pixels, behind an invalid one. What the loop needs of this object it holds
- * in variables of its own, the code too, so that it stays in registers. */
+/* Decodes a run of valid pixels, which follows an invalid one. The loop keeps what it needs of this
+ * object in local variables, the code too, so that it stays in registers. */
 template <class Code, bool Delta>
 inline bool
 CompactDecoder::decode_run (
@@ -117,13 +117,13 @@ CompactDecoder::decode_run (
         x > begin || n.any () ? code.template choice<Delta> (n) : int{kCorrect});
     if (chosen < kPredict) [[likely]] {
       const auto from = static_cast<std::ptrdiff_t> (x + chosen) - kTakeUpper;
-      const std::uint64_t take_left = mask_of_zero (chosen);
-      left_shown = either (take_left, left_shown, upper_shown[from]);
+      const std::uint64_t take_left = zero_mask (chosen);
+      left_shown = select (take_left, left_shown, upper_shown[from]);
       if constexpr (Delta) /* codes do not tell unknown pixels from invalid ones */
         if ((take_left ? left.state : upper_states[from]) == 0)
           return false;
-      left = {either (take_left, left.code, upper_codes[from]),
-          Delta ? copy_state (chosen) : either (take_left, kLeftState, kUpperState)};
+      left = {select (take_left, left.code, upper_codes[from]),
+          Delta ? copy_state (chosen) : select (take_left, kLeftState, kUpperState)};
     } else {
       if (chosen > kCorrect || !decode_full<Code, Delta> (code, n, chosen == kCorrect, left))
         return false;
@@ -140,7 +140,7 @@ CompactDecoder::decode_run (
   return true;
 }
 
-/* Reads which pixels of a row are valid, and where its runs end. */
+/* Reads which pixels of a row are valid, and the ends of its runs. */
 template <class Code>
 bool
 CompactDecoder::decode_runs (Code &code, int columns)
@@ -163,20 +163,6 @@ CompactDecoder::decode_runs (Code &code, int columns)
   return true;
 }
 
-template <class Code>
-bool
-CompactDecoder::decode_motions (Code &code)
-{
-  BlockMotion expected;
-  for (BlockMotion &m : motions_) {
-    if (!code.motion (expected, m) || std::abs (m.dx) > kMaxMotion ||
-        std::abs (m.dy) > kMaxMotion || std::abs (m.dz) > kMaxMotionDepth)
-      return false;
-    expected = m;
-  }
-  return true;
-}
-
 /* Reads which pixels of a run of valid ones equal those of the earlier frame set. */
 template <class Code>
 bool
@@ -187,7 +173,7 @@ CompactDecoder::decode_earlier_runs (Code &code, std::size_t begin, std::size_t 
   bool now = false;
   for (int x = first; x < last; now = !now) {
     std::int32_t later = 0;
-    if (!code.earlier_run (later))
+    if (!code.run (now, later))
       return false;
     const int to = run_end (upper, x, now) + later;
     if (to > last || to < x || (to == x && (x > first || now)))
@@ -223,24 +209,8 @@ CompactDecoder::decode_row (
   return !code.overrun ();
 }
 
-/* Fills the pixels of a row that are unknown from what was shown before. @return how many there are
- */
-std::uint64_t
-CompactDecoder::show_older_row (
-    const DecoderReference &reference, const SliceHeader &header, int row, const RangeImage &image)
-{
-  const PixelCode *const codes = row_.codes ();
-  const PixelState *const states = row_.states ();
-  std::uint64_t unknown = 0;
-  for (int x = 0; x < header.columns; x++)
-    if (states[x] != 0 && codes[x] == kNoPixel) {
-      show_older (reference, image, header.first_column + x, row);
-      unknown++;
-    }
-  return unknown;
-}
-
-/* Finds what the pixels of row y of the slice may equal. */
+/* Reads the motion of the blocks that begin in row y of the slice, and fetches the pixels of the
+ * earlier frame set that the row's may equal. */
 template <class Code>
 bool
 CompactDecoder::load_earlier (
@@ -248,10 +218,17 @@ CompactDecoder::load_earlier (
 {
   const int full_x = header.roi.x + header.first_column;
   const int full_y = header.roi.y + header.first_row + y;
-  if ((y == 0 || full_y % kMotionBlock == 0) && !decode_motions (code))
-    return false;
+  if (y == 0 || full_y % kMotionBlock == 0) {
+    BlockMotion expected;
+    for (BlockMotion &m : motions_) {
+      if (!code.motion (expected, m) || std::abs (m.dx) > kMaxMotion ||
+          std::abs (m.dy) > kMaxMotion || std::abs (m.dz) > kMaxMotionDepth)
+        return false;
+      expected = m;
+    }
+  }
   if (reference.before)
-    fetch_displaced (*reference.before, full_x, full_y, motions_, limits_.most[0], 0, kMaxImageSide,
+    fetch_displaced (*reference.before, full_x, full_y, motions_, limits_.max[0], 0, kMaxImageSide,
         earlier_codes_);
   std::ranges::fill (row_.earlier (), std::uint8_t{0});
   return true;
@@ -259,7 +236,7 @@ CompactDecoder::load_earlier (
 
 template <class Code, bool Delta>
 bool
-CompactDecoder::decode_rows (Code &code, const SliceHeader &header,
+CompactDecoder::decode_rows (Code code, const SliceHeader &header,
     const CompactQuantisers &quantisers, const DecoderReference &reference, const RangeImage &image,
     DecodedPixels &decoded)
 {
@@ -272,7 +249,8 @@ CompactDecoder::decode_rows (Code &code, const SliceHeader &header,
     motions_.assign (
         motion_blocks (header.roi.x + header.first_column, header.columns), BlockMotion{});
   }
-  limits_ = Limits (quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1, steps_);
+  limits_ =
+      PixelLimits (quantisers.depth.codes () - 1, (1 << quantisers.colour.bits ()) - 1, steps_);
   last_ = first_expected (limits_);
   for (int y = 0; y < header.rows; y++) {
     if constexpr (Delta)
@@ -285,7 +263,11 @@ CompactDecoder::decode_rows (Code &code, const SliceHeader &header,
     write_row (row_.shown (), columns, image.depth.row (image_row) + header.first_column,
         image.colour.row (image_row) + header.first_column);
     if constexpr (Delta)
-      unknown = show_older_row (reference, header, image_row, image);
+      for (int x = 0; x < header.columns; x++)
+        if (row_.states ()[x] != 0 && row_.codes ()[x] == kNoPixel) {
+          show_older (reference, image, header.first_column + x, image_row);
+          unknown++;
+        }
     decoded.points += points - unknown;
     decoded.unknown += unknown;
     if (reference.now)
@@ -294,16 +276,6 @@ CompactDecoder::decode_rows (Code &code, const SliceHeader &header,
     std::swap (row_, upper_);
   }
   return code.at_clean_end ();
-}
-
-template <class Code>
-bool
-CompactDecoder::decode_code (Code code, const SliceHeader &header,
-    const CompactQuantisers &quantisers, const DecoderReference &reference, const RangeImage &image,
-    DecodedPixels &decoded)
-{
-  return header.key ? decode_rows<Code, false> (code, header, quantisers, reference, image, decoded)
-                    : decode_rows<Code, true> (code, header, quantisers, reference, image, decoded);
 }
 
 bool
@@ -320,18 +292,22 @@ CompactDecoder::decode (std::span<const std::uint8_t> body, const SliceHeader &h
     return false;
   steps_ = steps.components ();
   const auto data = body.subspan (own_header);
+  const auto decode_with = [&] (auto code) {
+    using Code = decltype (code);
+    return header.key
+               ? decode_rows<Code, false> (code, header, quantisers, reference, image, decoded)
+               : decode_rows<Code, true> (code, header, quantisers, reference, image, decoded);
+  };
   if (!packed)
-    return decode_code (
-        EntropyReader (data, model_, header.key ? kInitialModel : kInitialDeltaModel), header,
-        quantisers, reference, image, decoded);
+    return decode_with (
+        EntropyReader (data, model_, header.key ? kInitialModel : kInitialDeltaModel));
   const auto order = [&] (std::size_t i) {
     return static_cast<std::uint8_t> (body[kStepsSize + i / 2] >> 4 * (i % 2) & 15);
   };
   bytes_.assign (data.begin (), data.end ());
   bytes_.resize (data.size () + PackedReader::kPadding);
-  return decode_code (PackedReader (bytes_.data (), data.size (),
-                          {{order (0), order (1), order (2), order (3)}, is_zero (steps_ - 1)}),
-      header, quantisers, reference, image, decoded);
+  return decode_with (PackedReader (bytes_.data (), data.size (),
+      {{order (0), order (1), order (2), order (3)}, is_zero (steps_ - 1)}));
 }
 
 } // namespace rangecast

@@ -16,25 +16,21 @@ namespace rangecast {
 class CompactDecoder {
 public:
   /** Writes only pixels of the slice's rows and columns, whatever the bytes are.
-   *  @param body    what is behind the slice header
-   *  @param header  checked, and not empty; its ROI is the image's
-   *  @param[out] decoded  grows
+   *  @param body    the bytes after the slice header
+   *  @param header  checked, with at least one row; its ROI is the image's
+   *  @param[in,out] decoded  is added to
    *  @return false for damage: the pixels may then be partly written */
   bool decode (std::span<const std::uint8_t> body, const SliceHeader &header,
       const CompactQuantisers &quantisers, const DecoderReference &reference,
       const RangeImage &image, DecodedPixels &decoded);
 
 private:
-  template <class Code>
-  bool decode_code (Code code, const SliceHeader &header, const CompactQuantisers &quantisers,
-      const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded);
   template <class Code, bool Delta>
-  bool decode_rows (Code &code, const SliceHeader &header, const CompactQuantisers &quantisers,
+  bool decode_rows (Code code, const SliceHeader &header, const CompactQuantisers &quantisers,
       const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded);
   template <class Code>
   bool load_earlier (
       Code &code, const SliceHeader &header, const DecoderReference &reference, int y);
-  template <class Code> bool decode_motions (Code &code);
   template <class Code> bool decode_earlier_runs (Code &code, std::size_t begin, std::size_t end);
   template <class Code> bool decode_runs (Code &code, int columns);
   template <class Code, bool Delta>
@@ -46,17 +42,15 @@ private:
   template <class Code, bool Delta>
   [[gnu::always_inline]] bool decode_full (
       Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
-  std::uint64_t show_older_row (const DecoderReference &reference, const SliceHeader &header,
-      int row, const RangeImage &image);
 
   CompactRow row_, upper_;
   std::vector<int> runs_;                /* ends of the row's runs */
-  std::vector<PixelCode> earlier_codes_; /* what its pixels may equal in the earlier frame set */
+  std::vector<PixelCode> earlier_codes_; /* pixels of the earlier frame set for the row */
   std::vector<BlockMotion> motions_;     /* of the blocks that the row touches */
   std::vector<std::uint8_t> bytes_;      /* of the slice, and padding */
   EntropyModel model_{};
   Components steps_{};
-  Limits limits_;
+  PixelLimits limits_;
   PixelCode last_ = kNoPixel;
 };
 

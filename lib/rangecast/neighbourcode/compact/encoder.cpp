@@ -8,11 +8,11 @@
 namespace rangecast {
 namespace {
 
-/* What one pixel may add to a slice at most, whatever its code; and one run. */
+/* Upper bounds of what a pixel and a run add to a slice, in either code. */
 constexpr std::size_t kMaxBytesOfPixel = 512, kMaxBytesOfRun = 64;
 
-/* What choice=best weighs. An error counts in thresholds squared. Bits are what choices and
- * residuals come to on average in recordings; their price was found by trying. */
+/* Costs for choice=best. Errors are squared, in units of the threshold. Bits are the averages of
+ * choices and residuals in recordings; their price was found by experiment. */
 constexpr float kPriceOfBit = 0.2f;
 constexpr float kBitsOfChoice[] = {0.7f, 3.5f, 2.5f, 3.5f};
 
@@ -31,14 +31,14 @@ bits_of (const Components &residual)
   return bits;
 }
 
-/* An EntropyCode that looks like a PackedWriter. */
-class EntropyWriter : public EntropyCode<EntropyWriting> {
+/* An EntropyCode with the interface of PackedWriter. */
+class EntropyWriter : public EntropyCode<RangeEncoder> {
 public:
   static constexpr bool kEarlierInRuns = false;
 
   EntropyWriter (
       std::uint8_t *to, EntropyModel &model, const EntropyModel &initial, const ResidualCodes &)
-      : EntropyCode (EntropyWriting (to), model)
+      : EntropyCode (RangeEncoder (to), model)
   {
     model = initial;
   }
@@ -49,8 +49,8 @@ public:
       return;
     (void)residual (n, has_neighbour, r);
   }
-  [[nodiscard]] std::size_t bound () const { return coder ().bound (); }
-  std::size_t finish () { return coder ().finish (); }
+  [[nodiscard]] std::size_t bound () const { return coder_.bound (); }
+  std::size_t finish () { return coder_.finish (); }
 };
 
 /* Residuals are divided by multiplication, and half a step more makes up for what the reciprocal
@@ -66,30 +66,22 @@ rounded (Components difference, Components half_steps, FloatComponents reciproca
   return (__builtin_convertvector(quotient, Components) ^ sign) - sign;
 }
 
-/* What a copy of a neighbour, left or above, has. */
+/* States of copies of a neighbour, left or above. */
 constexpr PixelState kLeftState = state_of (Origin::kLeft), kUpperState = state_of (Origin::kUpper);
-
-/* Order of the exponential Golomb code that suits sizes of this mean. */
-std::uint8_t
-golomb_order (std::int32_t sum, std::int32_t count)
-{
-  const auto mean = static_cast<std::uint32_t> (sum / count);
-  return static_cast<std::uint8_t> (std::min<int> (std::bit_width (mean + mean / 2), 15));
-}
 
 } // namespace
 
 Steps
 steps_within (int depth_threshold, int colour_threshold)
 {
-  /* A rounded residual may be wrong by half its step. A wrong Y changes R, G and B as much; wrong
-   * Co and Cg together, by the larger of them plus 1 (docs/formats/bitstream.md, "How an encoder
-   * chooses"). Coarse depth steps save more than they cost; a third for Y leaves chroma the rest.
-   */
+  /* A rounded residual is off by up to half its step. An error of Y changes R, G and B by as much;
+   * errors of Co and Cg together, by the larger of them plus 1 (docs/formats/bitstream.md, "How an
+   * encoder chooses"). Coarse depth steps save more than they cost; Y gets about a third of the
+   * colour threshold, chroma the rest. */
   const int depth = (3 * depth_threshold + 2) / 4;
   const int luma = (9 * colour_threshold + 12) / 25;
   const int chroma = std::max (0, colour_threshold - luma - 1);
-  const auto step = [] (int error, int most) { return std::min (2 * error + 1, most); };
+  const auto step = [] (int error, int max) { return std::min (2 * error + 1, max); };
   return {step (depth, 65535), step (luma, 255), step (chroma, 255)};
 }
 
@@ -104,29 +96,7 @@ finer_settings (const CompactSettings &settings)
   return finer;
 }
 
-void
-CompactEncoder::set_thresholds (const CompactSettings &settings)
-{
-  const auto bias = [] (int depth, int colour) {
-    return near_bias (static_cast<std::uint32_t> (depth), static_cast<std::uint32_t> (colour));
-  };
-  settings_ = finer_settings (settings);
-  const int d = settings_.depth_threshold, c = settings_.colour_threshold;
-  earlier_bias_ = bias (settings.depth_threshold, settings.colour_threshold);
-  earlier_threshold_ = Components{settings.depth_threshold, settings.colour_threshold,
-      settings.colour_threshold, settings.colour_threshold};
-  bias_ = bias (d, c);
-  steps_ = steps_within (d, c).components ();
-  half_steps_ = steps_ / 2;
-  reciprocals_ = 1.0f / __builtin_convertvector(steps_, FloatComponents);
-  const auto weight = [] (int threshold) {
-    return 1 / ((float (threshold) + 0.5f) * (float (threshold) + 0.5f));
-  };
-  depth_weight_ = weight (d);
-  colour_weight_ = weight (c);
-}
-
-/* ---- decided: what the pixels of a row become ---- */
+/* ---- loading a row and choosing what its pixels become ---- */
 
 /* Quantises a row. */
 inline void
@@ -157,8 +127,8 @@ CompactEncoder::load_row (const ConstRangeImage &image, int y)
     }
 }
 
-/* Motion of the blocks that begin in row y, or go on there. They refer to rows of their band only,
- * so that damage stays in it. */
+/* Finds the motion of the blocks that begin or continue in row y. They refer to rows of their band
+ * only, so that damage stays in it. */
 void
 CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand &band)
 {
@@ -169,7 +139,7 @@ CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand
   const MotionSearch::Pictures pictures = {
       image, quantisers_->depth, quantisers_->colour, *reference_.before, limits_};
   BlockMotion near_by[2];                   /* to the left, above */
-  if (header_.first_column >= kMotionBlock) /* another partition's: as it was last time */
+  if (header_.first_column >= kMotionBlock) /* another partition's, of the last frame set */
     near_by[0] = motion_memory_->before (first_x - kMotionBlock, first_y);
   for (std::size_t i = 0; i < motions_.size (); i++) {
     const int x = i == 0 ? first_x : (first_x / kMotionBlock + int (i)) * kMotionBlock;
@@ -181,7 +151,7 @@ CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand
   }
 }
 
-/* Finds the pixels that equal those of the earlier frame set, as far as thresholds go. */
+/* Finds the pixels that are within the thresholds of those of the earlier frame set. */
 void
 CompactEncoder::load_earlier (int y, const RowBand &band)
 {
@@ -189,7 +159,7 @@ CompactEncoder::load_earlier (int y, const RowBand &band)
   const Roi &roi = header_.roi;
   const int band_y = roi.y + band.first_row;
   fetch_displaced (*reference_.before, roi.x + header_.first_column, roi.y + y, motions_,
-      limits_.most[0], band_y, band_y + band.rows, std::span (earlier_codes_).first (columns));
+      limits_.max[0], band_y, band_y + band.rows, std::span (earlier_codes_).first (columns));
   std::uint8_t *const earlier = row_.earlier ().data ();
   const std::uint8_t *const valid = row_.valid ().data ();
   for (std::size_t x = 0; x < columns; x++) {
@@ -201,24 +171,11 @@ CompactEncoder::load_earlier (int y, const RowBand &band)
   }
 }
 
-/* Makes a row ready to be coded. */
-template <bool Delta>
-void
-CompactEncoder::load (const ConstRangeImage &image, int y, [[maybe_unused]] const RowBand &band)
-{
-  for_this_cpu ([&] { load_row (image, y); });
-  if constexpr (Delta) {
-    if (y == band.first_row || (header_.roi.y + y) % kMotionBlock == 0)
-      find_motions (image, y, band);
-    load_earlier (y, band);
-  }
-}
-
 /* Finds for each pixel of a run the first of the three above that is near enough, or kPredict. */
 inline void
 CompactEncoder::find_upper (std::size_t begin, std::size_t end)
 {
-  /* Two keys, compared as four halves: every processor can do that. */
+  /* Two keys, compared as four halves: available on every processor. */
   typedef std::uint64_t Keys __attribute__ ((vector_size (16)));
   typedef std::int32_t Halves __attribute__ ((vector_size (16)));
   constexpr std::size_t step = sizeof (Keys) / sizeof (PixelKey);
@@ -245,19 +202,19 @@ CompactEncoder::find_upper (std::size_t begin, std::size_t end)
   }
 }
 
-/* What the decoder will make of a prediction and a residual. */
+/* Prediction, rounded residual and the decoder's result. */
 inline CompactEncoder::FullPixel
 CompactEncoder::make_full (PixelKey own, const Neighbours &n) const
 {
-  const Components expected = predict (n, last_, limits_.most);
+  const Components expected = predict (n, last_, limits_.max);
   const Components residual =
       rounded (components_of_key (own) - expected, half_steps_, reciprocals_);
-  const Components made = cut (expected + residual * steps_, limits_.least, limits_.most);
+  const Components made = clamped (expected + residual * steps_, limits_.min, limits_.max);
   return {residual, pack_components (made), key_of (to_rgb (made, limits_))};
 }
 
-/* The neighbour with the least sum of error and price, or kPredict if the pixel in full has less.
- * @param[out] full  that */
+/* The neighbour of least cost (error and bits), or kPredict if the pixel in full costs less.
+ * @param[out] full  the pixel in full */
 int
 CompactEncoder::best_choice (std::size_t x, const Neighbours &n, FullPixel &full)
 {
@@ -272,7 +229,7 @@ CompactEncoder::best_choice (std::size_t x, const Neighbours &n, FullPixel &full
   };
   full = make_full (own, n);
   int best = kPredict;
-  float least = error (full.key) + kPriceOfBit * bits_of (full.residual);
+  float min = error (full.key) + kPriceOfBit * bits_of (full.residual);
   const PixelCode codes[] = {n.left.code, n.codes[-1], n.codes[0], n.codes[1]};
   for (std::size_t i = 0; i < 4; i++) {
     const PixelKey other = i == 0 ? row_.shown ()[x - 1] : upper_.shown ()[x + i - 2];
@@ -281,15 +238,15 @@ CompactEncoder::best_choice (std::size_t x, const Neighbours &n, FullPixel &full
         std::find (codes, codes + i, codes[i]) != codes + i)
       continue;
     const float sum = error (other) + kPriceOfBit * kBitsOfChoice[i];
-    if (sum < least) {
+    if (sum < min) {
       best = static_cast<int> (i);
-      least = sum;
+      min = sum;
     }
   }
   return best;
 }
 
-/* ---- written: the symbols of a row ---- */
+/* ---- writing the symbols of a row ---- */
 
 /* Codes a pixel that no neighbour replaces. @return its state */
 template <class Code, bool Delta>
@@ -302,14 +259,14 @@ CompactEncoder::code_full (Code &code, const Neighbours &n, Components residual)
   const Components size = residual < 0 ? -residual : residual;
   size_sums_ += size + (size > 0);
   size_counts_ -= size > 0;
-  return either (mask_of_zero (!predicted), state_of (Origin::kPredicted),
+  return select (zero_mask (!predicted), state_of (Origin::kPredicted),
       state_of (Origin::kCorrected, Code::kUsesActivity ? activity_of (residual) : 0));
 }
 
-/* Codes a run of valid pixels, behind an invalid one.
+/* Codes a run of valid pixels, which follows an invalid one.
  *
- * What the loop needs of this object it holds in variables of its own, the code too: bytes are
- * written in it, and for all that the compiler knows any byte may be one of this object's. */
+ * The loop keeps what it needs of this object in local variables, the code too: it writes bytes,
+ * and the compiler must assume that these may alias any member. */
 template <class Code, bool Best, bool Delta>
 inline void
 CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
@@ -340,24 +297,24 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
         continue;
       }
     }
-    /* Decided: which neighbour replaces the pixel, if any. */
+    /* Choose the neighbour that replaces the pixel, if any. */
     FullPixel full;
     std::uint64_t other = 0, take_left = 0; /* the latter is a mask */
     if constexpr (Best) {
       other = static_cast<std::uint64_t> (best_choice (x, n, full));
-      take_left = mask_of_zero (other);
+      take_left = zero_mask (other);
     } else {
-      take_left = mask_of_zero (near_bits (own[x], left_key, bias) ^ kNearMask);
+      take_left = zero_mask (near_bits (own[x], left_key, bias) ^ kNearMask);
       other = others[x];
     }
-    const std::uint64_t chosen = either (take_left, kTakeLeft, other);
-    /* Written: the choice, or the pixel in full. */
+    const std::uint64_t chosen = select (take_left, kTakeLeft, other);
+    /* Write the choice, or the pixel in full. */
     if (chosen != kPredict) [[likely]] {
       code.template choice<Delta> (n, static_cast<int> (chosen));
       const auto from = static_cast<std::ptrdiff_t> (x + other) - kTakeUpper;
-      left_key = either (take_left, left_key, upper_keys[from]);
-      left = {either (take_left, left.code, upper_codes[from]),
-          Delta ? copy_state (chosen) : either (take_left, kLeftState, kUpperState)};
+      left_key = select (take_left, left_key, upper_keys[from]);
+      left = {select (take_left, left.code, upper_codes[from]),
+          Delta ? copy_state (chosen) : select (take_left, kLeftState, kUpperState)};
     } else {
       if constexpr (!Best)
         full = make_full (own[x], n);
@@ -373,7 +330,7 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
   slice_code = code;
 }
 
-/* Codes which pixels of the row are valid, and finds where its runs end. */
+/* Codes which pixels of the row are valid, and finds the ends of its runs. */
 template <class Code>
 void
 CompactEncoder::code_runs (Code &code)
@@ -390,17 +347,6 @@ CompactEncoder::code_runs (Code &code)
   }
 }
 
-template <class Code>
-void
-CompactEncoder::code_motions (Code &code)
-{
-  BlockMotion expected;
-  for (BlockMotion &m : motions_) {
-    (void)code.motion (expected, m);
-    expected = m;
-  }
-}
-
 /* Codes which pixels of a run of valid ones equal those of the earlier frame set. */
 template <class Code>
 void
@@ -411,19 +357,24 @@ CompactEncoder::code_earlier_runs (Code &code, std::size_t begin, std::size_t en
   bool now = false;
   for (auto x = static_cast<int> (begin); x < static_cast<int> (end); now = !now) {
     const int to = run_end (own, x, now);
-    code.earlier_run (to - run_end (upper, x, now));
+    code.run (now, to - run_end (upper, x, now));
     x = to;
   }
 }
 
-/* @return false if the slice has become too long; the row is then to be coded again */
+/* @return false if the slice is too long now; the row must then be coded again */
 template <class Code, bool Delta>
 bool
 CompactEncoder::code_row (Code &slice_code, [[maybe_unused]] bool begins_block)
 {
   if constexpr (Delta)
-    if (begins_block)
-      code_motions (slice_code);
+    if (begins_block) {
+      BlockMotion expected;
+      for (BlockMotion &m : motions_) {
+        (void)slice_code.motion (expected, m);
+        expected = m;
+      }
+    }
   code_runs (slice_code);
   std::size_t begin = 0;
   bool valid = false;
@@ -458,9 +409,13 @@ template <class Code, bool Delta>
 Code
 CompactEncoder::begin_slice (int first_row)
 {
-  for (int i = 0; i < kComponents; i++) /* the last slice is the best guess for this one */
-    if (size_counts_[i] > 0)
-      orders_[static_cast<std::size_t> (i)] = golomb_order (size_sums_[i], size_counts_[i]);
+  /* The Golomb orders for the mean residuals of the last slice, the best guess for this one. */
+  for (int i = 0; i < kComponents; i++)
+    if (size_counts_[i] > 0) {
+      const auto mean = static_cast<std::uint32_t> (size_sums_[i] / size_counts_[i]);
+      orders_[static_cast<std::size_t> (i)] =
+          static_cast<std::uint8_t> (std::min<int> (std::bit_width (mean + mean / 2), 15));
+    }
   size_sums_ = size_counts_ = Components{};
   header_.first_row = first_row;
   header_.rows = 0;
@@ -504,14 +459,14 @@ CompactEncoder::resize (int columns)
   earlier_codes_.resize (own_.size ());
   earlier_keys_.resize (own_.size ());
   runs_.reserve (n + 1);
-  /* A row is coded whole before anybody looks whether it fits. */
-  const std::size_t most = static_cast<std::size_t> (settings_.max_slice_size) +
+  /* A row is coded completely before its size is checked. */
+  const std::size_t size = static_cast<std::size_t> (settings_.max_slice_size) +
                            (kMaxBytesOfPixel + kMaxBytesOfRun) * (n + 1);
-  bytes_.resize (std::max (bytes_.size (), most));
+  bytes_.resize (std::max (bytes_.size (), size));
 }
 
-/* Codes all rows of a band in the columns that the header says.
- * @return false if one row alone is longer than a slice may be */
+/* Codes all rows of a band in the header's columns.
+ * @return false if one row is longer than a slice may be */
 template <class Code, bool Delta>
 bool
 CompactEncoder::code_rows (
@@ -522,7 +477,12 @@ CompactEncoder::code_rows (
       motion_blocks (header_.roi.x + header_.first_column, header_.columns), BlockMotion{});
   Code code = begin_slice<Code, Delta> (band.first_row);
   for (int y = band.first_row; y < band.first_row + band.rows; y++) {
-    load<Delta> (image, y, band);
+    for_this_cpu ([&] { load_row (image, y); });
+    if constexpr (Delta) {
+      if (y == band.first_row || (header_.roi.y + y) % kMotionBlock == 0)
+        find_motions (image, y, band);
+      load_earlier (y, band);
+    }
     const EncoderResult result = result_;
     const Components sums = size_sums_, counts = size_counts_;
     Code before = code;
@@ -548,15 +508,6 @@ CompactEncoder::code_rows (
   return true;
 }
 
-template <class Code>
-bool
-CompactEncoder::code_rows (
-    const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
-{
-  return band.key ? code_rows<Code, false> (image, band, to)
-                  : code_rows<Code, true> (image, band, to);
-}
-
 bool
 CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &band,
     const SliceHeader &header, std::vector<std::uint8_t> &to, EncoderResult &result)
@@ -566,14 +517,34 @@ CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &ba
   motion_memory_ = &picture.motions;
   header_ = header;
   result_ = {};
-  set_thresholds (picture.settings);
+  const auto bias = [] (int depth, int colour) {
+    return near_bias (static_cast<std::uint32_t> (depth), static_cast<std::uint32_t> (colour));
+  };
+  const auto weight = [] (int threshold) {
+    return 1 / ((float (threshold) + 0.5f) * (float (threshold) + 0.5f));
+  };
+  settings_ = finer_settings (picture.settings);
+  const int depth = settings_.depth_threshold, colour = settings_.colour_threshold;
+  const int earlier_depth = picture.settings.depth_threshold,
+            earlier_colour = picture.settings.colour_threshold;
+  bias_ = bias (depth, colour);
+  earlier_bias_ = bias (earlier_depth, earlier_colour);
+  earlier_threshold_ = Components{earlier_depth, earlier_colour, earlier_colour, earlier_colour};
+  depth_weight_ = weight (depth);
+  colour_weight_ = weight (colour);
+  steps_ = steps_within (depth, colour).components ();
+  half_steps_ = steps_ / 2;
+  reciprocals_ = 1.0f / __builtin_convertvector(steps_, FloatComponents);
   limits_ =
-      Limits (quantisers_->depth.codes () - 1, (1 << quantisers_->colour.bits ()) - 1, steps_);
+      PixelLimits (quantisers_->depth.codes () - 1, (1 << quantisers_->colour.bits ()) - 1, steps_);
   orders_ = {};
   size_sums_ = size_counts_ = Components{};
-  const bool fits = header.profile == Profile::kPacked
-                        ? code_rows<PackedWriter> (picture.image, band, to)
-                        : code_rows<EntropyWriter> (picture.image, band, to);
+  const ConstRangeImage &image = picture.image;
+  const bool packed = header.profile == Profile::kPacked;
+  const bool fits = packed && band.key ? code_rows<PackedWriter, false> (image, band, to)
+                    : packed           ? code_rows<PackedWriter, true> (image, band, to)
+                    : band.key         ? code_rows<EntropyWriter, false> (image, band, to)
+                                       : code_rows<EntropyWriter, true> (image, band, to);
   result += result_;
   return fits;
 }

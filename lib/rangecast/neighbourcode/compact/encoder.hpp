@@ -7,8 +7,8 @@
 
 #include "../../geometry/quantiser.hpp"
 #include "../../geometry/range_image.hpp"
+#include "../bitstream/encoder_result.hpp"
 #include "../bitstream/refresh.hpp"
-#include "../bitstream/slice_partition.hpp"
 #include "entropy_code.hpp"
 #include "pixel_key.hpp"
 #include "row.hpp"
@@ -18,8 +18,8 @@ namespace rangecast {
 struct CompactSettings {
   int depth_threshold, colour_threshold; ///< codes
   int max_slice_size;                    ///< bytes
-  bool best; ///< what costs least in error and bits, not the first that is near enough
-  bool fine; ///< finer than need be: later frame sets can then take pixels again for longer
+  bool best; ///< choose the neighbour of least error and bits, not the first that is near enough
+  bool fine; ///< finer than the thresholds ask, so that later frame sets can reuse pixels longer
 };
 
 struct CompactQuantisers {
@@ -27,13 +27,13 @@ struct CompactQuantisers {
   const ColourQuantiser &colour;
 };
 
-/** The steps of residuals that keep every pixel within the thresholds; all 1 for thresholds of 0.
- */
+/** The coarsest residual steps that keep every pixel within the thresholds (codes); all 1 for
+ *  thresholds of 0. */
 Steps steps_within (int depth_threshold, int colour_threshold);
 /** Thresholds of pixels that are not taken from an earlier frame set. */
 CompactSettings finer_settings (const CompactSettings &settings);
 
-/** What the partitions of a range image have in common. */
+/** A range image and what is common to the coding of its partitions. */
 struct CompactPicture {
   const ConstRangeImage &image;
   CodingReference reference;
@@ -42,35 +42,30 @@ struct CompactPicture {
   MotionMemory &motions; ///< of the view
 };
 
-/** Codes partitions of range images in the profiles packed and entropy, each without anything of
- * those before. Keeps its memory. */
+/** Codes partitions of range images in the profiles packed and entropy, each independently of those
+ *  before. Keeps its memory. */
 class CompactEncoder {
 public:
   /** Appends the slices of a partition.
    *  @param band    its rows
-   *  @param header  of all slices: profile, bits, ROI, columns, times, what they refer to
-   *  @param[out] result  grows
-   *  @return false if a row alone is longer than a slice may be: partitions have to be narrower */
+   *  @param header  of all slices: profile, bits, ROI, columns, times, reference
+   *  @param[in,out] result  is added to
+   *  @return false if one row is longer than a slice may be: partitions must be narrower */
   bool code_partition (const CompactPicture &picture, const RowBand &band,
       const SliceHeader &header, std::vector<std::uint8_t> &to, EncoderResult &result);
 
 private:
-  /* What a pixel becomes that no neighbour replaces. */
+  /* A pixel that no neighbour replaces, as the decoder will have it. */
   struct FullPixel {
     Components residual;
     PixelCode code;
     PixelKey key;
   };
 
-  void set_thresholds (const CompactSettings &settings);
-  template <class Code>
-  bool code_rows (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
   template <class Code, bool Delta>
   bool code_rows (const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to);
-  template <bool Delta> void load (const ConstRangeImage &image, int y, const RowBand &band);
   template <class Code, bool Delta> bool code_row (Code &slice_code, bool begins_block);
   template <class Code> void code_runs (Code &code);
-  template <class Code> void code_motions (Code &code);
   template <class Code> void code_earlier_runs (Code &code, std::size_t begin, std::size_t end);
   template <class Code, bool Best, bool Delta>
   [[gnu::always_inline]] void code_run (Code &slice_code, std::size_t begin, std::size_t end);
@@ -89,21 +84,22 @@ private:
   [[nodiscard]] std::size_t header_size () const;
 
   CompactSettings settings_{};
-  const CompactQuantisers *quantisers_ = nullptr; /* while code_partition() runs */
-  MotionMemory *motion_memory_ = nullptr;         /* too */
+  const CompactQuantisers *quantisers_ =
+      nullptr; /* this and the next while code_partition() runs */
+  MotionMemory *motion_memory_ = nullptr;
   SliceHeader header_;
   EncoderResult result_;
   Components steps_{}, half_steps_{};
   FloatComponents reciprocals_{};
-  Limits limits_;
+  PixelLimits limits_;
   PixelKey bias_ = 0, earlier_bias_ = 0; /* of the thresholds */
   Components earlier_threshold_{};
   CodingReference reference_;
   float depth_weight_ = 0, colour_weight_ = 0;
 
   CompactRow row_, upper_;
-  std::vector<PixelKey> own_;            /* the row as it is to be coded */
-  std::vector<std::uint64_t> others_;    /* for each pixel, the first of those above that is near */
+  std::vector<PixelKey> own_;            /* the quantised row */
+  std::vector<std::uint64_t> others_;    /* for each pixel, the first near one of those above */
   std::vector<PixelCode> earlier_codes_; /* the row in the earlier frame set */
   std::vector<PixelKey> earlier_keys_;
   std::vector<BlockMotion> motions_; /* of the blocks that the row touches */
@@ -112,7 +108,7 @@ private:
   int columns_ = 0;
   std::vector<int> runs_; /* ends of the row's runs */
   EntropyModel model_{};
-  std::vector<std::uint8_t> bytes_;        /* of the open slice, behind its header */
+  std::vector<std::uint8_t> bytes_;        /* of the open slice, after its header */
   Components size_sums_{}, size_counts_{}; /* of its residuals */
   GolombOrders orders_{};
 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Profile entropy: every decision of a pixel under a probability of its own context. */
+/* Profile entropy: each decision of a pixel is coded with the probability of its context. */
 #pragma once
 
 #include "motion.hpp"
@@ -7,7 +7,7 @@
 
 namespace rangecast {
 
-/** Where the contexts of each kind of decision begin among a slice's probabilities. */
+/** Index of the first context of each kind of decision among a slice's probabilities. */
 namespace context {
 inline constexpr int kRunExact = 0;            /* of invalid and of valid pixels */
 inline constexpr int kRunSize = kRunExact + 2; /* 16 each */
@@ -17,45 +17,43 @@ inline constexpr int kPredicted = kOther + 48;
 inline constexpr int kNonZero = kPredicted + 25;          /* 12 for each component */
 inline constexpr int kSize = kNonZero + kComponents * 12; /* 2 x 16 for each component */
 inline constexpr int kEarlier = kSize + kComponents * 2 * 16;
-inline constexpr int kMotion = kEarlier + 36;     /* whether it is the expected one */
+inline constexpr int kMotion = kEarlier + 36;     /* whether it equals the expected motion */
 inline constexpr int kMotionNumber = kMotion + 1; /* 1 + 16 for each of dx, dy, dz */
 inline constexpr int kCount = kMotionNumber + 3 * 17;
 } // namespace context
 
 using EntropyModel = std::array<Probability, context::kCount>;
 
-/** What every slice begins with: learnt from scans and recordings, so that small slices do not pay
- *  for learning. Part of the format. */
+/** Probabilities at the start of each slice: learnt from scans and recordings, so that small slices
+ *  do not pay for adaptation. Part of the format. */
 extern const EntropyModel kInitialModel;
 /** The same for slices that refer to an earlier frame set. */
 extern const EntropyModel kInitialDeltaModel;
 
-/** Sizes that have decisions of their own; greater ones are an exponential Golomb code. */
+/** Magnitudes with decisions of their own; greater ones are an exponential Golomb code. */
 inline constexpr int kUnarySizes = 4;
-/** Longest prefix of that code: longer ones are damage. */
+/** Longest prefix of that code; a longer one means damaged data. */
 inline constexpr int kMaxPrefix = 17;
 
-/** The decisions of a slice in their order, the same for both directions: Coder::code (probability,
- *  yes) writes `yes`, or reads it and pays no heed to the argument; so does Coder::bits. Small, so
- *  that a loop can keep a copy in registers; the probabilities are the caller's. */
+/** The decisions of a slice in their order, the same for both directions. Coder is RangeEncoder or
+ *  RangeDecoder: code (probability, yes) writes `yes`, or reads it and ignores the argument; so
+ * does bits(). Small, so that a loop can keep a copy in registers; the probabilities are the
+ * caller's. */
 template <class Coder> class EntropyCode {
 public:
   /** Whether contexts need the activity of pixels. */
   static constexpr bool kUsesActivity = true;
 
-  EntropyCode (Coder coder, EntropyModel &model) : coder_ (coder), model_ (model.data ()) {}
+  EntropyCode (Coder coder, EntropyModel &model) : model_ (model.data ()), coder_ (coder) {}
 
-  [[nodiscard]] Coder &coder () { return coder_; }
-  [[nodiscard]] const Coder &coder () const { return coder_; }
-
-  /** By how much a run of valid or invalid pixels ends later than the one above.
-   *  @return false for a number that is too large */
+  /** Columns by which a run of valid or invalid pixels ends later than the one above.
+   *  @return false if the number is too large */
   bool run (bool valid, std::int32_t &later)
   {
     return number (context::kRunExact + valid, context::kRunSize + 16 * valid, later);
   }
 
-  /** Of a block, from what it is expected to be. @return false for a number that is too large */
+  /** Motion of a block, relative to `expected`. @return false if a number is too large */
   bool motion (const BlockMotion &expected, BlockMotion &m)
   {
     if (code (context::kMotion, m == expected)) {
@@ -73,15 +71,16 @@ public:
   /** Whether a valid pixel equals one of the earlier frame set. */
   bool earlier (const Neighbours &n, bool yes)
   {
-    const auto of = [] (PixelState s) { return (s != 0) + took (s, kTakeEarlier); };
-    const int at = of (n.left.state) + 3 * of (n.states[0]) + 9 * took (n.states[1], kTakeEarlier) +
-                   18 * took (n.states[-1], kTakeEarlier);
+    const auto of = [] (PixelState s) { return (s != 0) + is_copy (s, kTakeEarlier); };
+    const int at = of (n.left.state) + 3 * of (n.states[0]) +
+                   9 * is_copy (n.states[1], kTakeEarlier) +
+                   18 * is_copy (n.states[-1], kTakeEarlier);
     return code (context::kEarlier + at, yes);
   }
 
-  /** Of a valid pixel that has a neighbour.
-   *  @tparam Delta  the slice refers to an earlier frame set: nothing may depend on what pixels
-   *  are, because a decoder may not have them */
+  /** The PixelChoice of a valid pixel that has a neighbour.
+   *  @tparam Delta  the slice refers to an earlier frame set: contexts must not depend on pixel
+   *  values, because a decoder may not have them */
   template <bool Delta> int choice (const Neighbours &n, int chosen)
   {
     if (n.left.valid ()) {
@@ -95,7 +94,7 @@ public:
     return code (at, chosen == kPredict) ? kPredict : kCorrect;
   }
 
-  /** @return false for a residual that is too large */
+  /** The residual of a pixel coded in full. @return false if it is too large */
   [[gnu::always_inline]] bool residual (const Neighbours &n, bool has_neighbour, Components &r)
   {
     const Activity sums = n.activities ();
@@ -119,8 +118,8 @@ public:
 private:
   bool code (int at, bool yes) { return coder_.code (model_[at], yes); }
 
-  /* Which of the three above are valid and do not equal a neighbour before them, which would have
-   * been chosen. */
+  /* Which of the three above are valid and differ from the neighbours before them, which would have
+   * been chosen first. */
   struct Candidates {
     bool is[3];
   };
@@ -131,13 +130,13 @@ private:
         static_cast<bool> (n.upper ().valid () & (u != l) & (u != ul)),
         static_cast<bool> (n.upper_right ().valid () & (ur != l) & (ur != ul) & (ur != u))}};
   }
-  /* The same as far as their choices tell. */
+  /* The same, from the neighbours' choices alone. */
   static Candidates known_candidates (const Neighbours &n)
   {
     const PixelState l = n.left.state, u = n.states[0], ur = n.states[1];
-    return {{n.upper_left ().valid () && !took (l, kTakeUpper),
-        n.upper ().valid () && !took (u, kTakeLeft) && !took (l, kTakeUpperRight),
-        n.upper_right ().valid () && !took (ur, kTakeLeft)}};
+    return {{n.upper_left ().valid () && !is_copy (l, kTakeUpper),
+        n.upper ().valid () && !is_copy (u, kTakeLeft) && !is_copy (l, kTakeUpperRight),
+        n.upper_right ().valid () && !is_copy (ur, kTakeLeft)}};
   }
 
   /* One of the three above, or kPredict for none of them. */
@@ -155,7 +154,7 @@ private:
     return kPredict;
   }
 
-  /* Of the sum of three activities. */
+  /* Context class for the sum of three activities. */
   static constexpr std::uint8_t kActivityClass[] = {
       0, 1, 2, 2, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4};
 
@@ -192,29 +191,10 @@ private:
     return true;
   }
 
-  Coder coder_;
   Probability *model_;
-};
 
-/** Directions of an EntropyCode. */
-struct EntropyWriting : RangeEncoder {
-  using RangeEncoder::RangeEncoder;
-  bool code (Probability &p, bool yes)
-  {
-    put (p, yes);
-    return yes;
-  }
-  std::uint32_t bits (std::uint32_t value, int count)
-  {
-    put_bits (value, count);
-    return value;
-  }
-};
-
-struct EntropyReading : RangeDecoder {
-  using RangeDecoder::RangeDecoder;
-  bool code (Probability &p, bool) { return get (p); }
-  std::uint32_t bits (std::uint32_t, int count) { return get_bits (count); }
+protected:
+  Coder coder_;
 };
 
 } // namespace rangecast

@@ -20,7 +20,11 @@ fetch_displaced (const ReferencePlane &plane, int x, int y, std::span<const Bloc
       plane.fetch (x + m.dx, y + m.dy, part);
     if (m.dz != 0)
       for (PixelCode &code : part)
-        code = displaced (code, m.dz, last_depth);
+        if (code != kNoPixel) {
+          const auto depth = static_cast<std::int32_t> (code & 0xffff) + m.dz;
+          code = (code & ~PixelCode{0xffff}) |
+                 static_cast<PixelCode> (std::clamp (depth, 0, last_depth));
+        }
     x = next;
   }
 }
@@ -40,7 +44,7 @@ MotionSearch::MotionSearch ()
   sorted_.reserve (kMotionBlock * kMotionBlock);
 }
 
-/* Every other pixel of every other row, or all of narrow blocks. */
+/* Every second pixel of every second row, or all pixels of small blocks. */
 void
 MotionSearch::take_samples (const Pictures &pictures, const Area &area)
 {
@@ -60,7 +64,7 @@ MotionSearch::take_samples (const Pictures &pictures, const Area &area)
   }
 }
 
-/* The best dz of one displacement is the middle one of the differences. */
+/* The best dz of one displacement is the median of the depth differences. */
 MotionSearch::Match
 MotionSearch::match (
     const Pictures &pictures, Components threshold, const Area &area, int dx, int dy)
@@ -77,7 +81,7 @@ MotionSearch::match (
       continue;
     const Components difference = s.own - to_rgb (components_of (code), pictures.limits);
     const Components beyond = (difference > threshold) | (difference < -threshold);
-    if (is_zero (beyond & Components{0, -1, -1, -1}))
+    if (is_zero (beyond & Components{0, -1, -1, -1})) /* depth does not count here */
       differences_.push_back (difference[0]);
   }
   if (differences_.empty ())
@@ -104,7 +108,7 @@ MotionSearch::find (const Pictures &pictures, Components threshold, const Area &
   const auto all = static_cast<int> (samples_.size ());
   const auto attempt = [&] (int dx, int dy) {
     const Match other = match (pictures, threshold, area, dx, dy);
-    if (other.hits <= best.hits + all / 32) /* a motion of its own costs bits */
+    if (other.hits <= best.hits + all / 32) /* a motion costs bits */
       return false;
     best = other;
     return true;
@@ -122,7 +126,7 @@ MotionSearch::find (const Pictures &pictures, Components threshold, const Area &
       better |= attempt (x, y + 1);
     }
   }
-  /* Partitions may share a block: the one that has its first pixel keeps its motion. */
+  /* Partitions may share a block: the one with its first pixel records its motion. */
   const auto begins = [] (int at, int of_roi) { return at % kMotionBlock == 0 || at == of_roi; };
   if (begins (area.x, pictures.image.roi.x) && begins (area.y, pictures.image.roi.y))
     memory.keep (area.x, area.y, best.motion);

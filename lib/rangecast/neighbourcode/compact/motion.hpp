@@ -10,47 +10,38 @@
 
 namespace rangecast {
 
-/** Pixels of slices that refer to an earlier frame set share motion in blocks of so many columns
- * and rows, counted from the top left of the view's full image. */
+/** Side of the blocks of pixels that share their motion, in pixels, counted from the top left of
+ * the view's full image. */
 inline constexpr int kMotionBlock = 16;
 /** Greatest |dx| and |dy|, and greatest |dz|. */
 inline constexpr int kMaxMotion = 31, kMaxMotionDepth = 65535;
 
-/** Which pixel of an earlier frame set a pixel may equal: at column + dx, row + dy, and dz depth
- *  codes further away. */
+/** The pixel of an earlier frame set that a pixel may equal: at column + dx, row + dy, and dz depth
+ *  codes farther away. */
 struct BlockMotion {
   std::int32_t dx = 0, dy = 0, dz = 0;
 
   friend bool operator== (const BlockMotion &, const BlockMotion &) = default;
 };
 
-/** A pixel moved by dz depth codes; kNoPixel stays that. */
-constexpr PixelCode
-displaced (PixelCode code, std::int32_t dz, std::int32_t last_depth)
-{
-  if (code == kNoPixel)
-    return code;
-  const auto depth = std::clamp (static_cast<std::int32_t> (code & 0xffff) + dz, 0, last_depth);
-  return (code & ~PixelCode{0xffff}) | static_cast<PixelCode> (depth);
-}
-
-/** What of an earlier frame set the pixels of a row may equal.
- *  @param x, y  of the first pixel, in the view's full image
- *  @param motions  of the blocks that the row touches, from the left
- *  @param first_y, end_y  rows to which it may refer */
+/** Fetches the pixels of an earlier frame set that the pixels of a row may equal.
+ *  @param x, y        place of the first pixel in the view's full image
+ *  @param motions     of the blocks that the row touches, from the left
+ *  @param last_depth  greatest depth code; depths are clamped to it
+ *  @param first_y, end_y  rows that may be referred to; kNoPixel outside of them */
 void fetch_displaced (const ReferencePlane &plane, int x, int y,
     std::span<const BlockMotion> motions, std::int32_t last_depth, int first_y, int end_y,
     std::span<PixelCode> to);
 
-/** How many blocks columns x to x + columns - 1 touch. */
+/** Number of blocks that columns x to x + columns - 1 touch. */
 constexpr std::size_t
 motion_blocks (int x, int columns)
 {
   return static_cast<std::size_t> ((x + columns - 1) / kMotionBlock - x / kMotionBlock + 1);
 }
 
-/** The motion of a view's blocks when it was last found. Partitions of a frame set that are coded
- * at the same time all see that of frame sets before. */
+/** The latest known motion of a view's blocks. Partitions of a frame set, which are coded in
+ *  parallel, all see the motion of the frame sets before. */
 class MotionMemory {
 public:
   /** @param width, height  of the view's full image */
@@ -73,8 +64,8 @@ private:
   std::size_t across_ = 0;
 };
 
-/** Finds the motion of blocks between two frame sets of a view: that with which the most pixels
- *  come near enough to those of the earlier one. */
+/** Finds the motion of blocks between two frame sets of a view: the one with which the most pixels
+ *  are within the threshold of those of the earlier frame set. */
 class MotionSearch {
 public:
   struct Area {              ///< of one block, and where it may refer to
@@ -88,12 +79,12 @@ public:
     const ConstRangeImage &image;
     const DepthQuantiser &depth;
     const ColourQuantiser &colour;
-    const ReferencePlane &before; ///< with pixels as these profiles have them
-    const Limits &limits;
+    const ReferencePlane &before; ///< holds PixelCodes
+    const PixelLimits &limits;
   };
 
   /** @param threshold  of depth, R, G, B, codes
-   *  @param near_by  motions that are likely: of neighbouring blocks
+   *  @param near_by  motions of neighbouring blocks, which are likely
    *  @param memory   of the view */
   BlockMotion find (const Pictures &pictures, Components threshold, const Area &area,
       std::span<const BlockMotion> near_by, MotionMemory &memory);

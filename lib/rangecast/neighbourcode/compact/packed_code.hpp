@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Profile packed: run lengths and prefix codes that never change. */
+/* Profile packed: run lengths and fixed prefix codes. */
 #pragma once
 
 #include <bit>
 
+#include "../bitstream/symbols.hpp"
 #include "entropy_code.hpp"
 
 namespace rangecast {
@@ -11,19 +12,17 @@ namespace rangecast {
 inline constexpr int kPackedContexts = 64;
 inline constexpr int kMaxChoiceBits = 5;
 inline constexpr int kMaxPatternBits = 10;
-/** Longest prefix of an exponential Golomb code: longer ones are damage. */
+/** Longest prefix of an exponential Golomb code; a longer one means damaged data. */
 inline constexpr int kMaxGolombPrefix = 18;
-/** Bits of the greatest number that it says. */
+/** Bits of the greatest number that such a code holds. */
 inline constexpr int kMaxGolombBits = 20;
-/** Order of the code of run ends. */
-inline constexpr int kRunOrder = 1, kEarlierRunOrder = 1;
-/** Order of the code of depth motion. */
-inline constexpr int kMotionDepthOrder = 3;
+/** Golomb orders of run ends and of depth motion. */
+inline constexpr int kRunOrder = 1, kMotionDepthOrder = 3;
 
-/** Lengths of the codes in bits, 0 = there is none. Part of the format. */
+/** Lengths of the codes in bits, 0 = no code. Part of the format. */
 extern const std::array<std::array<std::uint8_t, kChoices>, kPackedContexts> kChoiceLengths;
-/** Which components of a residual are not zero: of pixels with a neighbour, of the others, and of
- *  pixels with a neighbour where all steps are 1, so that few components are 0. */
+/** Codes of the pattern of non-zero components of a residual: for pixels with a neighbour, for the
+ *  others, and for pixels with a neighbour where all steps are 1, so that few components are 0. */
 inline constexpr std::size_t kPatternCodes = 3;
 extern const std::array<std::array<std::uint8_t, 16>, kPatternCodes> kPatternLengths;
 
@@ -33,7 +32,7 @@ pattern_code (bool has_neighbour, bool exact)
   return !has_neighbour ? 1 : exact ? 2 : 0;
 }
 
-/** What a packed slice says of its residuals' codes. */
+/** The residual codes of a packed slice. */
 struct ResidualCodes {
   GolombOrders orders;
   bool exact; ///< all steps are 1
@@ -60,13 +59,14 @@ struct GolombCode {
   }
 };
 
-/** What bits say that are no code. */
+/** Result of reading bits that are no code. */
 inline constexpr int kNoSymbol = 16;
 
-/** Small residuals and their signs have tables of their own. */
+/** Residuals up to this magnitude are written by table; codes up to so many bits are read by one.
+ */
 inline constexpr int kMaxQuickSize = 31, kQuickBits = 9;
 
-/** Codes and the tables that read them, built once from the lengths. */
+/** The codes and the tables to read them, built once from the lengths. */
 struct PackedTables {
   /** Sign and size of a residual; no bits for 0. */
   struct QuickCode {
@@ -102,7 +102,7 @@ unzigzag (std::uint32_t v)
   return static_cast<std::int32_t> (v >> 1) ^ -static_cast<std::int32_t> (v & 1);
 }
 
-/** Writes the choices and residuals of a slice. A copy goes on from where it was taken. */
+/** Writes the choices and residuals of a slice. A copy continues from where it was taken. */
 class PackedWriter {
 public:
   static constexpr bool kUsesActivity = false;
@@ -114,11 +114,10 @@ public:
   {
   }
 
-  /** By how much a run ends later than the one above. */
+  /** Columns by which a run ends later than the one above: of valid or invalid pixels, or of pixels
+   *  that equal those of the earlier frame set or do not. */
   void run (bool, std::int32_t later) { golomb (zigzag (later), kRunOrder); }
-  /** The same for runs of pixels that equal those of the earlier frame set, or do not. */
-  void earlier_run (std::int32_t later) { golomb (zigzag (later), kEarlierRunOrder); }
-  /** Of a block, from what it is expected to be. */
+  /** Motion of a block, relative to `expected`. */
   void motion (const BlockMotion &expected, const BlockMotion &m)
   {
     put (m == expected, 1);
@@ -130,7 +129,8 @@ public:
   }
   template <bool Delta> [[gnu::always_inline]] void choice (const Neighbours &n, int chosen)
   {
-    put (tables_->choice[n.kinds ()][static_cast<std::size_t> (chosen)]);
+    const PrefixCode code = tables_->choice[n.kinds ()][static_cast<std::size_t> (chosen)];
+    put (code.bits, code.length);
   }
   /** A pixel that equals no neighbour; its residual may be 0 if there is a neighbour. */
   template <bool Delta>
@@ -171,33 +171,28 @@ public:
     quick (3);
     put (bits, length);
   }
-  /** The bytes that finish() comes to. */
+  /** The bytes that finish() returns. */
   [[nodiscard]] std::size_t bound () const
   {
     return static_cast<std::size_t> (to_ - begin_) + (count_ > 0);
   }
   std::size_t finish ()
   {
-    put (0, 0); /* again, because a copy may have gone on */
+    put (0, 0); /* again, because a copy may have overwritten the last byte */
     return bound ();
   }
 
 private:
-  /* Up to 56 bits. Writes eight bytes, of which the next call writes those again that are not full.
-   */
+  /* Up to 56 bits. Writes eight bytes; the next call overwrites those that are not full. */
   [[gnu::always_inline]] void put (std::uint64_t value, int bits)
   {
     held_ |= value << count_;
     count_ += bits;
-    std::uint64_t word = held_;
-    if constexpr (std::endian::native == std::endian::big)
-      word = __builtin_bswap64 (word);
-    std::memcpy (to_, &word, sizeof word);
+    store_little_endian (held_, to_);
     to_ += count_ >> 3;
     held_ >>= count_ & ~7;
     count_ &= 7;
   }
-  void put (const PrefixCode &code) { put (code.bits, code.length); }
   void long_residual (Components r, unsigned pattern)
   {
     for (; pattern != 0; pattern &= pattern - 1) {
@@ -221,14 +216,14 @@ private:
   const PackedTables *tables_;
 };
 
-/** Reads what a PackedWriter wrote. Behind the end it reads zeros: who goes on for long has to look
- *  at overrun() now and then. */
+/** Reads what a PackedWriter wrote. Beyond the end it reads zeros, so long loops must check
+ *  overrun(). */
 class PackedReader {
 public:
   static constexpr bool kUsesActivity = false;
   static constexpr bool kEarlierInRuns = true;
 
-  /** Zero bytes that have to be there behind the data. */
+  /** Zero bytes that must follow the data in memory. */
   static constexpr std::size_t kPadding = 16;
 
   PackedReader (const std::uint8_t *from, std::size_t bytes, const ResidualCodes &codes)
@@ -241,13 +236,6 @@ public:
   {
     std::uint32_t value = 0;
     const bool good = golomb (kRunOrder, value);
-    later = unzigzag (value);
-    return good && !overrun ();
-  }
-  bool earlier_run (std::int32_t &later)
-  {
-    std::uint32_t value = 0;
-    const bool good = golomb (kEarlierRunOrder, value);
     later = unzigzag (value);
     return good && !overrun ();
   }
@@ -289,9 +277,9 @@ public:
     r = Components{z, y, co, cg};
     return good;
   }
-  /** More was taken than there is. */
+  /** More was read than there is. */
   [[nodiscard]] bool overrun () const { return left () < 0; }
-  /** Nothing is left but the zero bits that fill the last byte, and no more was read. */
+  /** All was read, exactly, up to the zero bits that fill the last byte. */
   [[nodiscard]] bool at_clean_end () const
   {
     const std::ptrdiff_t bits = left ();
@@ -300,11 +288,11 @@ public:
 
 private:
   template <std::size_t N>
-  [[gnu::always_inline]] int get (const std::array<PackedTables::Entry, N> &table, int most)
+  [[gnu::always_inline]] int get (const std::array<PackedTables::Entry, N> &table, int max_bits)
   {
-    if (count_ < most)
+    if (count_ < max_bits)
       refill ();
-    const PackedTables::Entry e = table[held_ & ((1u << most) - 1)];
+    const PackedTables::Entry e = table[held_ & ((1u << max_bits) - 1)];
     consume (e.length);
     return e.symbol;
   }
@@ -339,14 +327,10 @@ private:
     consume (bits);
     return value;
   }
-  /* At least 56 bits are there afterwards. */
+  /* At least 56 bits are held afterwards. */
   [[gnu::always_inline]] void refill ()
   {
-    std::uint64_t word = 0;
-    std::memcpy (&word, from_, sizeof word);
-    if constexpr (std::endian::native == std::endian::big)
-      word = __builtin_bswap64 (word);
-    held_ |= word << count_;
+    held_ |= load_little_endian (from_) << count_;
     from_ = std::min (from_ + ((63 - count_) >> 3), end_ + 8);
     count_ |= 56;
   }
@@ -355,7 +339,7 @@ private:
     held_ >>= bits;
     count_ -= bits;
   }
-  /* Bits that have not been taken; below 0, how many too many. */
+  /* Bits that have not been read; negative if more was read than there is. */
   [[nodiscard]] std::ptrdiff_t left () const { return 8 * (end_ - from_) + count_; }
 
   const std::uint8_t *from_, *end_;

@@ -14,7 +14,8 @@ using PixelKey = std::uint64_t;
 
 inline constexpr PixelKey kInvalidKey = PixelKey{1} << 60;
 
-/** Of codes; `rgbx` has R in the least significant byte. */
+/** @param depth  code
+ *  @param rgbx   codes, R in the least significant byte */
 constexpr PixelKey
 key_of (std::uint32_t depth, std::uint32_t rgbx)
 {
@@ -22,7 +23,7 @@ key_of (std::uint32_t depth, std::uint32_t rgbx)
   return depth | (rgb & 0xff) << 32 | (rgb & 0xff00) << 10 | (rgb & 0xff0000) << 34;
 }
 
-/** Of depth, R, G, B. */
+/** @param c  codes of depth, R, G, B */
 inline PixelKey
 key_of (Components c)
 {
@@ -47,14 +48,16 @@ components_of_key (PixelKey key)
 inline constexpr PixelKey kNearMask = PixelKey{1} << 17 | PixelKey{1} << 27 | PixelKey{1} << 41 |
                                       PixelKey{1} << 59 | PixelKey{1} << 61;
 
-/** What keeps those bits set as long as no number is below another by more than its threshold. */
+/** The number that keeps these bits set unless a component is less than another's by more than its
+ *  threshold: see near_bits(). */
 constexpr PixelKey
 near_bias (std::uint32_t depth_threshold, std::uint32_t colour_threshold)
 {
   return kNearMask + key_of (depth_threshold, colour_threshold * 0x010101u);
 }
 
-/** Whether a valid pixel is near another one, which may be invalid. Keys: numbers or vectors. */
+/** kNearMask if a valid pixel is near another one, which may be invalid.
+ *  @tparam Keys  numbers or vectors of them */
 template <class Keys>
 constexpr Keys
 near_bits (Keys own, Keys other, PixelKey bias)

@@ -9,13 +9,13 @@
 
 namespace rangecast {
 
-/** How likely a decision is yes, in 1/65536; the coder uses the upper 12 bits. Moves a 32nd of the
- *  way to each outcome, and so never reaches 0 or 65536. */
+/** Probability that a decision is yes, in 1/65536; the coder uses the upper 12 bits. It moves a
+ * 32nd of the way to each outcome, and so never reaches 0 or 65536. */
 using Probability = std::uint16_t;
 inline constexpr int kAdaptationShift = 5;
 inline constexpr std::uint32_t kMinRange = 1u << 24;
-/** Bytes behind the end that a reader takes for zeros; who reads more has been led astray. Without
- *  a limit, a few bytes could keep it busy for long. */
+/** Zero bytes that a reader may read beyond the end of the data; more is damage. Without a limit a
+ *  few bytes could keep the decoder busy for long. */
 inline constexpr std::size_t kMaxOverrun = 16;
 
 /** What one decision splits off the range for yes; at least 1 and less than the range. */
@@ -32,41 +32,40 @@ learn (Probability &p, bool yes)
   p = static_cast<Probability> (p + (((yes ? 65536 : 31) - p) >> kAdaptationShift));
 }
 
-/** Bits by which a range has to grow to be at least kMinRange: 0, 8 or 16. */
-constexpr int
-bits_to_grow (std::uint32_t range)
-{
-  return std::countl_zero (range) & 24;
-}
-
-/** Writes decisions. A copy taken at some point goes on from there: bytes already written stay as
- *  they are, because a carry only ever reaches the two that are held back and the 0xff behind them.
- */
+/** Writes decisions; the interface is that of RangeDecoder, so that EntropyCode serves both. A copy
+ *  continues from the point where it was taken: bytes already written do not change, because a
+ *  carry only reaches the two that are held back and the 0xff bytes behind them. */
 class RangeEncoder {
 public:
   explicit RangeEncoder (std::uint8_t *to) : begin_ (to), to_ (to) {}
 
-  void put (Probability &p, bool yes)
+  bool code (Probability &p, bool yes)
   {
     const std::uint32_t part = yes_part (range_, p);
     low_ += yes ? 0 : part;
     range_ = yes ? part : range_ - part;
     learn (p, yes);
     normalise ();
+    return yes;
   }
-  /** `count` bits that are as likely 0 as 1, most significant first. */
-  void put_bits (std::uint32_t value, int count)
+  /** Writes `count` bits that are as likely 0 as 1, most significant first. */
+  std::uint32_t bits (std::uint32_t value, int count)
   {
     while (count-- > 0) {
       range_ >>= 1;
       low_ += value >> count & 1 ? 0 : range_;
       normalise ();
     }
+    return value;
   }
-  /** No less than the bytes that finish() would come to. */
-  [[nodiscard]] std::size_t bound () const { return shifted () + 4; }
-  /** Writes the fewest bytes that say which number in the range is meant, and that let a reader go
-   *  no more than kMaxOverrun bytes beyond them. @return how many */
+  /** Upper bound of the bytes that finish() would leave: those that have left the range, and 4. */
+  [[nodiscard]] std::size_t bound () const
+  {
+    return static_cast<std::size_t> (to_ - begin_) + 2 * pending_ + (holds_ ? 2 : 0) +
+           static_cast<std::size_t> (count_) / 8 + 4;
+  }
+  /** Writes the fewest bytes that identify a number in the range, such that a reader goes no more
+   *  than kMaxOverrun bytes beyond them. @return how many bytes there are */
   std::size_t finish ()
   {
     const std::uint64_t rest = low_ & 0xffffffffu;
@@ -78,29 +77,23 @@ public:
         break;
     }
     low_ += value - rest;
-    const std::size_t read = shifted () + 4;
-    const std::size_t least = read > kMaxOverrun ? read - kMaxOverrun : 0;
+    const std::size_t read = bound ();
+    const std::size_t min = read > kMaxOverrun ? read - kMaxOverrun : 0;
     for (int i = 0; i < 4; i++) { /* all that is held back goes out, and zeros behind it */
       low_ <<= 16;
       count_ += 16;
       shift ();
     }
     auto size = read;
-    while (size > least && begin_[size - 1] == 0)
+    while (size > min && begin_[size - 1] == 0)
       size--;
     return size;
   }
 
 private:
-  /* Bytes that have left the range. */
-  [[nodiscard]] std::size_t shifted () const
-  {
-    return static_cast<std::size_t> (to_ - begin_) + 2 * pending_ + (holds_ ? 2 : 0) +
-           static_cast<std::size_t> (count_) / 8;
-  }
   void normalise ()
   {
-    const int bits = bits_to_grow (range_);
+    const int bits = std::countl_zero (range_) & 24; /* to be at least kMinRange: 0, 8 or 16 */
     range_ <<= bits;
     low_ <<= bits;
     count_ += bits;
@@ -142,7 +135,8 @@ private:
   std::uint32_t held_ = 0; /* two bytes */
 };
 
-/** Reads decisions; behind the end it reads zeros. */
+/** Reads decisions; beyond the end it reads zeros. The second argument of code() and the first of
+ *  bits() are what an encoder writes. */
 class RangeDecoder {
 public:
   RangeDecoder (const std::uint8_t *from, std::size_t bytes) : from_ (from), end_ (from + bytes)
@@ -150,7 +144,7 @@ public:
     for (int i = 0; i < 4; i++)
       code_ = code_ << 8 | next_byte ();
   }
-  [[gnu::always_inline]] bool get (Probability &p)
+  [[gnu::always_inline]] bool code (Probability &p, bool = false)
   {
     const std::uint32_t part = yes_part (range_, p);
     if (code_ < part) {
@@ -165,7 +159,7 @@ public:
     normalise ();
     return false;
   }
-  std::uint32_t get_bits (int count)
+  std::uint32_t bits (std::uint32_t, int count)
   {
     std::uint32_t value = 0;
     while (count-- > 0) {

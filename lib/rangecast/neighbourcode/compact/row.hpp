@@ -8,15 +8,15 @@
 
 namespace rangecast {
 
-/** A row of a slice in the profiles packed and entropy, as it is when both sides have coded it. One
- *  invalid pixel comes before it, and a few behind it, because vectors read beyond its end. */
+/** A coded row of a slice in the profiles packed and entropy, the same in encoder and decoder. It
+ *  has one invalid pixel before it and a few after it, because vectors read beyond its end. */
 class CompactRow {
 public:
-  /** Pixels behind the row that may be read. */
+  /** Pixels after the row that may be read. */
   static constexpr std::size_t kMargin = 8;
 
   /** Makes all pixels invalid.
-   *  @param shown  of invalid pixels */
+   *  @param shown  value of invalid pixels in shown() */
   void reset (std::size_t columns, std::uint64_t shown)
   {
     codes_.assign (columns + 1 + kMargin, kNoPixel);
@@ -32,16 +32,15 @@ public:
     std::fill (this->shown () + begin, this->shown () + end, shown);
   }
 
-  /** Of the first column; the pixel before it is at -1. */
+  /** Codes from the first column on; the pixel before it is at -1. */
   [[nodiscard]] PixelCode *codes () { return codes_.data () + 1; }
   [[nodiscard]] PixelState *states () { return states_.data () + 1; }
-  /** What is shown instead of YCoCg: encoders keep a PixelKey, decoders what goes into the image.
-   */
+  /** The pixels as R, G, B: a PixelKey in encoders, the image's pixel in decoders. */
   [[nodiscard]] std::uint64_t *shown () { return shown_.data () + 1; }
   /** One byte a pixel, 0 = invalid. */
   [[nodiscard]] std::vector<std::uint8_t> &valid () { return valid_; }
 
-  /** The same, not 0 = equals one of an earlier frame set. */
+  /** One byte a pixel, not 0 = equals a pixel of an earlier frame set. */
   [[nodiscard]] std::vector<std::uint8_t> &earlier () { return earlier_; }
 
 private:

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The functions of profile plain in AVX2 intrinsics. They are not another version of the scalar
- * text, which for_this_cpu() would make: they code four rows as one wave, each row three columns
- * behind the one above it, with saturating arithmetic and moves between lanes that Lanes have no
- * words for. plain_functions (cpu_level ()) chooses them, by the same level as for_this_cpu().
+/* The functions of profile plain in AVX2 intrinsics. for_this_cpu() could not make them from the
+ * scalar code: they code four rows as one wavefront, each row three columns behind the one above
+ * it, with saturating arithmetic and moves between lanes that Lanes does not offer. plain_functions
+ * (cpu_level ()) selects them, by the same level as for_this_cpu().
  *
  * Each function names its target. With compiler options for the whole file an inline function of a
  * header, compiled here, could be the copy that the linker keeps for all. */
@@ -93,7 +93,7 @@ make_row (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *co
   int x = 0;
   for (; x + kBlock <= columns; x += kBlock)
     widen (span, x, make_block<kAllColourBits> (how, depth + x, colour + x, to + x));
-  if (x < columns) { /* what is behind the row may not be read */
+  if (x < columns) { /* memory after the row must not be read */
     std::uint16_t depths[kBlock] = {};
     Rgbx colours[kBlock];
     const auto rest = static_cast<std::size_t> (columns - x);
@@ -115,12 +115,12 @@ make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx 
 /* ---- coding ---- */
 
 /* Four rows at once, each kLag columns behind the one above it, so that its upper right neighbour
- * is known: lane i of a vector is row i. A lag of 2 would do, but then each step waits for all of
- * the one before it. */
+ * is known: lane i of a vector is row i. A lag of 2 would suffice, but then each step depends on
+ * the result of the one before it. */
 constexpr int kLag = 3, kColumnsBehind = kLag * (kBandRows - 1);
 static_assert (kColumnsBehind <= kPixelsBefore && kColumnsBehind + 16 + 8 <= kPixelsBehind);
 
-/* What the four rows know: the pixels on the left, and of the rows above the coming ones. */
+/* State of the four rows: the left pixels, and those of the rows above. */
 struct Wave {
   __m256i left, upper_left, upper, upper_right, next;
 };
@@ -133,9 +133,9 @@ load_pixels (const PlainPixel *from)
 
 /* Lanes of all ones where `pixel` lies between the limits in all four numbers. */
 AVX2 inline __m256i
-is_between (__m256i pixel, __m256i least, __m256i most)
+is_between (__m256i pixel, __m256i min, __m256i max)
 {
-  return _mm256_cmpeq_epi64 (_mm256_min_epu16 (_mm256_max_epu16 (pixel, least), most), pixel);
+  return _mm256_cmpeq_epi64 (_mm256_min_epu16 (_mm256_max_epu16 (pixel, min), max), pixel);
 }
 
 /* The symbol's lowest bit lies where invalid pixels have theirs. */
@@ -148,7 +148,8 @@ symbols (long long symbol)
   return _mm256_set1_epi64x (symbol << kSymbolAt);
 }
 
-/* GCC 12 compares the mask with 0 first where two of a kind have the same; hence two kinds. */
+/* blendv_pd here and blendv_epi8 for symbols: if both blends were of one kind, GCC 12 would add a
+ * comparison of the mask with 0. */
 AVX2 inline __m256i
 choose_pixel (__m256i otherwise, __m256i pixel, __m256i mask)
 {
@@ -161,12 +162,12 @@ choose_pixel (__m256i otherwise, __m256i pixel, __m256i mask)
 AVX2 inline __m256i
 step (Wave &wave, __m256i own, __m256i threshold, const PlainPixel *above)
 {
-  const __m256i least = _mm256_subs_epu16 (own, threshold);
-  const __m256i most = _mm256_adds_epu16 (own, threshold);
-  const __m256i upper_right = is_between (wave.upper_right, least, most);
-  const __m256i upper = is_between (wave.upper, least, most);
-  const __m256i upper_left = is_between (wave.upper_left, least, most);
-  const __m256i left = is_between (wave.left, least, most);
+  const __m256i min = _mm256_subs_epu16 (own, threshold);
+  const __m256i max = _mm256_adds_epu16 (own, threshold);
+  const __m256i upper_right = is_between (wave.upper_right, min, max);
+  const __m256i upper = is_between (wave.upper, min, max);
+  const __m256i upper_left = is_between (wave.upper_left, min, max);
+  const __m256i left = is_between (wave.left, min, max);
   static_assert (kInvalid == kFull + 1);
   __m256i symbol = _mm256_or_si256 (
       _mm256_and_si256 (own, _mm256_set1_epi64x (kInvalidPixelBit)), symbols (kFull));
@@ -254,7 +255,7 @@ code_band (const PlainBand &band)
   }
 }
 
-/* Of pixels side by side, bits of a place, moved. */
+/* The codes at bit `from` of adjacent pixels, shifted to bit `to`. */
 AVX2 inline __m256i
 moved (__m256i pixels, int from, __m128i to)
 {
@@ -346,7 +347,7 @@ show_row (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour
   int invalid_bits = 0, x = 0;
   for (; x + kBlock <= columns; x += kBlock)
     invalid_bits += _mm_popcnt_u32 (show_block (row + x, depth + x, colour + x));
-  if (x < columns && columns >= kBlock) { /* some once more */
+  if (x < columns && columns >= kBlock) { /* the last block overlaps the one before */
     const int last = columns - kBlock;
     const unsigned invalid = show_block (row + last, depth + last, colour + last);
     invalid_bits += _mm_popcnt_u32 (invalid >> 2 * (x - last));

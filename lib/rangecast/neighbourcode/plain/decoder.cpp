@@ -6,15 +6,15 @@
 namespace rangecast {
 namespace {
 
-/* Pixels may be read two before and five behind a row, and written up to a group behind it. */
-constexpr std::size_t kBefore = 2, kBehind = kGroup;
+/* Pixels up to two before and five after a row may be read, and up to a group after it written. */
+constexpr std::size_t kBefore = 2, kAfter = kGroup;
 
 constexpr ShownPixel kNothing[kGroup] = {};
 constexpr std::uint64_t kYes = ~std::uint64_t{0};
 constexpr std::uint64_t kIsLeft[8] = {kYes}, kIsFull[8] = {0, 0, 0, 0, kYes};
 constexpr std::size_t kFullPixels[8] = {0, 0, 0, 0, 1};
 
-/* Decodes the pixels of some symbols without a branch, as no symbol can be foreseen. */
+/* Decodes the pixels of a group of symbols without branches, which would be unpredictable. */
 inline void
 decode_group (std::uint64_t symbols, const ShownPixel *upper, ShownPixel *row, ShownPixel &last,
     const ShownPixel *&full)
@@ -34,7 +34,7 @@ decode_group (std::uint64_t symbols, const ShownPixel *upper, ShownPixel *row, S
   full = next;
 }
 
-/* Decodes one row. @param at  of its first symbol, bits */
+/* Decodes one row. @param at  bit of its first symbol */
 void
 decode_row (const LittleEndianBits &symbols, std::size_t at, const ShownPixel *upper,
     ShownPixel *row, int columns, const ShownPixel *&full)
@@ -42,7 +42,7 @@ decode_row (const LittleEndianBits &symbols, std::size_t at, const ShownPixel *u
   ShownPixel left = 0;
   for (; columns > 0; columns -= kGroup, at += kGroupBits, upper += kGroup, row += kGroup) {
     std::uint64_t group = symbols.from (at) & kGroupMask;
-    if (columns < kGroup) { /* what is behind the row is invalid, too */
+    if (columns < kGroup) { /* pixels after the row are invalid */
       const std::uint64_t own = (std::uint64_t{1} << columns * kSymbolBits) - 1;
       group = (group & own) | (kInvalidGroup & ~own);
     }
@@ -56,7 +56,7 @@ decode_row (const LittleEndianBits &symbols, std::size_t at, const ShownPixel *u
   }
 }
 
-/* Reads full pixels. @return false if one has a depth code that there is not */
+/* Reads full pixels. @return false if one has a depth code that does not exist */
 bool
 read_full (const LittleEndianBits &bits, std::size_t count, int depth_bits,
     const DepthQuantiser &depth, const ColourQuantiser &colour, ShownPixel *to)
@@ -87,49 +87,40 @@ read_full (const LittleEndianBits &bits, std::size_t count, int depth_bits,
 
 } // namespace
 
-void
-PlainDecoder::decode_rows (const LittleEndianBits &symbols, const SliceHeader &header,
-    const RangeImage &image, std::size_t &points)
-{
-  const auto columns = static_cast<std::size_t> (header.columns);
-  const std::size_t padded = kBefore + columns + kBehind;
-  rows_.resize (std::max (rows_.size (), 2 * padded));
-  std::fill_n (rows_.begin (), 2 * padded, ShownPixel{0});
-  ShownPixel *row = rows_.data () + kBefore, *upper = row + padded;
-  const ShownPixel *full = full_.data ();
-  std::size_t at = 0;
-  for (int y = header.first_row; y < header.first_row + header.rows; y++) {
-    decode_row (symbols, at, upper, row, header.columns, full);
-    points += functions_->show_row (row, header.columns, image.depth.row (y) + header.first_column,
-        image.colour.row (y) + header.first_column);
-    at += columns * kSymbolBits;
-    std::swap (row, upper);
-  }
-}
-
 bool
 PlainDecoder::decode (std::span<const std::uint8_t> body, const SliceHeader &header,
     const DepthQuantiser &depth, const ColourQuantiser &colour, const RangeImage &image,
     std::uint64_t &points)
 {
-  functions_ = &plain_functions (cpu_level ());
-  const std::size_t pixels =
-      static_cast<std::size_t> (header.rows) * static_cast<std::size_t> (header.columns);
+  const PlainFunctions &functions = plain_functions (cpu_level ());
+  const auto columns = static_cast<std::size_t> (header.columns);
+  const std::size_t pixels = static_cast<std::size_t> (header.rows) * columns;
   const std::size_t size = symbol_bytes (pixels);
-  const LittleEndianBits symbols (body.first (size)), full (body.subspan (size));
-  if (!symbols.end_behind (pixels * kSymbolBits))
+  const LittleEndianBits symbols (body.first (size)), full_bits (body.subspan (size));
+  if (!symbols.end_after (pixels * kSymbolBits))
     return false;
-  const PlainCounts counts = functions_->count_symbols (body.data (), size);
+  const PlainCounts counts = functions.count_symbols (body.data (), size);
   const auto bits = static_cast<std::size_t> (header.depth_bits + 3 * header.colour_bits);
-  if (!full.end_behind (counts.full * bits))
+  if (!full_bits.end_after (counts.full * bits))
     return false;
   full_.resize (std::max (full_.size (), counts.full + 1));
-  if (!read_full (full, counts.full, header.depth_bits, depth, colour, full_.data ()))
+  if (!read_full (full_bits, counts.full, header.depth_bits, depth, colour, full_.data ()))
     return false;
-  std::size_t valid = 0;
-  decode_rows (symbols, header, image, valid);
+  const std::size_t padded = kBefore + columns + kAfter;
+  rows_.resize (std::max (rows_.size (), 2 * padded));
+  std::fill_n (rows_.begin (), 2 * padded, ShownPixel{0});
+  ShownPixel *row = rows_.data () + kBefore, *upper = row + padded;
+  const ShownPixel *full = full_.data ();
+  std::size_t at = 0, valid = 0;
+  for (int y = header.first_row; y < header.first_row + header.rows; y++) {
+    decode_row (symbols, at, upper, row, header.columns, full);
+    valid += functions.show_row (row, header.columns, image.depth.row (y) + header.first_column,
+        image.colour.row (y) + header.first_column);
+    at += columns * kSymbolBits;
+    std::swap (row, upper);
+  }
   points += valid;
-  /* A pixel is 0 if its symbol says so, is reserved, or names one that is 0. */
+  /* A pixel is 0 if its symbol is kInvalid, is reserved, or refers to a pixel that is 0. */
   return valid + counts.invalid == pixels;
 }
 

@@ -17,21 +17,17 @@ namespace rangecast {
 class PlainDecoder {
 public:
   /** Writes only pixels of the slice's rows and columns, whatever the bytes are.
-   *  @param body    what is behind the slice header; not shorter than its symbols
-   *  @param header  checked, and not empty; its ROI is the image's
-   *  @param[out] points  grows by the valid pixels
+   *  @param body    the bytes after the slice header; not shorter than its symbols
+   *  @param header  checked, with at least one row; its ROI is the image's
+   *  @param[in,out] points  the number of valid pixels is added
    *  @return false for damage: the pixels may then be partly written */
   bool decode (std::span<const std::uint8_t> body, const SliceHeader &header,
       const DepthQuantiser &depth, const ColourQuantiser &colour, const RangeImage &image,
       std::uint64_t &points);
 
 private:
-  void decode_rows (const LittleEndianBits &symbols, const SliceHeader &header,
-      const RangeImage &image, std::size_t &points);
-
-  const PlainFunctions *functions_ = nullptr;
-  std::vector<ShownPixel> rows_; /* the present row and the one above it, padded */
-  std::vector<ShownPixel> full_; /* pixels of the slice, and one more that nothing asks for */
+  std::vector<ShownPixel> rows_; /* the current row and the one above it, padded */
+  std::vector<ShownPixel> full_; /* pixels of the slice, and one more that may be read */
 };
 
 } // namespace rangecast

@@ -11,7 +11,7 @@
 namespace rangecast {
 namespace {
 
-/* In memory the writer would be waited for. */
+/* Inlined, so that the writer stays in registers. */
 [[gnu::always_inline]] inline void
 put_invalid (BitWriter &bits, int count)
 {
@@ -23,8 +23,8 @@ put_invalid (BitWriter &bits, int count)
 
 } // namespace
 
-/* Valid depths are one interval. Whichever way codes go, its ends have the first and the last, or
- * nearly so. */
+/* Valid depths are one interval; its ends have the first and the last code, in either order, or are
+ * close to depths that do. */
 void
 PlainCodes::set (const DepthQuantiser &depth, const ColourQuantiser &colours)
 {
@@ -41,15 +41,11 @@ PlainCodes::set (const DepthQuantiser &depth, const ColourQuantiser &colours)
 }
 
 std::size_t
-PlainEncoder::pixels_of (int rows) const
-{
-  return static_cast<std::size_t> (rows) * static_cast<std::size_t> (header_.columns);
-}
-
-std::size_t
 PlainEncoder::slice_size (int rows, std::size_t full) const
 {
-  return kSliceHeaderSize + symbol_bytes (pixels_of (rows)) +
+  return kSliceHeaderSize +
+         symbol_bytes (
+             static_cast<std::size_t> (rows) * static_cast<std::size_t> (header_.columns)) +
          (full * static_cast<std::size_t> (bits_of_full ()) + 7) / 8;
 }
 
@@ -66,22 +62,12 @@ PlainEncoder::resize (int columns)
   for (auto &symbols : row_symbols_)
     symbols.resize (std::max (symbols.size (), symbol_bytes (size) + kSymbolBytesBehind));
   row_full_.resize (std::max (row_full_.size (), size + kGroup));
-  const auto most = static_cast<std::size_t> (settings_.max_slice_size) + 16;
-  symbols_.resize (std::max (symbols_.size (), most));
-  full_.resize (std::max (full_.size (), most));
+  const auto size_with_padding = static_cast<std::size_t> (settings_.max_slice_size) + 16;
+  symbols_.resize (std::max (symbols_.size (), size_with_padding));
+  full_.resize (std::max (full_.size (), size_with_padding));
 }
 
-void
-PlainEncoder::load_row (const ConstRangeImage &image, int y, Row &row)
-{
-  const PlainQuantising how = {codes_->near, codes_->far, codes_->codes.data (), codes_->colour, y};
-  row.span = functions_->make_pixels (how, image.depth.row (y) + header_.first_column,
-      image.colour.row (y) + header_.first_column, header_.columns,
-      row.pixels.data () + kPixelsBefore);
-  result_.points += static_cast<std::uint64_t> (row.span.valid);
-}
-
-/* Codes the first rows that wait. @return where they have valid pixels */
+/* Codes the first rows of rows_. @return the columns with valid pixels */
 PlainSpan
 PlainEncoder::code_band (int rows)
 {
@@ -110,20 +96,13 @@ PlainEncoder::code_band (int rows)
   return span;
 }
 
-/* The symbols of a coded row and what was coded. */
-PlainRow
-PlainEncoder::coded_row (int row, const PlainSpan &span) const
-{
-  const auto at = static_cast<std::size_t> (row);
-  return {row_symbols_[at].data (), at * static_cast<std::size_t> (functions_->skip_bits),
-      rows_[at].pixels.data () + kPixelsBefore + span.begin, span.end - span.begin};
-}
-
 /* Appends a coded row to the slice. */
 void
 PlainEncoder::add_row (const PlainRow &row, const PlainSpan &span, std::span<PlainPixel> full)
 {
-  BitWriter symbols (symbols_.data (), pixels_of (header_.rows) * kSymbolBits);
+  const auto pixels_before =
+      static_cast<std::size_t> (header_.rows) * static_cast<std::size_t> (header_.columns);
+  BitWriter symbols (symbols_.data (), pixels_before * kSymbolBits);
   put_invalid (symbols, span.begin);
   std::size_t bit = row.first_bit;
   for (int left = row.columns; left > 0; left -= kGroup, bit += kGroupBits)
@@ -151,7 +130,8 @@ PlainEncoder::begin_slice (int first_row)
 void
 PlainEncoder::close_slice (std::vector<std::uint8_t> &to)
 {
-  const std::size_t symbols = symbol_bytes (pixels_of (header_.rows));
+  const std::size_t symbols = symbol_bytes (
+      static_cast<std::size_t> (header_.rows) * static_cast<std::size_t> (header_.columns));
   const std::size_t begin = to.size (), size = slice_size (header_.rows, full_pixels_);
   to.resize (begin + size);
   std::uint8_t *const p = to.data () + begin;
@@ -162,15 +142,18 @@ PlainEncoder::close_slice (std::vector<std::uint8_t> &to)
   result_.full_pixels += full_pixels_;
 }
 
-/* Codes the first rows that wait, as far as the open slice has room for them. Where it has not, the
- * next slice is open then, and its first row is without upper neighbours. @return rows done */
+/* Codes the first rows of rows_ and appends them to the open slice while they fit. When it is full
+ * opens the next one, whose first row has no upper neighbours. @return rows appended */
 int
 PlainEncoder::add_band (int rows, std::vector<std::uint8_t> &to)
 {
   const PlainSpan span = code_band (rows);
   const auto limit = static_cast<std::size_t> (settings_.max_slice_size);
   for (int i = 0; i < rows; i++) {
-    const PlainRow row = coded_row (i, span);
+    const auto at = static_cast<std::size_t> (i);
+    const PlainRow row = {row_symbols_[at].data (),
+        at * static_cast<std::size_t> (functions_->skip_bits),
+        rows_[at].pixels.data () + kPixelsBefore + span.begin, span.end - span.begin};
     const std::span<PlainPixel> full (
         row_full_.data (), functions_->gather_full (row, row_full_.data ()));
     if (header_.rows > 0 && slice_size (header_.rows + 1, full_pixels_ + full.size ()) > limit) {
@@ -183,7 +166,6 @@ PlainEncoder::add_band (int rows, std::vector<std::uint8_t> &to)
   return rows;
 }
 
-/* In as many slices as the size of the partition asks for. */
 void
 PlainEncoder::code_partition (const ConstRangeImage &image, const PlainCodes &codes,
     const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
@@ -198,8 +180,15 @@ PlainEncoder::code_partition (const ConstRangeImage &image, const PlainCodes &co
   begin_slice (0);
   int waiting = 0;
   for (int done = 0; done < image.roi.height;) {
-    for (; waiting < functions_->band_rows && done + waiting < image.roi.height; waiting++)
-      load_row (image, done + waiting, rows_[static_cast<std::size_t> (waiting)]);
+    for (; waiting < functions_->band_rows && done + waiting < image.roi.height; waiting++) {
+      const int y = done + waiting;
+      Row &row = rows_[static_cast<std::size_t> (waiting)];
+      row.span = functions_->make_pixels (
+          {codes_->near, codes_->far, codes_->codes.data (), codes_->colour, y},
+          image.depth.row (y) + header_.first_column, image.colour.row (y) + header_.first_column,
+          header_.columns, row.pixels.data () + kPixelsBefore);
+      result_.points += static_cast<std::uint64_t> (row.span.valid);
+    }
     const int more = add_band (waiting, to);
     std::rotate (rows_.begin (), rows_.begin () + more, rows_.end ());
     waiting -= more;

@@ -8,7 +8,7 @@
 
 #include "../../geometry/quantiser.hpp"
 #include "../../geometry/range_image.hpp"
-#include "../bitstream/slice_partition.hpp"
+#include "../bitstream/encoder_result.hpp"
 #include "../bitstream/symbols.hpp"
 #include "../bitstream/unit.hpp"
 #include "functions.hpp"
@@ -20,7 +20,7 @@ struct PlainSettings {
   int max_slice_size;                    ///< bytes
 };
 
-/** The codes of depths and colours, as vectors look them up. */
+/** The codes of depths and colours, as tables for vector code. */
 struct PlainCodes {
   void set (const DepthQuantiser &depth, const ColourQuantiser &colour);
 
@@ -29,33 +29,30 @@ struct PlainCodes {
   ColourQuantiser colour;
 };
 
-/** Codes partitions of range images in profile plain, each without anything of those before. Keeps
- * its memory. */
+/** Codes partitions of range images in profile plain, each independently of those before. Keeps its
+ *  memory. */
 class PlainEncoder {
 public:
   /** Appends the slices of a partition: all rows of some columns of the ROI.
    *  @param header  of all slices: bits, ROI, columns, times
-   *  @param[out] result  grows */
+   *  @param[in,out] result  is added to */
   void code_partition (const ConstRangeImage &image, const PlainCodes &codes,
       const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
       EncoderResult &result);
 
 private:
-  /* A row that waits to be coded. */
+  /* A row to be coded. */
   struct Row {
-    std::vector<PlainPixel> pixels; /* from kPixelsBefore before its first one on */
+    std::vector<PlainPixel> pixels; /* the first one is at kPixelsBefore */
     PlainSpan span;
   };
   void resize (int columns);
-  void load_row (const ConstRangeImage &image, int y, Row &row);
   PlainSpan code_band (int rows);
-  [[nodiscard]] PlainRow coded_row (int row, const PlainSpan &span) const;
   void add_row (const PlainRow &row, const PlainSpan &span, std::span<PlainPixel> full);
   int add_band (int rows, std::vector<std::uint8_t> &to);
   void begin_slice (int first_row);
   void close_slice (std::vector<std::uint8_t> &to);
   [[nodiscard]] std::size_t slice_size (int rows, std::size_t full) const;
-  [[nodiscard]] std::size_t pixels_of (int rows) const;
   [[nodiscard]] int bits_of_full () const { return header_.depth_bits + 3 * header_.colour_bits; }
 
   PlainSettings settings_{};

@@ -42,7 +42,7 @@ components_of (PlainPixel pixel)
   return __builtin_convertvector(packed, Components);
 }
 
-/* The row above, which is replaced as it goes, but for the last pixel. */
+/* Three pixels of the row above. */
 struct Above {
   PlainPixel left, here, right;
 };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The inner loops of profile plain, which exist once for each rung of cpu.hpp. All rungs give the
- * same; the scalar functions say what that is. */
+/* The inner loops of profile plain, implemented for each CpuLevel. All implementations give the
+ * same results; the scalar one is the reference. */
 #pragma once
 
 #include <cstddef>
@@ -22,10 +22,10 @@ plain_pixel (unsigned r, unsigned g, unsigned b, unsigned depth)
   return r | PlainPixel{g} << 16 | PlainPixel{b} << 32 | PlainPixel{depth} << 48;
 }
 
-/** What there is outside a slice: an R that no threshold makes equal to one of a pixel. */
+/** A pixel outside the slice: its R is farther than any threshold from that of a pixel. */
 inline constexpr PlainPixel kOutsidePixel = 0xc000;
 /** An invalid pixel. Its R is also far from that of the invalid pixels beside and above it, so that
- *  comparing is all it takes to find that it has no neighbour. */
+ *  comparison alone finds that it has no neighbour. */
 constexpr PlainPixel
 invalid_plain_pixel (int x, int y)
 {
@@ -33,11 +33,10 @@ invalid_plain_pixel (int x, int y)
 }
 inline constexpr PlainPixel kInvalidPixelBit = 0x4000; /* set in both, and in no valid pixel */
 
-/** Rows of pixels go on outside of their columns: so many before and behind can be read, and are
- *  outside or invalid. */
+/** Padding of rows: so many pixels before and after can be read, and are outside or invalid. */
 inline constexpr int kPixelsBefore = 16, kPixelsBehind = 48;
 
-/** How to quantise a row. */
+/** Parameters to quantise a row. */
 struct PlainQuantising {
   std::uint16_t near, far;    ///< of valid depths
   const std::uint16_t *codes; ///< of all 65536 depths; of those that are not valid, anything
@@ -45,7 +44,7 @@ struct PlainQuantising {
   int row; ///< of the partition: its last bit matters
 };
 
-/** The columns of a row that have something. */
+/** The columns of a row with valid pixels. */
 struct PlainSpan {
   int begin = 0, end = 0; ///< all pixels elsewhere are invalid
   int valid = 0;          ///< valid pixels
@@ -55,25 +54,25 @@ struct PlainSpan {
 inline constexpr int kBandRows = 4;
 
 struct PlainBand {
-  const PlainPixel *rows[kBandRows]; ///< what is to be coded; those that are not there are outside
-  PlainPixel *upper;    ///< the coded row above; from begin to end becomes the last of `rows`, as
-                        ///< coded, and elsewhere keeps what it is or is outside or invalid
+  const PlainPixel *rows[kBandRows]; ///< to be coded; missing ones are rows of outside pixels
+  PlainPixel *upper;    ///< in: the coded row above; out: from begin to end the last of `rows` as
+                        ///< coded, elsewhere unchanged, outside or invalid
   int begin, end;       ///< elsewhere all pixels of the rows are invalid
   PlainPixel threshold; ///< in all four numbers
-  std::uint8_t *symbols[kBandRows]; ///< 3 bits each, from column `begin` on, behind skip bits;
-                                    ///< room for kSymbolBytesBehind more than they need
+  std::uint8_t *symbols[kBandRows]; ///< 3 bits each, from column `begin` on, after skip bits;
+                                    ///< with room for kSymbolBytesBehind more bytes
 };
 inline constexpr int kSymbolBytesBehind = 24;
 
 /** A coded row. */
 struct PlainRow {
-  const std::uint8_t *symbols; ///< as code_band() gives them
-  std::size_t first_bit;       ///< of them
-  const PlainPixel *pixels;    ///< what was coded; kPixelsBehind more can be read
+  const std::uint8_t *symbols; ///< written by code_band()
+  std::size_t first_bit;       ///< of the row's symbols
+  const PlainPixel *pixels;    ///< the row before coding; kPixelsBehind more can be read
   int columns;
 };
 
-/** Up to sixteen symbols from a bit on; above them 0. */
+/** Up to sixteen symbols from a bit on; the bits above them are 0. */
 inline std::uint64_t
 plain_group (const std::uint8_t *symbols, std::size_t bit, int count)
 {
@@ -90,26 +89,26 @@ struct PlainCounts {
 };
 
 struct PlainFunctions {
-  /** Quantises a row; `to` may be written up to 15 pixels behind the columns. */
+  /** Quantises a row; may write up to 15 pixels after the columns. */
   PlainSpan (*make_pixels) (const PlainQuantising &how, const std::uint16_t *depth,
       const Rgbx *colour, int columns, PlainPixel *to);
-  /** Codes a band as docs/formats/bitstream.md says an encoder chooses. */
+  /** Codes a band, see "How an encoder chooses" in docs/formats/bitstream.md. */
   void (*code_band) (const PlainBand &band);
-  /** Gathers the full pixels of a row. @return how many */
+  /** Copies the full pixels of a row to `to`. @return how many */
   std::size_t (*gather_full) (const PlainRow &row, PlainPixel *to);
-  /** Makes pixels what is written: D bits of depth, then C each of R, G, B. Up to 3 behind them
-   *  may change. */
+  /** Packs pixels in place: D bits of depth, then C each of R, G, B. May change 3 more after them.
+   */
   void (*pack_pixels) (PlainPixel *pixels, std::size_t count, int depth_bits, int colour_bits);
   /** Counts symbols. Bits that fill the last byte are 0. */
   PlainCounts (*count_symbols) (const std::uint8_t *symbols, std::size_t bytes);
   /** Writes a decoded row. @return valid pixels */
   std::size_t (*show_row) (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour);
   int band_rows;
-  /** Where in its bits the symbols of row i of a band begin: at bit i * skip_bits. */
+  /** The symbols of row i of a band begin at bit i * skip_bits. */
   int skip_bits;
 };
 
-/** The functions of a rung, or of the next lower one that has its own. */
+/** The functions for a level, or for the next lower one that has its own. */
 const PlainFunctions &plain_functions (CpuLevel level);
 
 #if defined __x86_64__

@@ -10,7 +10,7 @@ namespace {
 
 constexpr Components kInvalidComponents = {kNoDepthCode, 0, 0, 0};
 
-/* A pixel of an earlier frame set: its four numbers, 16 bits each. */
+/* A pixel as a ReferencePlane holds it: four numbers of 16 bits. */
 std::uint64_t
 kept (Components pixel)
 {
@@ -41,7 +41,7 @@ PlainTemporalEncoder::slice_size (std::size_t pixels, std::size_t full) const
          (full * static_cast<std::size_t> (bits_of_full ()) + 7) / 8;
 }
 
-/* Quantises a row, and finds what it may equal in the earlier frame set. */
+/* Quantises a row, and fetches the earlier frame set's pixels at the same place. */
 void
 PlainTemporalEncoder::load_row (const ConstRangeImage &image, int y)
 {
@@ -76,7 +76,7 @@ PlainTemporalEncoder::symbol_of (int x) const
                                                                                       : kFull;
 }
 
-/* Codes the row in place. @return its full pixels */
+/* Codes the row in place. @return the number of its full pixels */
 std::size_t
 PlainTemporalEncoder::code_row (std::size_t symbols_at, std::size_t full_at)
 {
@@ -130,11 +130,20 @@ PlainTemporalEncoder::close_slice (
   result_.full_pixels += full;
 }
 
-/* Codes all rows of a band in the columns that the header says. */
 void
-PlainTemporalEncoder::code_rows (
-    const ConstRangeImage &image, const RowBand &band, std::vector<std::uint8_t> &to)
+PlainTemporalEncoder::code_partition (const ConstRangeImage &image, const RowBand &band,
+    const CodingReference &reference, const DepthQuantiser &depth, const ColourQuantiser &colour,
+    const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
+    EncoderResult &result)
 {
+  depth_ = &depth;
+  colour_ = &colour;
+  reference_ = reference;
+  settings_ = settings;
+  header_ = header;
+  result_ = {};
+  const int c = settings.colour_threshold;
+  threshold_ = Components{settings.depth_threshold, c, c, c};
   const auto columns = static_cast<std::size_t> (header_.columns);
   row_.assign (columns + 2, kInvalidComponents);
   upper_.assign (columns + 2, kInvalidComponents);
@@ -167,23 +176,6 @@ PlainTemporalEncoder::code_rows (
     std::swap (row_, upper_);
   }
   close_slice (pixels, full, to);
-}
-
-void
-PlainTemporalEncoder::code_partition (const ConstRangeImage &image, const RowBand &band,
-    const CodingReference &reference, const DepthQuantiser &depth, const ColourQuantiser &colour,
-    const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
-    EncoderResult &result)
-{
-  depth_ = &depth;
-  colour_ = &colour;
-  reference_ = reference;
-  settings_ = settings;
-  header_ = header;
-  result_ = {};
-  const int c = settings.colour_threshold;
-  threshold_ = Components{settings.depth_threshold, c, c, c};
-  code_rows (image, band, to);
   result += result_;
 }
 
@@ -201,7 +193,7 @@ struct FullPixels {
   const ColourQuantiser &colour;
   int depth_bits;
 
-  /* kInvalidShown if there is no such depth or no such pixel. */
+  /* kInvalidShown if the depth code does not exist or the data ends. */
   std::uint64_t next ()
   {
     const std::uint64_t value = bits.get (depth_bits + 3 * colour.bits ());
@@ -236,13 +228,13 @@ decode_row (BitReader &symbols, FullPixels &full, const std::uint64_t *upper,
              : symbol == kFull    ? full.next ()
              : symbol == kEarlier ? earlier[x]
                                   : upper[x + symbol - kUpper];
-    if (row[x] == kInvalidShown) /* refers to an invalid pixel, or is not there */
+    if (row[x] == kInvalidShown) /* refers to an invalid pixel, or the data is damaged */
       return false;
   }
   return true;
 }
 
-/* Unknown pixels get what `older` has. */
+/* Writes a row into the image; unknown pixels are taken from reference.older. */
 void
 write_row (const std::uint64_t *row, const SliceHeader &header, int y, const RangeImage &image,
     const DecoderReference &reference, DecodedPixels &decoded)
@@ -260,17 +252,6 @@ write_row (const std::uint64_t *row, const SliceHeader &header, int y, const Ran
     if (unknown)
       show_older (reference, image, header.first_column + x, y);
   }
-}
-
-/* Row as later frame sets refer to it. */
-void
-keep_row (const std::uint64_t *row, const SliceHeader &header, int y, ReferencePlane &now,
-    std::vector<std::uint64_t> &kept)
-{
-  std::transform (row, row + header.columns, kept.begin (),
-      [] (std::uint64_t p) { return p == kInvalidShown ? ReferencePlane::kNone : p; });
-  now.keep (header.roi.x + header.first_column, header.roi.y + y,
-      std::span (kept).first (static_cast<std::size_t> (header.columns)));
 }
 
 } // namespace
@@ -299,8 +280,12 @@ PlainTemporalDecoder::decode (std::span<const std::uint8_t> body, const SliceHea
             symbols, full, upper, header.key ? nullptr : earlier_.data (), row, header.columns))
       return false;
     write_row (row, header, image_row, image, reference, decoded);
-    if (reference.now)
-      keep_row (row, header, image_row, *reference.now, kept_);
+    if (reference.now) {
+      std::transform (row, row + columns, kept_.begin (),
+          [] (std::uint64_t p) { return p == kInvalidShown ? ReferencePlane::kNone : p; });
+      reference.now->keep (header.roi.x + header.first_column, header.roi.y + image_row,
+          std::span (kept_).first (columns));
+    }
     std::swap (row, upper);
   }
   return symbols.at_clean_end () && full.bits.at_clean_end ();

@@ -9,26 +9,27 @@ namespace {
 
 constexpr std::uint64_t kMs = 1'000'000;
 
-/* A queue that grows by the first in half a second, and by so many times what it grows and falls
- * anyhow, is congestion; so is one of the third length. Where it is shorter than the last there is
- * none. Not its length counts but how it grows: of streams that share a link the bursts of some
- * come just behind those of others, and wait for them always. Seconds. */
-constexpr double kGrowth = 0.008, kTimesUnrest = 2.5, kLongQueue = 0.08, kNoQueue = 0.012;
+/* Seconds, but for kTimesVariation. A queue that grows in half a second by more than kGrowth and by
+ * more than kTimesVariation times its usual variation is congestion; so is one longer than
+ * kLongQueue. Below kNoQueue there is none. Growth counts rather than length, because on a shared
+ * link the bursts of some streams always follow those of others, and wait for them. */
+constexpr double kGrowth = 0.008, kTimesVariation = 2.5, kLongQueue = 0.08, kNoQueue = 0.012;
 
-/* Of what arrives, so much is sent after congestion (draft-ietf-rmcat-gcc-02, 5.5: beta). But
- * never less than half of what was sent, where that was little by itself. */
+/* Share of the delivered rate that is sent after congestion (draft-ietf-rmcat-gcc-02, 5.5: beta),
+ * and the least share of the old rate, for sources that sent little. */
 constexpr double kDecrease = 0.85, kMaxDecrease = 0.5;
 
-/* So long encoder and network take until a new rate shows. */
+/* Time until a new rate takes effect in encoder and network. */
 constexpr std::uint64_t kReactionNs = 500 * kMs;
 
-/* Near the capacity that is known: additive, this times the square root of the rate, bits/s each
- * second. Below: a share each second. Beyond, a share that doubles every two seconds. */
+/* Increase a second: near the known capacity additive, kAdditive times the square root of the rate
+ * in bits/s; below it the share kRecovery; beyond it a share that starts at kProbe and doubles
+ * every kDoubling seconds up to kMaxProbe. */
 constexpr double kAdditive = 30, kRecovery = 0.2, kProbe = 0.08, kMaxProbe = 0.35;
 constexpr double kNearBelow = 0.92, kNearAbove = 1.08, kDoubling = 2;
 
-/* A source that makes less than it may is not given more than this times what it makes, and so
- * much (draft-ietf-rmcat-gcc-02, 5.5). */
+/* The rate of a source that sends less than it may is limited to kHeadroom times what is delivered
+ * plus kMore bits/s (draft-ietf-rmcat-gcc-02, 5.5). */
 constexpr double kHeadroom = 1.5, kMore = 50'000;
 
 constexpr std::uint64_t kLossIntervalNs = 500 * kMs;
@@ -37,13 +38,13 @@ constexpr double kMinPackets = 20, kManyPackets = 150;
 constexpr std::uint64_t kSilencePacketsNs = 3'000 * kMs, kSilenceReportsNs = 15'000 * kMs;
 constexpr int kMaxHalvings = 10;
 
-/* Of receiver reports: round trips longer by this are a queue; jitter greater by this forbids more.
- * Reports older than the last do not count. */
+/* Receiver reports. Seconds by which a round trip above the minimum is a queue, and by which jitter
+ * above the minimum stops the increase. Reports older than kFreshNs do not count. */
 constexpr double kRoundTripQueue = 0.1, kJitter = 0.03;
 constexpr std::uint64_t kFreshNs = 15'000 * kMs, kReportIntervalNs = 400 * kMs;
 constexpr std::uint64_t kLongestLossNs = 2'000 * kMs;
 constexpr double kLongestElapsed = 6;
-/* No more is sent while one loses so much beyond the usual. */
+/* Loss beyond the usual that stops the increase. */
 constexpr double kReportedLoss = 0.02;
 
 double
@@ -52,7 +53,7 @@ seconds (std::uint64_t ns)
   return 1e-9 * static_cast<double> (ns);
 }
 
-/* Whether to evaluate loss now. Where one or two of few packets were lost, more are waited for. */
+/* Whether there are enough packets to evaluate loss: more are needed if one or two were lost. */
 bool
 is_enough (double packets, double lost, std::uint64_t span_ns)
 {
@@ -100,14 +101,14 @@ CongestionControl::record_report (Source source, std::uint64_t now_ns)
   report_ns_ = silent_since_ns_ = now_ns;
 }
 
-/* Every decrease is a question, too: does what was wrong go away? */
+/* Lowers the rate after congestion. Whether loss persists then is what LossEvaluator observes. */
 void
 CongestionControl::decrease (double delivered, std::uint64_t now_ns)
 {
   const double wanted = kDecrease * delivered;
-  const double least = rate_ > 0 ? kMaxDecrease * rate_ : 0;
+  const double min = rate_ > 0 ? kMaxDecrease * rate_ : 0;
   const double before = bits_per_s ();
-  rate_ = limited (before > 0 ? std::min (std::max (wanted, least), before) : wanted);
+  rate_ = limited (before > 0 ? std::min (std::max (wanted, min), before) : wanted);
   capacity_ = delivered;
   calm_s_ = 0;
   before_loss_ = 0;
@@ -115,18 +116,7 @@ CongestionControl::decrease (double delivered, std::uint64_t now_ns)
   decrease_ns_ = now_ns;
   valid_sent_ns_ = last_sent_ns_ + kReactionNs;
   counted_ = counted_lost_ = 0;
-  loss_.sends_less ();
-}
-
-/* The loss for which the rate was lowered is there all the same. */
-void
-CongestionControl::take_back ()
-{
-  if (before_loss_ <= rate_)
-    return;
-  rate_ = limited (before_loss_);
-  capacity_ = 0;
-  before_loss_ = 0;
+  loss_.record_decrease ();
 }
 
 void
@@ -145,8 +135,8 @@ CongestionControl::increase (double delivered, double elapsed_s)
     more = std::min (kProbe * std::exp2 (calm_s_ / kDoubling), kMaxProbe) * rate_;
     calm_s_ += elapsed_s;
   }
-  const double most = std::max (rate_, kHeadroom * delivered + kMore);
-  rate_ = limited (std::min (rate_ + more * elapsed_s, most));
+  const double max = std::max (rate_, kHeadroom * delivered + kMore);
+  rate_ = limited (std::min (rate_ + more * elapsed_s, max));
 }
 
 void
@@ -156,7 +146,7 @@ CongestionControl::evaluate_queue (std::uint64_t sent_ns, std::uint64_t now_ns)
     return;
   queue_s_ = delays_.queue_s ();
   const double growth = delays_.growth_s ();
-  const double much = std::max (kGrowth, kTimesUnrest * delays_.unrest_s ());
+  const double much = std::max (kGrowth, kTimesVariation * delays_.variation_s ());
   if (sent_ns < valid_sent_ns_)
     return;
   if (queue_s_ < kNoQueue || growth > -kGrowth)
@@ -171,17 +161,6 @@ CongestionControl::evaluate_queue (std::uint64_t sent_ns, std::uint64_t now_ns)
 }
 
 void
-CongestionControl::count_losses (const PacketReport &packet)
-{
-  if (packet.sent_ns < valid_sent_ns_)
-    return;
-  if (counted_ == 0)
-    losses_since_ns_ = packet.sent_ns;
-  counted_++;
-  counted_lost_ += packet.lost ? 1 : 0;
-}
-
-void
 CongestionControl::evaluate_loss (std::uint64_t now_ns)
 {
   if (static_cast<std::int64_t> (last_sent_ns_ - losses_since_ns_) <
@@ -193,8 +172,11 @@ CongestionControl::evaluate_loss (std::uint64_t now_ns)
   const double share = counted_lost_ / counted_;
   const bool congestion = loss_.evaluate (share, counted_, seconds (span));
   counted_ = counted_lost_ = 0;
-  if (loss_.was_usual ())
-    take_back ();
+  if (loss_.was_usual () && before_loss_ > rate_) { /* the decrease did not help: undo it */
+    rate_ = limited (before_loss_);
+    capacity_ = 0;
+    before_loss_ = 0;
+  }
   const double delivered = arrivals_.delivered_bits_per_s ();
   if (!congestion || delivered <= 0)
     return;
@@ -210,10 +192,10 @@ CongestionControl::packets (std::span<const PacketReport> packets, std::uint64_t
     return;
   const bool first = source_ != Source::kPackets;
   const double elapsed =
-      first ? 0 : std::min (seconds (now_ns - report_ns_), 0.5); /* silence is no calm */
+      first ? 0 : std::min (seconds (now_ns - report_ns_), 0.5); /* a gap in reports is not calm */
   record_report (Source::kPackets, now_ns);
   if (static_cast<std::int64_t> (packets.front ().sent_ns - last_sent_ns_) < -1'000'000'000)
-    valid_sent_ns_ = 0, counted_ = counted_lost_ = 0; /* the sender's clock began anew */
+    valid_sent_ns_ = 0, counted_ = counted_lost_ = 0; /* the sender's clock was reset */
   const bool was_decreased = decreased_;
   decreased_ = false;
   const bool has_losses = std::ranges::any_of (packets, &PacketReport::lost);
@@ -222,7 +204,12 @@ CongestionControl::packets (std::span<const PacketReport> packets, std::uint64_t
     if (!has_losses)
       delays_.add (packet);
     last_sent_ns_ = packet.sent_ns;
-    count_losses (packet);
+    if (packet.sent_ns >= valid_sent_ns_) {
+      if (counted_ == 0)
+        losses_since_ns_ = packet.sent_ns;
+      counted_++;
+      counted_lost_ += packet.lost ? 1 : 0;
+    }
     evaluate_queue (packet.sent_ns, now_ns);
   }
   evaluate_loss (now_ns);
@@ -269,9 +256,9 @@ CongestionControl::receiver_report (
     evaluate_receivers (sent_bits_per_s, now_ns);
 }
 
-/* Loss of a receiver that has not reported since is still the worst, but no reason to send less
- * once more. What it counted before a decrease took effect tells nothing of whether that helped:
- * taken for the answer, it would make loss by congestion the usual one. */
+/* The loss of a receiver that has not reported since the last evaluation may still be the worst,
+ * but causes no further decrease. Packets from before a decrease took effect are dropped: they do
+ * not show whether it helped, and would make loss by congestion appear usual. */
 CongestionControl::Worst
 CongestionControl::find_worst (std::uint64_t now_ns)
 {
@@ -280,7 +267,7 @@ CongestionControl::find_worst (std::uint64_t now_ns)
     if (receiver.time_ns == 0 || now_ns - receiver.time_ns > kFreshNs)
       continue;
     const bool is_old = decrease_ns_ > 0 && receiver.since_ns < decrease_ns_ + kReactionNs;
-    if (is_old && receiver.has_report) { /* the next report is of what comes from now on */
+    if (is_old && receiver.has_report) { /* count from this report on */
       receiver.packets = receiver.lost = 0;
       receiver.since_ns = now_ns;
     }
@@ -314,7 +301,7 @@ CongestionControl::evaluate_receivers (double sent_bits_per_s, std::uint64_t now
   evaluated_ns_ = now_ns;
   const bool loses = worst.is_new && loss_.evaluate (worst.lost, worst.packets, elapsed);
   const bool is_bad = worst.lost - loss_.usual () > kReportedLoss;
-  /* A report that comes at once after a decrease is still of the time before. */
+  /* A report soon after a decrease still covers the time before it. */
   const bool waits = decrease_ns_ > 0 && now_ns - decrease_ns_ < 2 * kReactionNs;
   if (waits || sent_bits_per_s <= 0)
     return;

@@ -9,11 +9,11 @@
 
 namespace rangecast {
 
-/** What an RTCP receiver report says (RFC 3550, 6.4.1), as far as it counts here. */
+/** The fields of an RTCP receiver report (RFC 3550, 6.4.1) that congestion control uses. */
 struct ReceiverReport {
-  std::uint32_t receiver = 0; ///< SSRC of who reports
-  double lost = 0;            ///< share of packets since the report before, 0 to 1
-  double packets = 0;         ///< that it is of; 0: not known
+  std::uint32_t receiver = 0; ///< SSRC of the receiver
+  double lost = 0;            ///< share of packets lost since the last report, 0 to 1
+  double packets = 0;         ///< packets since the last report; 0: not known
   double jitter_s = 0;        ///< interarrival jitter
   double round_trip_s = 0;    ///< 0: not known
 };
@@ -25,46 +25,46 @@ struct CongestionSettings {
   friend bool operator== (const CongestionSettings &, const CongestionSettings &) = default;
 };
 
-/** Finds the bit rate that a network bears, from what receivers report.
+/** Finds the bit rate that a network sustains, from receivers' reports.
  *
- *  It is additive increase and multiplicative decrease on signs of queues and of loss, as in Google
+ *  Additive increase and multiplicative decrease on signs of queues and of loss, as in Google
  *  Congestion Control (draft-ietf-rmcat-gcc-02, sections 5.5 and 6), with three changes for streams
- *  that come in bursts, one a frame set: queues are seen in the one-way delay of the first packet
- *  of each burst (RFC 8698, 4.2) as it grows, and not in the spacing of packets, which the burst
- *  itself makes;
- *  the increase near the last known capacity goes with the square root of the rate, so that
- *  streams which share a link get equal parts of it soon at 1 and at 20 Mbit/s; loss counts beyond
- *  what is *usual*, that is what stays where less is sent (LossEvaluator).
+ *  of bursts, one a frame set. Queues are detected by growth of the one-way delay of each burst's
+ *  first packets (RFC 8698, 4.2) instead of the spacing of packets, which depends on the burst. The
+ *  increase near the last known capacity is proportional to the square root of the rate, so that
+ *  streams which share a link soon get equal parts of it at 1 as well as at 20 Mbit/s. Only loss
+ *  beyond the *usual*, which remains when less is sent, counts (LossEvaluator).
  *
- *  A rate of bytes that receivers report: payload where headers are not in `bytes`. Until the first
- *  sign of congestion it is most_bits_per_s, or no limit. Nothing is allocated. Not thread-safe. */
+ *  The rate counts the bytes of PacketReport: payload only, if these exclude headers. Until the
+ * first sign of congestion it is most_bits_per_s, or no limit. Nothing is allocated. Not
+ * thread-safe. */
 class CongestionControl {
 public:
   void reset () { *this = CongestionControl (); }
   void configure (const CongestionSettings &settings);
 
-  /** Transport-wide feedback of one receiver; while it comes, receiver reports do not count. Of a
-   *  report with lost packets the times do not count: those that GStreamer 1.22 sends then are
-   *  wrong, by some frame intervals, as its deltas and the packets that they are of do not agree.
+  /** Transport-wide feedback of one receiver; while it arrives, receiver reports are ignored. Times
+   *  in a report with lost packets are ignored: GStreamer 1.22 assigns its deltas to the wrong
+   * packets then, which makes them wrong by some frame intervals.
    *  @param now_ns  of any steady clock, the same for all calls */
   void packets (std::span<const PacketReport> packets, std::uint64_t now_ns);
-  /** The worst of several receivers counts, of up to 64. Its loss is evaluated over 20 packets or
-   * two seconds at least: with early feedback reports are of few packets, and come because one was
-   *  lost.
-   *  @param sent_bits_per_s  the rate of what was sent of late */
+  /** RTCP receiver report. The worst of up to 64 receivers counts. Loss is evaluated over at least
+   * 20 packets or two seconds, because with early feedback reports cover few packets and are sent
+   *  because one was lost.
+   *  @param sent_bits_per_s  the recent rate of sending */
   void receiver_report (const ReceiverReport &report, double sent_bits_per_s, std::uint64_t now_ns);
-  /** Before each frame set: where reports stay away, the rate falls to half every 3 s (packets) or
-   *  15 s (receiver reports), and is back at half of what it was with the first that comes.
-   *  @param sent_bits_per_s  the rate of what was sent of late */
+  /** To be called before each frame set. While reports are missing the rate is halved every 3 s
+   *  (packets) or 15 s (receiver reports); the first report restores it to half of its old value.
+   *  @param sent_bits_per_s  the recent rate of sending */
   void tick (double sent_bits_per_s, std::uint64_t now_ns);
 
-  /** 0: no limit. */
+  /** The rate to send at; 0: no limit. */
   [[nodiscard]] double bits_per_s () const;
-  /** Reports came, and not too long ago. */
+  /** Reports have arrived, the last one not too long ago. */
   [[nodiscard]] bool has_reports () const { return source_ != Source::kNone && halvings_ == 0; }
-  /** Share of packets lost, of the latest half second or report. */
+  /** Share of packets lost in the latest half second or report, 0 to 1. */
   [[nodiscard]] double lost () const { return loss_.share (); }
-  /** Time in queues, seconds; from the round trip where there are receiver reports only. */
+  /** Queueing delay, seconds; from the round trip if there are receiver reports only. */
   [[nodiscard]] double queue_s () const { return queue_s_; }
 
 private:
@@ -84,11 +84,9 @@ private:
   [[nodiscard]] double limited (double bits_per_s) const;
   void record_report (Source source, std::uint64_t now_ns);
   void decrease (double delivered, std::uint64_t now_ns);
-  void take_back ();
   void increase (double delivered, double elapsed_s);
   void evaluate_queue (std::uint64_t sent_ns, std::uint64_t now_ns);
   void evaluate_loss (std::uint64_t now_ns);
-  void count_losses (const PacketReport &packet);
   struct Worst {
     double lost = 0, packets = 0, queue_s = 0;
     bool is_new = false, jitters = false;
@@ -101,7 +99,7 @@ private:
   CongestionSettings settings_;
   double rate_ = 0;        /* 0: no limit known */
   double capacity_ = 0;    /* of the link where it was full last; 0: not known */
-  double before_loss_ = 0; /* the rate, if nothing but loss lowered it since */
+  double before_loss_ = 0; /* the rate before it was lowered, if for loss alone; else 0 */
   double calm_s_ = 0;      /* beyond capacity_ without congestion */
   Source source_ = Source::kNone;
   std::uint64_t report_ns_ = 0; /* of the last one */
@@ -113,7 +111,7 @@ private:
   QueueDelay delays_;
   LossEvaluator loss_;
   double queue_s_ = 0;
-  bool drains_ = false; /* the queue of the last decrease is not yet gone */
+  bool drains_ = false; /* the queue that caused the last decrease is not yet gone */
   std::uint64_t decrease_ns_ = 0;
   bool decreased_ = false;
   /* Packets that were sent before this were sent at another rate. */

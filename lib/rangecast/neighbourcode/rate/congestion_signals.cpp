@@ -14,33 +14,32 @@ constexpr std::uint64_t kBurstNs = 5 * kMs;
 
 constexpr std::uint64_t kWindowNs = 1000 * kMs, kMinSpanNs = 330 * kMs;
 
-/* The first arrival of so many packets of a burst counts: jitter may exchange them. */
+/* The earliest arrival among so many packets of a burst counts, as jitter may reorder them. */
 constexpr int kHead = 4;
 
-/* Of jitter the least of so long, but of so many bursts. */
+/* Jitter is removed by the minimum over kFilterNs, but at least kMinBursts bursts. */
 constexpr std::uint64_t kFilterNs = 250 * kMs, kGrowthNs = 500 * kMs;
 constexpr std::size_t kMinBursts = 3;
 
 constexpr std::uint64_t kHalfMemoryNs = 10'000 * kMs;
 
-/* Seconds; an outburst counts as the second at most. */
-constexpr double kMemoryOfUnrest = 5, kMaxUnrest = 0.03;
+/* Seconds: time constant of the variation, and the limit of what one change adds to it. */
+constexpr double kVariationMemory = 5, kMaxVariation = 0.03;
 
-/* A delay that is so far from the last one is of another clock: of a sender or receiver that began
- * anew. */
-constexpr double kOtherClock = 10;
+/* Seconds. A larger step of the delay means that the sender's or receiver's clock was reset. */
+constexpr double kMaxDelayStep = 10;
 
 /* Below the first, loss is never congestion (draft-ietf-rmcat-gcc-02, 6); above the second it is
  * never usual. */
 constexpr double kHarmlessLoss = 0.02, kMaxUsualLoss = 0.1;
 
-/* Packets that must be lost: of one or two nothing follows. */
+/* Lost packets that are needed: one or two mean nothing. */
 constexpr double kMinLost = 2.5;
 
-/* The loss that stays of that before, where less is sent, if it was usual. */
+/* Share of the loss that remains, if it was usual, when less is sent. */
 constexpr double kStays = 0.6;
 
-/* Seconds after which usual loss is doubted: by 1/e. */
+/* Time constant with which the usual loss is forgotten, seconds. */
 constexpr double kMemoryOfLoss = 40;
 
 double
@@ -93,7 +92,7 @@ ArrivalWindow::delivered_bits_per_s () const
     end_ns = std::max (end_ns, e.arrival_ns);
   }
   const Entry &last = at (count_ - 1);
-  if (lost > 0) { /* times of reports with losses are not to be trusted */
+  if (lost > 0) { /* arrival times in reports with losses are unreliable */
     begin_ns = at (first).sent_ns;
     end_ns = last.sent_ns;
   }
@@ -120,15 +119,15 @@ SlidingMinimum::add (std::uint64_t time_ns, double value)
   return std::min (older_, newer_);
 }
 
-/* A packet on its own tells little: of each list of buffers GStreamer's rtpsession knows when the
- * first one came to it, but of the others when the socket took them, which is later where the sink
- * waits for the clock. So bursts of one packet are left out. */
+/* Bursts of one packet are ignored: for the first packet of a buffer list GStreamer's rtpsession
+ * reports the time when it received the list, for the others the time when the socket took them,
+ * which is later if the sink waits for the clock. */
 void
 QueueDelay::add (const PacketReport &packet)
 {
   if (burst_packets_ > 0 && packet.sent_ns - last_sent_ns_ > kBurstNs) {
     if (burst_packets_ > 1 && burst_packets_ < kHead)
-      finish (burst_sent_ns_, first_arrival_ns_);
+      add_burst (burst_sent_ns_, first_arrival_ns_);
     burst_packets_ = 0;
   }
   last_sent_ns_ = packet.sent_ns;
@@ -140,19 +139,19 @@ QueueDelay::add (const PacketReport &packet)
   }
   first_arrival_ns_ = std::min (first_arrival_ns_, packet.arrival_ns);
   if (burst_packets_ == kHead)
-    finish (burst_sent_ns_, first_arrival_ns_);
+    add_burst (burst_sent_ns_, first_arrival_ns_);
 }
 
 void
-QueueDelay::finish (std::uint64_t sent_ns, std::uint64_t arrival_ns)
+QueueDelay::add_burst (std::uint64_t sent_ns, std::uint64_t arrival_ns)
 {
   const double delay = seconds_between (sent_ns, arrival_ns);
-  if (n_ > 0 && std::abs (delay - latest (0).delay_s) > kOtherClock) {
+  if (n_ > 0 && std::abs (delay - latest (0).delay_s) > kMaxDelayStep) {
     n_ = 0;
-    least_.reset ();
-    queue_s_ = growth_s_ = unrest_s_ = 0;
+    min_.reset ();
+    queue_s_ = growth_s_ = variation_s_ = 0;
   }
-  const double least = least_.add (sent_ns, delay);
+  const double min = min_.add (sent_ns, delay);
   const double elapsed = n_ > 0 ? seconds_between (latest (0).sent_ns, sent_ns) : 0;
   samples_[n_++ % samples_.size ()] = {sent_ns, delay, 0};
   const std::size_t known = std::min (n_, samples_.size ());
@@ -162,14 +161,14 @@ QueueDelay::finish (std::uint64_t sent_ns, std::uint64_t arrival_ns)
       break;
     jitter_free = std::min (jitter_free, latest (i).delay_s);
   }
-  queue_s_ = jitter_free - least;
+  queue_s_ = jitter_free - min;
   samples_[(n_ - 1) % samples_.size ()].queue_s = queue_s_;
   std::size_t then = 0;
   while (then + 1 < known && sent_ns - latest (then).sent_ns < kGrowthNs)
     then++;
   growth_s_ = queue_s_ - latest (then).queue_s;
-  unrest_s_ += (1 - std::exp (-elapsed / kMemoryOfUnrest)) *
-               (std::min (std::abs (growth_s_), kMaxUnrest) - unrest_s_);
+  variation_s_ += (1 - std::exp (-elapsed / kVariationMemory)) *
+                  (std::min (std::abs (growth_s_), kMaxVariation) - variation_s_);
   has_update_ = known >= kMinBursts;
 }
 
@@ -198,7 +197,7 @@ LossEvaluator::evaluate (double share, double packets, double elapsed_s)
 }
 
 void
-LossEvaluator::sends_less ()
+LossEvaluator::record_decrease ()
 {
   tries_ = true;
   before_ = share_;

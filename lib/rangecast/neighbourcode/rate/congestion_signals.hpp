@@ -7,27 +7,26 @@
 
 namespace rangecast {
 
-/** What a receiver says of one packet (transport-wide feedback,
- *  draft-holmer-rmcat-transport-wide-cc-extensions-01). Packets of a report are in the order in
- *  which they were sent. */
+/** A receiver's report of one packet (transport-wide feedback,
+ *  draft-holmer-rmcat-transport-wide-cc-extensions-01). Packets of a report are in sending order.
+ */
 struct PacketReport {
-  std::uint16_t sequence = 0;   ///< counts packets sent, wraps
+  std::uint16_t sequence = 0;   ///< number of the packet, wraps
   std::uint64_t sent_ns = 0;    ///< on the sender's clock
-  std::uint64_t arrival_ns = 0; ///< on the receiver's clock, where it is not lost
+  std::uint64_t arrival_ns = 0; ///< on the receiver's clock, unless lost
   std::uint32_t bytes = 0;
   bool lost = false;
 };
 
-/** The packets of the last second: how much of them arrived, and how fast. */
+/** The packets of the last second and the rate at which they were delivered. */
 class ArrivalWindow {
 public:
   void reset () { *this = ArrivalWindow (); }
   void add (const PacketReport &packet);
 
-  /** Bits/s at which bytes arrived; 0: not known yet, which takes three bursts and a third of a
-   *  second. On a link that is full this is its capacity, on another what was sent. Packets of
-   *  which the report got lost count as those around them. Where packets were lost, the time is
-   *  that in which they were sent. */
+  /** Delivered bits/s; 0: not known, until there are three bursts in a third of a second. On a full
+   *  link this is its capacity, else the rate of sending. Packets whose reports were lost are
+   *  interpolated. If packets were lost, sending times are used. */
   [[nodiscard]] double delivered_bits_per_s () const;
 
 private:
@@ -45,11 +44,11 @@ private:
   std::size_t first_ = 0, count_ = 0;
 };
 
-/** The least of what was seen in the last 10 to 20 seconds. */
+/** Minimum over the last 10 to 20 seconds. */
 class SlidingMinimum {
 public:
   void reset () { *this = SlidingMinimum (); }
-  /** @return the least, `value` included */
+  /** Adds a value. @return the minimum, `value` included */
   double add (std::uint64_t time_ns, double value);
 
 private:
@@ -58,9 +57,9 @@ private:
   double older_ = 0, newer_ = 0;
 };
 
-/** How long packets wait in queues, from one-way delays of clocks that need not agree: the delay of
- *  the beginning of each burst (frame set), less the least of the last 10 to 20 seconds
- *  (RFC 8698, 4.2: d_queue); of the last quarter of a second the least, which is free of jitter. */
+/** Queueing delay, from one-way delays between clocks that need not agree: the delay of the
+ * beginning of each burst (frame set) less the minimum of the last 10 to 20 seconds (RFC 8698, 4.2:
+ * d_queue), as the minimum over the last quarter of a second to remove jitter. */
 class QueueDelay {
 public:
   void reset () { *this = QueueDelay (); }
@@ -68,11 +67,11 @@ public:
 
   /** Seconds; 0 before it is known. */
   [[nodiscard]] double queue_s () const { return queue_s_; }
-  /** By how much it is more than half a second before, seconds; negative where it falls. */
+  /** Change over half a second, seconds; negative if the queue shrinks. */
   [[nodiscard]] double growth_s () const { return growth_s_; }
-  /** How much it grows and falls anyhow, seconds: the mean over some seconds. */
-  [[nodiscard]] double unrest_s () const { return unrest_s_; }
-  /** A burst was added since this was called last, and enough are known. */
+  /** Usual size of that change, seconds: its mean over some seconds. */
+  [[nodiscard]] double variation_s () const { return variation_s_; }
+  /** Whether a burst was added since the last call, and enough are known. */
   bool poll_update ();
 
 private:
@@ -80,7 +79,7 @@ private:
     std::uint64_t sent_ns;
     double delay_s, queue_s;
   };
-  void finish (std::uint64_t sent_ns, std::uint64_t arrival_ns);
+  void add_burst (std::uint64_t sent_ns, std::uint64_t arrival_ns);
   [[nodiscard]] const Sample &latest (std::size_t i) const
   {
     return samples_[(n_ - 1 - i) % samples_.size ()];
@@ -88,27 +87,27 @@ private:
 
   std::array<Sample, 64> samples_{}; /* a ring */
   std::size_t n_ = 0;
-  SlidingMinimum least_;
+  SlidingMinimum min_;
   std::uint64_t burst_sent_ns_ = 0, first_arrival_ns_ = 0, last_sent_ns_ = 0;
   int burst_packets_ = 0;
-  double queue_s_ = 0, growth_s_ = 0, unrest_s_ = 0;
+  double queue_s_ = 0, growth_s_ = 0, variation_s_ = 0;
   bool has_update_ = false;
 };
 
-/** Tells losses of a full link from those that come anyhow, as of radio: the latter stay where less
- *  is sent. What stays is the *usual* loss; only more than that is congestion. */
+/** Distinguishes loss on a full link from other loss, such as that of radio links, which remains
+ * when less is sent. The latter is the *usual* loss; only more than that is congestion. */
 class LossEvaluator {
 public:
   /** @param share  of packets lost since the last call, 0 to 1
-   *  @param packets  that it is of
+   *  @param packets  packets since the last call
    *  @param elapsed_s  since the last call
-   *  @return whether it is congestion: the caller then sends less, and says so by sends_less() */
+   *  @return whether it is congestion: the caller then sends less and calls record_decrease() */
   bool evaluate (double share, double packets, double elapsed_s);
-  void sends_less ();
-  /** The latest call found that sending less had not helped. */
+  void record_decrease ();
+  /** The latest evaluate() found that sending less had not helped. */
   [[nodiscard]] bool was_usual () const { return was_usual_; }
   [[nodiscard]] double usual () const { return usual_; }
-  /** Of the latest call. */
+  /** Share of packets lost in the latest evaluate(). */
   [[nodiscard]] double share () const { return share_; }
 
 private:

@@ -7,13 +7,12 @@
 namespace rangecast {
 namespace {
 
-/* Seconds for which a rate must be wrong. */
+/* Seconds for which a rate must be too low, or sufficient for more, before n changes. */
 constexpr double kShort = 0.25, kEnough = 2;
-/* What a frame set may cost more than there is before that counts, and what there must be more than
- * it costs before there are more of them. */
+/* Cost over rate from which the rate is too low, and rate over cost from which n may fall. */
 constexpr double kTooMuch = 1.03, kReserve = 1.2;
 constexpr int kMax = 1000;
-/* Intervals between frame sets: so many are measured, and longer ones (seconds) are pauses. */
+/* Number of intervals to measure, and seconds from which one is a pause. */
 constexpr int kMeasured = 32;
 constexpr double kPause = 2;
 
@@ -22,8 +21,8 @@ constexpr double kPause = 2;
 void
 FrameThinning::measure (const ThinningInput &in, double elapsed_s)
 {
-  if (told_ns_ != in.interval_ns) {
-    told_ns_ = interval_ns_ = in.interval_ns;
+  if (nominal_ns_ != in.interval_ns) {
+    nominal_ns_ = interval_ns_ = in.interval_ns;
     measured_ = 0, measured_s_ = 0;
   }
   if (elapsed_s <= 0 || elapsed_s > kPause)
@@ -33,25 +32,25 @@ FrameThinning::measure (const ThinningInput &in, double elapsed_s)
     return;
   const double mean_s = measured_s_ / measured_;
   measured_ = 0, measured_s_ = 0;
-  const double slower = mean_s / (1e-9 * static_cast<double> (told_ns_)), faster = 1 / slower;
-  interval_ns_ = slower >= 1 ? told_ns_ * static_cast<std::uint64_t> (std::round (slower))
-                             : told_ns_ / static_cast<std::uint64_t> (std::round (faster));
+  const double slower = mean_s / (1e-9 * static_cast<double> (nominal_ns_)), faster = 1 / slower;
+  interval_ns_ = slower >= 1 ? nominal_ns_ * static_cast<std::uint64_t> (std::round (slower))
+                             : nominal_ns_ / static_cast<std::uint64_t> (std::round (faster));
 }
 
 void
 FrameThinning::adjust (const ThinningInput &in, double elapsed_s)
 {
   const double fps = 1e9 / static_cast<double> (interval_ns_);
-  const int most = in.least_fps > 0
-                       ? static_cast<int> (std::clamp (fps / in.least_fps, 1.0, double (kMax)))
-                       : kMax;
+  const int max = in.least_fps > 0
+                      ? static_cast<int> (std::clamp (fps / in.least_fps, 1.0, double (kMax)))
+                      : kMax;
   const double share = in.bits_per_s > 0 ? in.least_bits * fps / in.bits_per_s : 0;
   const auto one_of = [&] (double x) {
-    return static_cast<int> (std::ceil (std::clamp (x, 1.0, double (most))));
+    return static_cast<int> (std::ceil (std::clamp (x, 1.0, double (max))));
   };
   short_s_ = share > kTooMuch * one_of_ ? short_s_ + elapsed_s : 0;
   enough_s_ = one_of (kReserve * share) < one_of_ ? enough_s_ + elapsed_s : 0;
-  if (short_s_ > kShort || one_of_ > most)
+  if (short_s_ > kShort || one_of_ > max)
     one_of_ = one_of (share);
   else if (enough_s_ > kEnough)
     one_of_ = one_of (kReserve * share);

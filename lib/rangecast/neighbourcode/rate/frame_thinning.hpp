@@ -5,27 +5,27 @@
 
 namespace rangecast {
 
-/** What a stream may cost, and what it costs. */
+/** Rate and cost of a stream at one frame set. */
 struct ThinningInput {
   std::uint64_t time_ns = 0;     ///< of the frame set's capture
-  std::uint64_t interval_ns = 0; ///< of frame sets, as the stream says
-  double bits_per_s = 0;         ///< that there are; 0: no limit
+  std::uint64_t interval_ns = 0; ///< between frame sets, from the caps
+  double bits_per_s = 0;         ///< available rate; 0: no limit
   double least_bits = 0;         ///< of a frame set at the worst quality; 0: not known
-  double least_fps = 1;          ///< frame sets a second that are kept at least
+  double least_fps = 1;          ///< least number of frame sets a second to keep
 };
 
-/** Leaves out whole frame sets where the worst quality still takes more than there is: one of n is
- *  kept, evenly. Which ones goes by their time alone, so that encoders on hosts whose clocks agree
- *  keep the same ones. n rises within a quarter of a second, and falls where for two seconds there
- *  was a fifth more than it takes. Where frame sets come twice as fast or half as fast as the
- *  stream says, or more so, that whole multiple counts; one that comes with gaps still goes by what
- *  the stream says, and keeps what others keep. Nothing is allocated. */
+/** Drops whole frame sets when the worst quality still exceeds the rate: one of n is kept, evenly.
+ *  Which ones depends on their time alone, so that encoders on hosts with synchronised clocks keep
+ *  the same ones. n rises within a quarter of a second, and falls after two seconds in which the
+ * rate was a fifth above what is needed. If frame sets arrive at a multiple or a fraction of the
+ * nominal rate, the interval is scaled by that whole number; gaps do not change it. Nothing is
+ * allocated. */
 class FrameThinning {
 public:
   void reset () { *this = FrameThinning (); }
-  /** @return false: the frame set is left out. Once for each that comes. */
+  /** To be called once for each frame set. @return false if it is to be dropped */
   bool keep (const ThinningInput &input);
-  /** n. */
+  /** n: one of so many frame sets is kept. */
   [[nodiscard]] int one_of () const { return one_of_; }
 
 private:
@@ -33,11 +33,12 @@ private:
   void adjust (const ThinningInput &input, double elapsed_s);
 
   int one_of_ = 1;
-  double short_s_ = 0, enough_s_ = 0; /* since when the rate has been wrong */
+  double short_s_ = 0,
+         enough_s_ = 0; /* for how long the rate has been too low, or sufficient for more */
   bool has_time_ = false;
-  std::uint64_t told_ns_ = 0, interval_ns_ = 0; /* as the stream says; what counts */
+  std::uint64_t nominal_ns_ = 0, interval_ns_ = 0; /* from the caps; as measured */
   int measured_ = 0;
-  double measured_s_ = 0;                /* of so many intervals as they came */
+  double measured_s_ = 0;                /* sum of so many measured intervals */
   std::uint64_t time_ns_ = 0, kept_ = 0; /* kept_: time in units of one_of_ intervals */
 };
 

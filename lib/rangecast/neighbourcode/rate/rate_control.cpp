@@ -7,45 +7,43 @@
 namespace rangecast {
 namespace {
 
-/* Seconds. The account is paid back over the first. What refreshes cost more is paid in two steps
- * of the second each: of large ones, one a second, every frame set then bears the same within 6 %.
- */
+/* Seconds. The account is paid back over kPayBack. The extra bytes of refreshes pass two stages of
+ * kSpread each; with one large refresh a second all frame sets then pay the same within 6 %. */
 constexpr double kPayBack = 1.0, kSpread = 1.0;
 
-/* The share of the target that refreshes take of other frame sets at most, and the seconds' worth
- * of bytes that each of the two steps holds at most: what refreshes of that share come to. */
+/* Greatest share of the target that refreshes take from other frame sets, and the greatest content
+ * of each of the two stages, in seconds of the target: what refreshes of that share amount to. */
 constexpr double kMaxForRefreshes = 0.9, kMaxSpread = 1.6;
 
 constexpr double kMemoryOfModel = 0.3, kMemoryOfInterval = 0.5;
 
-/* A frame set that comes later, or so many intervals later, than the one before is a new beginning:
- * nothing was saved while nothing was there. */
+/* A longer pause, in seconds or intervals, is a discontinuity: nothing is saved during it. */
 constexpr double kLongestPause = 2, kMaxIntervals = 4;
 
-/* A target that differs by more is another one; by less it is the old one that follows a network.
- */
+/* A target that differs by a greater share begins a new account; a smaller change is congestion
+ * control following the network. */
 constexpr double kOtherTarget = 0.125;
 
-/* What a share of the target a frame set is planned for at least and at most. */
-constexpr double kMinShare = 0.7, kGreatestShare = 1.3;
+/* Limits of the planned size of a frame set, as a share of the target. */
+constexpr double kMinShare = 0.7, kMaxShare = 1.3;
 
-/* Seconds' worth of bytes that the account holds at most. Little where nothing can be done about
- * it: at the limits, and while nobody is there. */
+/* Limits of the account, in seconds of the target: kLittle where thresholds cannot change it, at
+ * their limits and while the scene is empty. */
 constexpr double kMaxDebt = 0.5, kMaxCredit = 0.25, kLittle = 0.05;
 
-/* Logarithms of a threshold a second. More where the model says that bytes are far from the plan.
- */
+/* Speed of thresholds, logarithms a second: kSlowest, and more when the predicted size is farther
+ * than kFarOff from the plan. */
 constexpr double kSlowest = 1.5, kFaster = 8, kFarOff = 0.2;
 
-/* A whole threshold stays until the wanted one is half a code from it and so much more, codes for
- * each code. Where thresholds are small, bytes differ much from one to the next, and nobody sees
- * them change: there it is better to go to and fro between the two that the target lies between. */
+/* A threshold changes when the wanted one differs by half a code plus this, codes per code. Small
+ * thresholds have little hysteresis: their sizes differ much from one to the next and changes are
+ * not visible, so alternating between two neighbours meets the target better. */
 constexpr double kHysteresis = 0.02, kMaxHysteresis = 0.25;
 
-/* b of the model: what recordings came to, and limits. */
-constexpr double kFirstSlope = 0.6, kMinSlope = 0.15, kGreatestSlope = 1.6;
+/* b of the model: the value for recordings, and limits. */
+constexpr double kFirstSlope = 0.6, kMinSlope = 0.15, kMaxSlope = 1.6;
 
-/* Logarithm of bits by which a frame set is none that the model may follow at once. */
+/* Error of the model, logarithm of bits, from which a single frame set is an outlier. */
 constexpr double kOutlier = 0.3;
 
 double
@@ -54,7 +52,7 @@ log_ratio (int worst, int best)
   return std::log ((worst + 0.5) / (best + 0.5));
 }
 
-/* How much of the new to take for a memory of some seconds. */
+/* Weight of a new value in an exponential average with that time constant. */
 double
 gain (double elapsed_s, double memory_s)
 {
@@ -73,12 +71,11 @@ with_hysteresis (int present, double wanted)
 double
 RateControl::threshold_at (int best, int worst, double x) const
 {
-  const double share = most_x_ > 0 ? x / most_x_ : 0;
+  const double share = max_x_ > 0 ? x / max_x_ : 0;
   return (best + 0.5) * std::exp (share * log_ratio (worst, best)) - 0.5;
 }
 
-/* Of thresholds that are whole numbers, the x that gives their mean place between best and worst.
- */
+/* The x of whole-number thresholds: their mean position between best and worst. */
 double
 RateControl::coarseness_of (const Thresholds &t) const
 {
@@ -92,7 +89,7 @@ RateControl::coarseness_of (const Thresholds &t) const
   };
   add (depth_span_, t.depth, settings_.best.depth);
   add (colour_span_, t.colour, settings_.best.colour);
-  return n > 0 ? most_x_ * sum / n : 0;
+  return n > 0 ? max_x_ * sum / n : 0;
 }
 
 void
@@ -115,7 +112,7 @@ RateControl::configure (const RateSettings &wanted)
     return;
   depth_span_ = log_ratio (settings.worst.depth, settings.best.depth);
   colour_span_ = log_ratio (settings.worst.colour, settings.best.colour);
-  most_x_ = std::max (depth_span_, colour_span_);
+  max_x_ = std::max (depth_span_, colour_span_);
   thresholds_ = {std::clamp (before.depth, settings.best.depth, settings.worst.depth),
       std::clamp (before.colour, settings.best.colour, settings.worst.colour)};
   if (first) {
@@ -132,21 +129,7 @@ RateControl::configure (const RateSettings &wanted)
   x_ = x;
 }
 
-void
-RateControl::take_time (std::uint64_t time_ns)
-{
-  const double elapsed =
-      has_time_ ? 1e-9 * static_cast<double> (static_cast<std::int64_t> (time_ns - time_ns_)) : -1;
-  const bool goes_on =
-      elapsed > 0 && elapsed < std::max (kLongestPause, kMaxIntervals * interval_s_);
-  elapsed_s_ = goes_on ? elapsed : interval_s_;
-  if (goes_on)
-    interval_s_ += gain (elapsed, kMemoryOfInterval) * (elapsed - interval_s_);
-  has_time_ = true;
-  time_ns_ = time_ns;
-}
-
-/* What the next frame set bears of the refreshes before it, bytes. */
+/* Bytes of earlier refreshes that the next frame set pays back. */
 double
 RateControl::pay_for_refreshes ()
 {
@@ -166,15 +149,23 @@ RateControl::plan_bytes ()
   const double fair = bytes_per_s () * elapsed_s_ - pay_for_refreshes ();
   account_ -= fair;
   const double usual = fair * interval_s_ / elapsed_s_;
-  const double excess = account_ + usual; /* if this one is as it should be */
+  const double excess = account_ + usual; /* if this one has its usual size */
   const double share = 1 - excess / usual * std::min (interval_s_ / kPayBack, 0.5);
-  return usual * std::clamp (share, kMinShare, kGreatestShare);
+  return usual * std::clamp (share, kMinShare, kMaxShare);
 }
 
 Thresholds
 RateControl::next (std::uint64_t time_ns, std::uint64_t pixels)
 {
-  take_time (time_ns);
+  const double elapsed =
+      has_time_ ? 1e-9 * static_cast<double> (static_cast<std::int64_t> (time_ns - time_ns_)) : -1;
+  const bool continues =
+      elapsed > 0 && elapsed < std::max (kLongestPause, kMaxIntervals * interval_s_);
+  elapsed_s_ = continues ? elapsed : interval_s_;
+  if (continues)
+    interval_s_ += gain (elapsed, kMemoryOfInterval) * (elapsed - interval_s_);
+  has_time_ = true;
+  time_ns_ = time_ns;
   const double planned = plan_bytes ();
   const double points = fill_ * static_cast<double> (pixels);
   if (points >= 1) {
@@ -182,8 +173,8 @@ RateControl::next (std::uint64_t time_ns, std::uint64_t pixels)
     const double wanted = (bits_at_best - std::log (8 * planned)) / b_;
     const double far_off = std::abs (wanted - x_) * b_ - kFarOff;
     const double speed = kSlowest + kFaster * std::max (0.0, far_off);
-    const double most = frames_ > 0 ? speed * elapsed_s_ : most_x_;
-    x_ = std::clamp (x_ + std::clamp (wanted - x_, -most, most), 0.0, most_x_);
+    const double max_step = frames_ > 0 ? speed * elapsed_s_ : max_x_;
+    x_ = std::clamp (x_ + std::clamp (wanted - x_, -max_step, max_step), 0.0, max_x_);
   }
   const RateSettings &s = settings_;
   thresholds_ = {
@@ -198,10 +189,10 @@ RateControl::learn (double bits)
 {
   const double x = coarseness_of (thresholds_), dx = x - learnt_x_;
   if (frames_ > 0 && std::abs (dx) > 0.01) {
-    const double slope = std::clamp ((learnt_bits_ - bits) / dx, kMinSlope, kGreatestSlope);
+    const double slope = std::clamp ((learnt_bits_ - bits) / dx, kMinSlope, kMaxSlope);
     const double before = b_;
     b_ += dx * dx / (dx * dx + 0.05) * (slope - b_);
-    a_ += (b_ - before) * learnt_x_; /* where it was, the model stays right */
+    a_ += (b_ - before) * learnt_x_; /* keeps the prediction at the old x */
   }
   const double error = bits + b_ * x - a_;
   const bool outlier = frames_ > 0 && std::abs (error) > kOutlier;
@@ -213,19 +204,10 @@ RateControl::learn (double bits)
   learnt_bits_ = bits;
 }
 
-void
-RateControl::limit_account ()
-{
-  const double second = bytes_per_s ();
-  const double debt = x_ >= most_x_ ? kLittle : kMaxDebt;
-  const double credit = x_ <= 0 ? kLittle : kMaxCredit;
-  account_ = std::clamp (account_, -credit * second, debt * second);
-}
-
 double
 RateControl::least_bits () const
 {
-  return frames_ > 0 ? points_ * std::exp (a_ - b_ * most_x_) : 0;
+  return frames_ > 0 ? points_ * std::exp (a_ - b_ * max_x_) : 0;
 }
 
 void
@@ -237,11 +219,13 @@ RateControl::coded (const CodedFrame &frame)
   points_ = points;
   const double usual = points * std::exp (a_ - b_ * coarseness_of (thresholds_)) / 8;
   const double more = refresh ? std::max (0.0, bytes - usual) : 0;
-  entering_ = std::min (entering_ + more, kMaxSpread * bytes_per_s ());
-  account_ += bytes - more;
-  limit_account ();
+  const double second = bytes_per_s ();
+  entering_ = std::min (entering_ + more, kMaxSpread * second);
+  const double debt = x_ >= max_x_ ? kLittle : kMaxDebt;
+  const double credit = x_ <= 0 ? kLittle : kMaxCredit;
+  account_ = std::clamp (account_ + (bytes - more), -credit * second, debt * second);
   if (frame.points == 0 || frame.bytes == 0) {
-    account_ = std::max (account_, -kLittle * bytes_per_s ());
+    account_ = std::max (account_, -kLittle * second);
     return;
   }
   if (refresh)

@@ -17,31 +17,31 @@ struct Thresholds {
 
 struct RateSettings {
   double bits_per_s = 0;        ///< the target; > 0
-  Thresholds best;              ///< never below
-  Thresholds worst;             ///< never above, where `best` is not
-  double bits_per_point = 8;    ///< a guess for the first frame set, at `best`
-  double interval_s = 1.0 / 30; ///< a guess, of frame sets; 0: the default
+  Thresholds best;              ///< lower limits
+  Thresholds worst;             ///< upper limits, unless `best` is above
+  double bits_per_point = 8;    ///< estimate for the first frame set, at `best`
+  double interval_s = 1.0 / 30; ///< estimated interval of frame sets, seconds; 0: the default
 
   friend bool operator== (const RateSettings &, const RateSettings &) = default;
 };
 
-/** What one frame set came to. */
+/** Size of one coded frame set. */
 struct CodedFrame {
   std::uint64_t bytes = 0;
-  std::uint64_t points = 0; ///< valid pixels; 0: nobody is there
+  std::uint64_t points = 0; ///< valid pixels; 0: the scene is empty
   std::uint64_t pixels = 0; ///< of all ROIs
-  bool refresh = false;     ///< a key frame set among others that are smaller
+  bool refresh = false;     ///< a key frame set in a stream of smaller ones
 };
 
-/** Chooses thresholds so that coded frame sets come to a bit rate.
+/** Chooses thresholds so that coded frame sets meet a bit rate.
  *
- *  Quality is one number, *coarseness* x >= 0: with it the logarithms of both thresholds (+ 1/2)
- *  rise evenly from the best to the worst. A model says what a frame set comes to,
+ *  Quality is one number, *coarseness* x >= 0: the logarithms of both thresholds (+ 1/2) rise
+ *  linearly with it from the best to the worst. A model predicts the size of a frame set,
  *      bits = points * exp (a - b * x)
- *  of which a follows every frame set and b each change of x. An account holds what was sent beyond
- *  the target; it is paid back over about a second, what key frame sets cost more over two. From
- * one frame set to the next thresholds move little, and by hysteresis seldom: usually by one code
- * in one of the two.
+ *  where a adapts to every frame set and b to each change of x. An account holds the bytes sent
+ *  beyond the target; it is paid back over about a second, the extra bytes of key frame sets over
+ *  two. From one frame set to the next thresholds change little, and because of hysteresis rarely:
+ *  usually by one code in one of the two.
  *
  *  Time is that of the frame sets. Nothing is allocated. Not thread-safe. */
 class RateControl {
@@ -50,37 +50,35 @@ public:
   void reset () { *this = RateControl (); }
 
   /** May be called before every frame set. A target that differs by more than an eighth
-   *  begins a new account; thresholds go on from what they are, within the new limits. */
+   *  begins a new account; thresholds continue from their values, within the new limits. */
   void configure (const RateSettings &settings);
 
   /** The thresholds for the next frame set, once for each.
-   *  @param time_ns  of its capture; differences count, and what goes backwards or jumps ahead by
-   *  more than some seconds is a new beginning
+   *  @param time_ns  capture time; steps back, or ahead by more than some seconds, are
+   *  discontinuities
    *  @param pixels  of all its ROIs: more pixels are expected to need more bytes */
   Thresholds next (std::uint64_t time_ns, std::uint64_t pixels);
 
-  /** What the frame set of the latest next() came to. */
+  /** Reports the size of the frame set of the latest next(). */
   void coded (const CodedFrame &frame);
 
   [[nodiscard]] double coarseness () const { return x_; }
 
-  /** What the latest frame set would come to at the worst thresholds, bits; 0 before the first. */
+  /** Predicted size of the latest frame set at the worst thresholds, bits; 0 before the first. */
   [[nodiscard]] double least_bits () const;
 
 private:
   [[nodiscard]] double threshold_at (int best, int worst, double x) const;
   [[nodiscard]] double coarseness_of (const Thresholds &thresholds) const;
   [[nodiscard]] double bytes_per_s () const { return settings_.bits_per_s / 8; }
-  void take_time (std::uint64_t time_ns);
   double pay_for_refreshes ();
   double plan_bytes ();
   void learn (double bits_per_point);
-  void limit_account ();
 
   RateSettings settings_;
   bool configured_ = false;
   double depth_span_ = 0, colour_span_ = 0; /* logarithms of worst / best */
-  double x_ = 0, most_x_ = 0;
+  double x_ = 0, max_x_ = 0;
   Thresholds thresholds_;
   double learnt_x_ = 0, learnt_bits_ = 0; /* of the latest frame set with points */
   int frames_ = 0;                        /* learnt from, up to a few */
@@ -92,8 +90,8 @@ private:
   std::uint64_t time_ns_ = 0;
   double interval_s_ = 0, elapsed_s_ = 0;
   double account_ = 0; /* bytes sent beyond the target */
-  /* Bytes of refreshes beyond what other frame sets have that are still to be paid: those that go
-   * over into spread_ first. */
+  /* Bytes of refreshes beyond the size of other frame sets that are still to be paid back: they
+   * move from entering_ to spread_, and are paid from there. */
   double entering_ = 0, spread_ = 0;
 };
 
@@ -102,8 +100,9 @@ class RateMeter {
 public:
   void reset () { *this = RateMeter (); }
   void add (std::uint64_t time_ns, std::uint64_t bytes);
-  /** Until two seconds are full, that of all frame sets so far, the first among them.
-   *  @param interval_ns  of frame sets, where there is only one; 0 = not known, and then no rate */
+  /** The rate; until two seconds are full, of all frame sets so far.
+   *  @param interval_ns  nominal interval, used if there is only one frame set; 0 = not known, then
+   *  the rate is 0 */
   [[nodiscard]] double bits_per_s (std::uint64_t interval_ns = 0) const;
 
 private:
