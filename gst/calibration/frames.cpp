@@ -6,13 +6,13 @@
 
 using rangecast::StatusCode;
 
-ImageSet::~ImageSet ()
+CalibrationImages::~CalibrationImages ()
 {
   for (GstBuffer *&buffer : buffers)
     gst_clear_buffer (&buffer);
 }
 
-MappedImages::MappedImages (ImageSet &set) : views (set.cameras.size ())
+MappedImages::MappedImages (CalibrationImages &set) : views (set.cameras.size ())
 {
   for (std::size_t i = 0; i < set.cameras.size () && status.ok (); i++)
     if (set.buffers[i])
@@ -26,7 +26,7 @@ MappedImages::~MappedImages ()
 }
 
 void
-MappedImages::open (ImageSet &set, std::size_t i)
+MappedImages::open (CalibrationImages &set, std::size_t i)
 {
   CameraInput &camera = *set.cameras[i];
   const std::string &name = set.described[i].name;
@@ -105,10 +105,10 @@ drop_unmatched (const CameraInputs &cameras, const PadFronts &fronts, GstClockTi
   return any;
 }
 
-std::shared_ptr<ImageSet>
+std::shared_ptr<CalibrationImages>
 pop_images (const CameraInputs &cameras, const PadFronts &fronts, guint64 number)
 {
-  auto set = std::make_shared<ImageSet> ();
+  auto set = std::make_shared<CalibrationImages> ();
   set->cameras = cameras;
   set->buffers.resize (cameras.size ());
   set->number = number;

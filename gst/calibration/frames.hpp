@@ -32,7 +32,7 @@ struct CameraInput {
 using CameraInputs = std::vector<std::shared_ptr<CameraInput>>;
 
 /** Images of one moment on their way to the board detector; vectors are by camera. */
-struct ImageSet {
+struct CalibrationImages {
   CameraInputs cameras;
   std::vector<rangecast::CalibrationCamera> described;
   std::vector<GstVideoInfo> infos;
@@ -43,16 +43,16 @@ struct ImageSet {
   int tile_width = 0;
   bool auto_finish = false;
 
-  ImageSet () = default;
-  ImageSet (const ImageSet &) = delete;
-  ImageSet &operator= (const ImageSet &) = delete;
-  ~ImageSet ();
+  CalibrationImages () = default;
+  CalibrationImages (const CalibrationImages &) = delete;
+  CalibrationImages &operator= (const CalibrationImages &) = delete;
+  ~CalibrationImages ();
 };
 
 /** Maps the images of a set as long as it lives. */
 class MappedImages {
 public:
-  explicit MappedImages (ImageSet &set);
+  explicit MappedImages (CalibrationImages &set);
   ~MappedImages ();
   MappedImages (const MappedImages &) = delete;
   MappedImages &operator= (const MappedImages &) = delete;
@@ -61,7 +61,7 @@ public:
   rangecast::Status status;
 
 private:
-  void open (ImageSet &set, std::size_t i);
+  void open (CalibrationImages &set, std::size_t i);
 
   std::vector<CameraInput *> open_;
 };
@@ -96,5 +96,5 @@ bool drop_unmatched (const CameraInputs &cameras, const PadFronts &fronts, GstCl
     GstDebugCategory *category, guint64 &dropped);
 
 /** Takes the front images off their pads. */
-std::shared_ptr<ImageSet> pop_images (
+std::shared_ptr<CalibrationImages> pop_images (
     const CameraInputs &cameras, const PadFronts &fronts, guint64 number);

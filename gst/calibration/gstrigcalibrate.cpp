@@ -187,7 +187,7 @@ calibrate (GstRigCalibrate *self, std::stop_token stop)
 
 /* Draws the images with the corners found, for the streaming thread to push. */
 static void
-draw_still (GstRigCalibrate *self, const ImageSet &set, const MappedImages &images)
+draw_still (GstRigCalibrate *self, const CalibrationImages &set, const MappedImages &images)
 {
   GstRigCalibratePrivate *priv = self->priv;
   const TileLayout layout = rangecast::lay_out (set.described, set.tile_width);
@@ -210,7 +210,7 @@ draw_still (GstRigCalibrate *self, const ImageSet &set, const MappedImages &imag
 
 /* Looks for the board. @param[out] taken  whether the set was kept */
 static Status
-examine (GstRigCalibrate *self, ImageSet &set, bool &taken)
+examine (GstRigCalibrate *self, CalibrationImages &set, bool &taken)
 {
   GstRigCalibratePrivate *priv = self->priv;
   if (set.begin)
@@ -242,7 +242,7 @@ examine (GstRigCalibrate *self, ImageSet &set, bool &taken)
 
 /* With auto-finish, complete coverage ends the stream: after calibration, or with its error. */
 static void
-examine_job (GstRigCalibrate *self, ImageSet &set, std::stop_token stop)
+examine_job (GstRigCalibrate *self, CalibrationImages &set, std::stop_token stop)
 {
   GstRigCalibratePrivate *priv = self->priv;
   bool taken = false, finished = false;
@@ -329,7 +329,8 @@ push_still (GstRigCalibrate *self, GstClockTime running)
 
 /* Checks the cameras of the first set and decides how to select frames. */
 static Status
-begin_session (GstRigCalibrate *self, ImageSet &set, const RigCalibrateSettings &p, bool live)
+begin_session (
+    GstRigCalibrate *self, CalibrationImages &set, const RigCalibrateSettings &p, bool live)
 {
   if (Status s = rangecast::check_cameras (set.described, p.core.board); !s.ok ())
     return s;
@@ -349,7 +350,7 @@ begin_session (GstRigCalibrate *self, ImageSet &set, const RigCalibrateSettings 
 
 /* Posts a set as a job, waits for it unless live, and pushes the preview. */
 static GstFlowReturn
-examine_set (GstRigCalibrate *self, std::shared_ptr<ImageSet> set, bool live)
+examine_set (GstRigCalibrate *self, std::shared_ptr<CalibrationImages> set, bool live)
 {
   GstRigCalibratePrivate *priv = self->priv;
   const RigCalibrateSettings p = current_settings (self);

@@ -65,7 +65,7 @@ SetOutput::capture_time (const ImageSet &set) const
   if (GST_CLOCK_TIME_IS_VALID (set.trigger_time))
     return set.trigger_time;
   GstClock *clock = clock_of_element (element_);
-  const std::int64_t age_ns = monotonic_ns () - set.exposed_ns;
+  const std::int64_t age_ns = monotonic_ns () - set.taken_ns;
   const auto now_ns = static_cast<std::int64_t> (gst_clock_get_time (clock));
   gst_object_unref (clock);
   std::int64_t time_ns = std::max<std::int64_t> (now_ns - age_ns, 0);

@@ -356,7 +356,7 @@ FramePairing::complete (FrameSets::Set &frames, ImageSet &set)
   spread_.add (spread_ns);
   set.trigger_time = by_ == TriggeredBy::kElement ? triggers_[frames.keys[0] % kMaxTriggers].time
                                                   : GST_CLOCK_TIME_NONE;
-  set.exposed_ns = waiting (0)->taken_ns;
+  set.taken_ns = waiting (0)->taken_ns;
   for (int c = 0; c < cameras_; c++) {
     set.images[c] = std::move (waiting (c)->frame.buffer);
     release (waiting (c));

@@ -18,8 +18,8 @@ using rangecast::kMaxCameras;
 /** Images of all cameras that were exposed at the same time. */
 struct ImageSet {
   std::array<GstBufferPtr, kMaxCameras> images;
-  GstClockTime trigger_time = GST_CLOCK_TIME_NONE; ///< on the pipeline clock; NONE: see exposed_ns
-  std::int64_t exposed_ns = 0; ///< exposure of the left image, g_get_monotonic_time
+  GstClockTime trigger_time = GST_CLOCK_TIME_NONE; ///< on the pipeline clock; NONE: see taken_ns
+  std::int64_t taken_ns = 0; ///< capture time of the left image, g_get_monotonic_time () * 1000
 };
 
 /** Counters since the session began. */

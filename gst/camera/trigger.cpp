@@ -87,9 +87,10 @@ CameraTrigger::request (GstClockTime time)
 void
 CameraTrigger::run ()
 {
-  const ScopedRealtimePriority priority; /* threads of the pool inherit it */
   if (settings_.trigger == TriggerMode::kSoftware) {
     const auto call = [] (gpointer camera, gpointer self) {
+      /* For this call only: GLib gives threads of a pool to other pools afterwards. */
+      const ScopedRealtimePriority priority;
       auto trigger = static_cast<CameraTrigger *> (self);
       const CameraStatus status = static_cast<Camera *> (camera)->trigger_software ();
       if (!status.ok ())
@@ -108,6 +109,7 @@ CameraTrigger::run ()
       running_ = false;
     }
   }
+  const ScopedRealtimePriority priority; /* not before: threads of the pool would inherit it */
   std::unique_lock guard (lock_);
   while (running_) {
     if (!playing_ || (on_request_ && requests_.empty ())) {

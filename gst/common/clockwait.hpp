@@ -11,17 +11,21 @@ class ClockWait {
 public:
   /** Waits until `time` on `clock`; a time that has passed ends the wait at once.
    *  @param guard  locked; check the condition for waiting under this lock
-   *  @return false if interrupt() ended the wait */
+   *  @return false if the time has not come: interrupt() ended the wait, or the clock cannot be
+   * waited for, which costs 10 ms, so that callers may try again */
   bool wait_until (std::unique_lock<std::mutex> &guard, GstClock *clock, GstClockTime time)
   {
     GstClockID id = gst_clock_new_single_shot_id (clock, time);
     waiting_ = id;
     guard.unlock ();
     const GstClockReturn result = gst_clock_id_wait (id, nullptr);
+    const bool reached = result == GST_CLOCK_OK || result == GST_CLOCK_EARLY;
+    if (!reached && result != GST_CLOCK_UNSCHEDULED)
+      g_usleep (10000);
     guard.lock ();
     waiting_ = nullptr;
     gst_clock_id_unref (id);
-    return result != GST_CLOCK_UNSCHEDULED;
+    return reached;
   }
 
   /** Ends the wait in progress, if there is one. Call with the mutex locked. */

@@ -140,7 +140,8 @@ make_depth_view (const ViewSettings &settings, int width, int height, View &view
     view = make_pinhole_view (settings, focal_length, width, height);
     view.far_m = kDefaultFar;
   } else {
-    if (Status s = load_view (settings.rig, settings.view_id, width, height, view); !s.ok ())
+    if (Status s = load_view (settings.rig, settings.view_id, "view-id", width, height, view);
+        !s.ok ())
       return s;
     view.right.reset ();
     view.third.reset ();
@@ -158,8 +159,8 @@ make_colour_view (
     if (settings.view.rig.empty ())
       return {StatusCode::kBadValue, "property colour-view-id: expected property rig, too: a file "
                                      "with the poses of both cameras"};
-    const Status status =
-        load_view (settings.view.rig, settings.colour_view_id, width, height, view);
+    const Status status = load_view (
+        settings.view.rig, settings.colour_view_id, "colour-view-id", width, height, view);
     view.right.reset ();
     view.third.reset ();
     return status;

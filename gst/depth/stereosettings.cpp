@@ -128,7 +128,7 @@ make_stereo_view (const StereoDepthSettings &settings, int width, int height, Vi
 {
   const ViewSettings &v = settings.view;
   if (!v.rig.empty ()) {
-    if (Status s = load_view (v.rig, v.view_id, width, height, view); !s.ok ())
+    if (Status s = load_view (v.rig, v.view_id, "view-id", width, height, view); !s.ok ())
       return s;
   } else if (v.focal_length <= 0 || settings.baseline <= 0) {
     return {StatusCode::kNotFound,

@@ -8,15 +8,17 @@ using rangecast::StatusCode;
 using rangecast::View;
 
 Status
-load_view (const std::string &rig_file, int view_id, int width, int height, View &view)
+load_view (const std::string &rig_file, int view_id, const char *property, int width, int height,
+    View &view)
 {
   rangecast::Rig rig;
   if (Status s = rangecast::load_rig (rig_file, rig); !s.ok ())
     return s;
   const View *found = rig.find (view_id);
   if (!found)
-    return {
-        StatusCode::kNotFound, rig_file + ": has no view with view-id " + std::to_string (view_id)};
+    return {StatusCode::kNotFound, rig_file + ": has no view with view-id " +
+                                       std::to_string (view_id) + ", the value of property " +
+                                       property};
   view = *found;
   const Status scaled = rangecast::scale_view (view, width, height);
   return scaled.ok () ? scaled : Status{scaled.code (), rig_file + ": " + scaled.message ()};

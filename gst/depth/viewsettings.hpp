@@ -14,10 +14,11 @@ struct ViewSettings {
 };
 
 /** Loads a view from a rig file and scales it to the size of the images.
+ *  @param property  the name of the property that gives `view_id`, for the error
  *  @return the error of load_rig(); kNotFound if the rig lacks the view; kBadSize if it is for
  * images of another shape */
-rangecast::Status load_view (
-    const std::string &rig_file, int view_id, int width, int height, rangecast::View &view);
+rangecast::Status load_view (const std::string &rig_file, int view_id, const char *property,
+    int width, int height, rangecast::View &view);
 
 /** A pinhole camera at the world's origin that looks along -z. `focal_length` is in pixels. */
 rangecast::View make_pinhole_view (

@@ -1,13 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "outputtask.hpp"
 
-OutputTask::~OutputTask ()
-{
-  if (id_)
-    gst_clock_id_unref (id_);
-  gst_clear_object (&clock_);
-}
-
 bool
 OutputTask::start (GstPad *src, Tick tick)
 {
@@ -22,7 +15,12 @@ OutputTask::start (GstPad *src, Tick tick)
   const auto function = [] (gpointer self) { static_cast<OutputTask *> (self)->iterate (); };
   if (gst_pad_start_task (src, function, this, nullptr))
     return true;
-  stop ();
+  /* Without a thread GstTask takes itself for running (1.22), and to join it would never end. */
+  GST_OBJECT_LOCK (src);
+  gst_clear_object (&GST_PAD_TASK (src));
+  GST_OBJECT_UNLOCK (src);
+  std::lock_guard guard (lock_);
+  src_ = nullptr;
   return false;
 }
 
@@ -40,6 +38,8 @@ OutputTask::stop ()
     gst_pad_stop_task (src);
   std::lock_guard guard (lock_);
   src_ = nullptr;
+  g_clear_pointer (&id_, gst_clock_id_unref);
+  gst_clear_object (&clock_);
 }
 
 /* With the lock. A clock that is about to be waited for returns at once, too. */

@@ -17,7 +17,6 @@ public:
   OutputTask () = default;
   OutputTask (const OutputTask &) = delete;
   OutputTask &operator= (const OutputTask &) = delete;
-  ~OutputTask ();
 
   /** Called without a lock.
    *  @return running time of the next call, ns; GST_CLOCK_TIME_NONE: when wake() is called */

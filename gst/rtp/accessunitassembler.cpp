@@ -8,7 +8,8 @@
 bool
 AccessUnitAssembler::grow (gsize needed)
 {
-  GstMemory *larger = memories_.acquire (std::max ({needed, 2 * map_.size, expected_}));
+  GstMemory *larger = memories_.acquire (std::min<gsize> (
+      std::max ({needed, 2 * map_.size, expected_}), rangecast::kMaxAccessUnitSize));
   if (!larger)
     return false;
   GstMapInfo map;

@@ -29,6 +29,11 @@ struct CameraInfo {
     return same (id, other.id) || same (address, other.address) ||
            same (physical_id, other.physical_id);
   }
+  /** Whether it can be opened under this name without asking it for its user-defined one. */
+  [[nodiscard]] bool is_listed_as (const std::string &name) const
+  {
+    return name == id || name == serial || name == physical_id || name == address;
+  }
   /** Whether this camera is meant by a name as in the properties of stereocamsrc and rig files. */
   [[nodiscard]] bool is_called (const std::string &name) const
   {

@@ -210,7 +210,7 @@ open_listed (const std::string &name, bool afresh, ArvDevice *&device, CameraInf
   const std::vector<ListedCamera> &list = discover (afresh);
   const CameraInfo *chosen = nullptr;
   for (const ListedCamera &camera : list) {
-    if (!name.empty () && !camera.info.is_called (name))
+    if (!name.empty () && !camera.info.is_listed_as (name))
       continue;
     if (chosen)
       return {CameraFault::kBadSetting,

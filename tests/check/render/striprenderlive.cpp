@@ -521,6 +521,53 @@ GST_START_TEST (test_flow_of_the_drawing_thread_comes_back_upstream)
 }
 GST_END_TEST;
 
+/* A pool that has no thread for anybody. */
+static gpointer
+refuse_thread (GstTaskPool *, GstTaskPoolFunction, gpointer, GError **error)
+{
+  g_set_error (error, G_THREAD_ERROR, G_THREAD_ERROR_AGAIN, "no more threads");
+  return nullptr;
+}
+
+static GstBusSyncReply
+set_refusing_pool (GstBus *, GstMessage *message, gpointer pool)
+{
+  GstStreamStatusType type;
+  GstElement *owner;
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_STREAM_STATUS) {
+    gst_message_parse_stream_status (message, &type, &owner);
+    if (type == GST_STREAM_STATUS_TYPE_CREATE)
+      gst_task_set_pool (
+          GST_TASK (g_value_get_object (gst_message_get_stream_status_object (message))),
+          GST_TASK_POOL (pool));
+  }
+  return GST_BUS_DROP;
+}
+
+GST_START_TEST (test_without_a_thread_a_live_stream_is_drawn_as_if_not_live)
+{
+  Live live;
+  if (!live.h)
+    RANGECAST_SKIP ("no OpenGL context");
+  GstTaskPool *pool = gst_task_pool_new ();
+  GST_TASK_POOL_GET_CLASS (pool)->push = refuse_thread; /* each test has a process of its own */
+  GstBus *bus = gst_bus_new ();
+  gst_bus_set_sync_handler (bus, set_refusing_pool, pool, nullptr);
+  gst_element_set_bus (live.h->element, bus);
+  ASSERT_WARNING (live.push (0));
+  live.push (200 * GST_MSECOND);
+  for (guint64 i = 0; i < 2; i++) {
+    const RenderedPicture picture = take_rendered (gst_harness_pull (live.h), 320);
+    fail_unless_equals_uint64 (picture.pts, i * kPeriod);
+    fail_unless_equals_uint64 (picture.shows, 0);
+  }
+  gst_element_set_bus (live.h->element, nullptr);
+  gst_bus_set_sync_handler (bus, nullptr, nullptr, nullptr);
+  gst_object_unref (bus);
+  gst_object_unref (pool);
+}
+GST_END_TEST;
+
 /* ---- late pictures ---- */
 
 GST_START_TEST (test_late_pictures_of_a_held_frame_set_are_left_out_and_counted)
@@ -709,6 +756,7 @@ striprenderlive_suite ()
   tcase_add_test (tc, test_gap_of_a_live_stream_is_filled_not_passed_on);
   tcase_add_test (tc, test_pause_and_states_twice_while_holding);
   tcase_add_test (tc, test_flow_of_the_drawing_thread_comes_back_upstream);
+  tcase_add_test (tc, test_without_a_thread_a_live_stream_is_drawn_as_if_not_live);
   tcase_add_test (tc, test_late_pictures_of_a_held_frame_set_are_left_out_and_counted);
   tcase_add_test (tc, test_thread_that_comes_too_late_leaves_pictures_out);
   tcase_add_test (tc, test_thread_that_is_held_by_the_sink_leaves_nothing_out);
