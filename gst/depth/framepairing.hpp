@@ -8,8 +8,8 @@
 #include <optional>
 
 /** Pairs the buffers of two sink pads of an aggregator by running time, and announces downstream
- * the times without pairs. Streaming thread. All times are running times in ns; each dropped buffer
- * is logged with its reason. */
+ *  the times without pairs. Streaming thread. All times are running times in ns; each dropped
+ *  buffer is logged with its reason. */
 class PairMatcher {
 public:
   PairMatcher (GstAggregatorPad *first, GstAggregatorPad *second, GstDebugCategory *category)
@@ -24,8 +24,8 @@ public:
 
   /** Takes the next pair off the pads. Buffers whose running times differ by no more than
    *  gstrange::pairing_tolerance() are a pair; of two that differ more, the older one is dropped
-   * and counted. Buffers without PTS are paired in order of arrival. A GAP on one pad drops (and
-   * counts) the buffers of the other pad during that time.
+   *  and counted. Buffers without PTS are paired in order of arrival. A GAP on one pad drops (and
+   *  counts) the buffers of the other pad during that time.
    *  @param frame_duration  ns, or GST_CLOCK_TIME_NONE
    *  @return GST_FLOW_OK with a pair, GST_FLOW_EOS once one pad has ended,
    *          GST_AGGREGATOR_FLOW_NEED_DATA while one pad has no buffer */
@@ -82,7 +82,7 @@ GstFlowReturn take_companion (GstAggregatorPad *pad, GstDebugCategory *category,
 void log_waiting (GstDebugCategory *category, GstAggregatorPad *pad);
 
 /** Frame duration of a pad's caps, ns; GST_CLOCK_TIME_NONE if there are none or the rate is
- * unknown. */
+ *  unknown. */
 GstClockTime frame_duration (const std::optional<GstVideoInfo> &info);
 
 /** Adds the always pad of this name from its template; for instance_init.

@@ -420,9 +420,16 @@ drop_unusable (GstRangeMux *self, GstClockTime tolerance)
     {
       std::lock_guard guard (priv->lock);
       stream.received++;
-      (state == StreamState::kLate           ? stream.late
-          : state == StreamState::kOutOfSync ? stream.out_of_sync
-                                             : stream.left_out)++;
+      switch (state) {
+        case StreamState::kLate:
+          stream.late++;
+          break;
+        case StreamState::kOutOfSync:
+          stream.out_of_sync++;
+          break;
+        default:
+          stream.left_out++;
+      }
     }
     set_state (self, stream, state, w.running);
   }
