@@ -29,16 +29,16 @@ public:
    *  @param frame_duration  ns, or GST_CLOCK_TIME_NONE
    *  @return GST_FLOW_OK with a pair, GST_FLOW_EOS once one pad has ended,
    *          GST_AGGREGATOR_FLOW_NEED_DATA while one pad has no buffer */
-  GstFlowReturn take (GstClockTime frame_duration, Pair &pair);
+  GstFlowReturn pop_pair (GstClockTime frame_duration, Pair &pair);
 
   /** A buffer is about to be pushed. Both times may be GST_CLOCK_TIME_NONE. */
   void record_output (GstClockTime running_time, GstClockTime duration);
 
-  /** Takes the time without pairs that take() has found since the last call, from the end of the
-   *  output so far.
+  /** Takes the time without pairs that pop_pair() has found since the last call, from the end of
+   *  the output so far.
    *  @param until  running time of the next pair, or GST_CLOCK_TIME_NONE
    *  @return false if there is none */
-  bool take_gap (GstClockTime until, GstClockTime &begin, GstClockTime &end);
+  bool pop_gap (GstClockTime until, GstClockTime &begin, GstClockTime &end);
 
   /** Pushes a GAP event, preceded by the segment if that was not sent yet. Caps must have been
    *  sent. */
@@ -73,7 +73,7 @@ private:
  *  @param dropped       is increased by the number of dropped buffers, without GAPs
  *  @param[out] buffer   transfer full; null if it was lost or the pad has ended
  *  @return GST_FLOW_OK, or GST_AGGREGATOR_FLOW_NEED_DATA while it may still arrive */
-GstFlowReturn take_companion (GstAggregatorPad *pad, GstDebugCategory *category,
+GstFlowReturn pop_companion (GstAggregatorPad *pad, GstDebugCategory *category,
     GstClockTime running_time, GstClockTime tolerance, bool timeout, guint64 &dropped,
     GstBuffer **buffer);
 

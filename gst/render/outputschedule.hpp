@@ -41,7 +41,7 @@ public:
   /** ns by which a frame set may be after the picture that shows it */
   [[nodiscard]] GstClockTime tolerance () const { return period () / 4; }
   /** For how long after its own duration the last frame set is shown, ns; GST_CLOCK_TIME_NONE:
-   *  for ever. If not live, where no clock limits the number of pictures, kMaxDuration at most. */
+   *  forever. If not live, where no clock limits the number of pictures, kMaxDuration at most. */
   void set_hold (GstClockTime hold) { hold_ = hold; }
   void set_live (bool live) { live_ = live; }
 
