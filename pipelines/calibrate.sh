@@ -121,7 +121,7 @@ is_source () { # a launch string: has a link, or begins with an element's name
 }
 is_pattern () { [ ! -e "$1" ] && ! is_source "$1" && [[ "$1" == *[%*?[]* ]]; }
 
-# Pictures that all cameras have, numbered anew: multifilesrc stops at a gap.
+# Pictures that all cameras have, numbered again: multifilesrc stops at a gap.
 common=
 for what in "${whats[@]}"; do
   is_pattern "$what" || continue

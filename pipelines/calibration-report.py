@@ -109,7 +109,7 @@ def report(child):
             print("calibrate.sh: " + complaint, file=sys.stderr)
             if is_error:
                 error = True
-                # After an error that comes before the first picture gst-launch-1.0 may wait for ever.
+                # After an error that comes before the first picture gst-launch-1.0 may wait forever.
                 threading.Timer(2, child.process.kill).start()
         sys.stdout.flush()
     child.process.wait()

@@ -13,7 +13,7 @@ if [ -z "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
 fi
 
 # What runs the launch strings: rangecast-run, where it is built or installed, and demo.sh has it measure. gst-launch-1.0 of
-# GStreamer 1.22 takes the same strings, but sends no statistics, and with -e may wait for ever after an error that comes
+# GStreamer 1.22 takes the same strings, but sends no statistics, and with -e may wait forever after an error that comes
 # before the first picture. With -q it would say nothing of warnings, and without it says them among much else on stdout.
 launch () {
   local runner

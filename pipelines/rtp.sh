@@ -81,7 +81,7 @@ send_rtp () {
   split_addresses "$1" --to
   rtp=(rtpneighbourcodepay ${rtp_mtu:+"mtu=$rtp_mtu"})
   # Of several receivers rtpsession would mix the transport-wide feedback. It remembers every packet until there is some (70
-  # bytes each, for ever where nobody gives any): for those only who adapt to it.
+  # bytes each, indefinitely where nobody gives any): for those only who adapt to it.
   [[ -z "$rtp_adaptive" || "$1" == *,* || "$1" =~ ^(22[4-9]|23[0-9])\. ]] || twcc=,$rtp_twcc
   [ -z "$rtp_feedback" ] || rtp+=(! "application/x-rtp,$rtp_fb$twcc" ! rtcpreports name=reports)
   [ -z "$rtp_fec" ] || rtp+=(! rtpulpfecenc "percentage=$rtp_fec" pt=122)

@@ -11,7 +11,7 @@
 #include <utility>
 
 /** Runs jobs one after the other on one thread (a GThreadPool), and lets a streaming thread wait
- * for them. start() and stop() are called by one thread at a time; the others are thread-safe. */
+ *  for them. start() and stop() are called by one thread at a time; the others are thread-safe. */
 class BackgroundJobs {
 public:
   /** Must return soon once the token requests it. */

@@ -228,8 +228,9 @@ CameraGroup::wait_for_ptp ()
       return {};
     if (g_get_monotonic_time () - begin > kMaxPtpWait_us)
       return {CameraFault::kTimedOut,
-          (*behind)->label () + ": its clock does not follow PTP after 30 s; expected a PTP master "
-                                "in its network, or action-scheduled=false"};
+          (*behind)->label () +
+              ": the camera's clock does not follow PTP after 30 s; expected a PTP master "
+              "in the camera's network, or action-scheduled=false"};
   } while (session_.wait (std::chrono::milliseconds (200)));
   return {CameraFault::kFailed, "stopped"};
 }
@@ -269,7 +270,7 @@ CameraGroup::check_frames (std::int64_t now_ns, std::int64_t since_ns, std::int6
         now_ns - std::max (pairing_.last_frame_ns (static_cast<int> (i)), since_ns);
     if (silent_ns > max_ns && !heartbeats_[i].is_overdue ())
       return {CameraFault::kTimedOut,
-          cameras_[i]->label () + ": no picture for " + std::to_string (silent_ns / kSecond_ns) +
+          cameras_[i]->label () + ": no image for " + std::to_string (silent_ns / kSecond_ns) +
               " s, although it answers; expected one each frame period (does a firewall block its "
               "packets, is its trigger connected?)"};
   }

@@ -22,7 +22,7 @@ public:
   }
 
   void set_format (const SourceFormat &format);
-  /** After a flush, running time may begin anew. */
+  /** After a flush, running time may begin again. */
   void reset_time ();
   /** Sends a set, unless it was captured before running time 0, or in time that GAPs covered.
    *  @return false: this was the last of num-buffers */

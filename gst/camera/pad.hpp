@@ -13,7 +13,7 @@
 
 /** One pad of stereocamsrc: a short queue and the task that empties it, so that a blocked branch
  *  blocks neither the other branches nor the cameras. A full queue drops its oldest image and
- * counts it. Any thread, except where it says otherwise. */
+ *  counts it. Any thread, except where it says otherwise. */
 class CameraPad {
 public:
   /** Called from the task when pushing gives another flow than before. */

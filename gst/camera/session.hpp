@@ -24,7 +24,7 @@
  *  and starts over when one is lost.
  *
  *  The thread keeps this object and the element alive, so that no state change waits for a camera
- *  that does not answer. It is no GstTask, since that must be joined.
+ *  that does not answer. The thread is not a GstTask, since that must be joined.
  *
  *  Threads: this one; Aravis' and the trigger threads, which only report frames and faults; the
  *  pads' tasks, which report flows. No lock is held while anything waits for a camera, pushes or

@@ -55,15 +55,13 @@ stereo_cam_properties ()
           kMutableReady),
       P::text<&S::features> ("features", "Features",
           "GenICam features to set on all cameras after all other settings: \"Name=Value "
-          "Name=Value "
-          "Command ...\"",
+          "Name=Value Command ...\"",
           kMutableReady),
       P::text<&S::trigger_line> ("trigger-line", "Trigger line",
           "Input line of the cameras for trigger=hardware", kMutableReady),
       P::text<&S::output_line> ("output-line", "Output line",
           "Output line of the left camera for trigger=hardware; the left camera then runs freely "
-          "and "
-          "triggers the others (unset = external signal)",
+          "and triggers the others (unset = external signal)",
           kMutableReady),
       P::text<&S::clock_server> ("clock-server", "Clock server",
           "Network clock to provide to the pipeline: HOST:PORT of a GStreamer network clock, or "
@@ -79,8 +77,7 @@ stereo_cam_properties ()
           kMutableReady),
       P::number<&S::packet_size> ("packet-size", "Packet size",
           "GigE Vision packet size in bytes, with headers (0 = largest that passes the network, -1 "
-          "= "
-          "leave unchanged)",
+          "= leave unchanged)",
           -1, 65535, kMutableReady),
       P::number<&S::n_buffers> ("buffers", "Buffers",
           "Number of buffers per camera, shared by the camera's stream and downstream", 2, 256,

@@ -116,7 +116,7 @@ Concealment::add_views (
     if (Status s = gstrange::add_view (buffer, view.view_id, roi, view.capture_time_ns); !s.ok ())
       return s;
     there |= std::uint64_t{1} << view.view_id;
-    if (!skips_) /* or its time is that of a jump, which may be damage */
+    if (!skips_) /* else the time of the frame set is that of a jump and may be damaged */
       last_seen_[std::size_t (view.view_id)] = now_;
   }
   for (const RangeImage &image : older)

@@ -8,7 +8,7 @@
 #include <rangecast/neighbourcode/access_unit.hpp>
 
 /** neighbourcodedec conceal=last: repeats pixels of the last output frame set where slices are
- * lost, and views that do not come, for at most kMaxAge (in the .cpp). Streaming thread only. */
+ *  lost, and views that do not come, for at most kMaxAge (in the .cpp). Streaming thread only. */
 class Concealment {
 public:
   ~Concealment () { reset (); }

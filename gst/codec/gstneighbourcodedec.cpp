@@ -75,12 +75,14 @@ struct GstNeighbourCodeDecPrivate {
 
   StatsReporter reporter; /* any thread; has locks of its own */
 
+  /* written by the streaming thread, also read by src_event() */
+  std::atomic<bool> by_slices{false};   /* alignment of the input */
+  std::atomic<bool> is_temporal{false}; /* later frame sets refer to the latest */
+
   /* streaming thread only */
   rangecast::AccessUnitDecoder decoder;
   GstBufferPool *pool = nullptr;
   Concealment concealment;
-  std::atomic<bool> by_slices{false};   /* alignment of the input; also read by src_event() */
-  std::atomic<bool> is_temporal{false}; /* later frame sets refer to the latest; as above */
   GstClockTime last_request = GST_CLOCK_TIME_NONE; /* PTS of the frame set that caused it */
   std::vector<guint8> slices;                      /* alignment=slice: of the frame set so far */
   GstBuffer *first = nullptr; /* its first slice, which gives times and flags */

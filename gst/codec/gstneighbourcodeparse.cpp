@@ -62,7 +62,7 @@ using Bytes = std::span<const guint8>;
 constexpr GstClockTime kRigInterval = GST_SECOND;
 /* Maximum bytes in front of the first access unit; a stream that begins with more is another type.
  */
-constexpr gsize kMaxLeadingGarbage = 2 << 20;
+constexpr gsize kMaxLeadingRubbish = 2 << 20;
 
 /* What was found in the stream so far; selects the error text at its end. */
 enum class Seen { kNothing, kAccessUnit, kRig, kSlices };
@@ -79,7 +79,7 @@ struct Stream {               /* streaming thread only */
   bool had_gaps = false;
   bool discont = false; /* bytes were dropped since the last buffer */
   bool ending = false;  /* push mode: EOS has arrived */
-  gsize leading_garbage = 0;
+  gsize leading_rubbish = 0;
   rangecast::RigCollector collector; /* of the byte stream */
   std::string too_large;             /* why a rig was refused */
   unsigned used_generation = 0;      /* of collector: the rig of the source caps */
@@ -415,15 +415,15 @@ drop (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 /* Drops frames instead of skipping bytes, because the base class gives up after 2 MiB, and a
  * damaged access unit can be longer. */
 static GstFlowReturn
-drop_garbage (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
+drop_rubbish (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 {
   GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
   GST_WARNING_OBJECT (base,
       "%" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT " are not an access unit", size,
       guint64 (frame->offset));
   if (priv->seen == Seen::kNothing) {
-    priv->stream.leading_garbage += size;
-    if (priv->stream.leading_garbage > kMaxLeadingGarbage) {
+    priv->stream.leading_rubbish += size;
+    if (priv->stream.leading_rubbish > kMaxLeadingRubbish) {
       post_missing_data (base);
       return GST_FLOW_ERROR;
     }
@@ -595,7 +595,7 @@ handle_stream (GstBaseParse *base, GstBaseParseFrame *frame)
   }
   gst_buffer_unmap (frame->buffer, &map);
   if (part.rubbish)
-    return drop_garbage (base, frame, part.rubbish);
+    return drop_rubbish (base, frame, part.rubbish);
   if (part.length) {
     warn_if_cut_off (base, part);
     return handle_access_unit_of_stream (base, frame, part);

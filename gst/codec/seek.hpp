@@ -7,7 +7,7 @@
 #include <vector>
 
 /** Seeking by time in a file, and the times of its stream, which begin at 0. Any thread: the lock
- * is never held while pulling, pushing, querying or posting. */
+ *  is never held while pulling, pushing, querying or posting. */
 class NeighbourCodeSeek {
 public:
   /** Whether the parser is in pull mode. */
@@ -19,7 +19,7 @@ public:
    *  @param frame_duration  ns, or none */
   GstClockTime time_of (GstBaseParse *base, guint64 pts_ns, GstClockTime frame_duration);
   /** The rig units that apply at `offset`, bytes, if a seek has chosen it; else empty. Only the
-   * first call returns them. */
+   *  first call returns them. */
   std::vector<guint8> rig_at (guint64 offset);
   /** @param event (transfer full): a seek.
    *  @return (transfer full): the seek for the base class, to a key access unit; null if refused */

@@ -4,7 +4,7 @@
 #include <gst/gst.h>
 
 /** Deactivates and unrefs a pool, whether created here or offered by a peer, and clears the
- * pointer, which may be null. */
+ *  pointer, which may be null. */
 void drop_pool (GstBufferPool *&pool);
 
 /** Acquires a buffer. Posts the error "out of memory for `what`" if the pool cannot allocate one; a

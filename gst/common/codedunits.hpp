@@ -9,7 +9,7 @@
 
 /** A buffer of whole units, mapped for reading. Memories are mapped one by one, because mapping a
  *  buffer of several memories copies them into one. Only where a unit crosses memories is the
- * buffer mapped as a whole. */
+ *  buffer mapped as a whole. */
 class CodedUnitsMap {
 public:
   using Bytes = std::span<const guint8>;

@@ -35,7 +35,7 @@ guint64 view_bits (const rangecast::Rig &rig);
  *
  *  The timer is one of GStreamer's system clock, not the streaming thread, so that statistics of a
  *  stalled stream are posted, too. Allocates once per interval. Do not call start() or finish()
- * with a lock held that `collect` takes. */
+ *  with a lock held that `collect` takes. */
 class StatsReporter {
 public:
   /** Reads the counters, on any thread; takes the element's locks itself. The element's own row

@@ -30,7 +30,7 @@ struct PairMatcher::Front {
 };
 
 GstFlowReturn
-PairMatcher::take (GstClockTime frame_duration, Pair &pair)
+PairMatcher::pop_pair (GstClockTime frame_duration, Pair &pair)
 {
   const GstClockTime tolerance = gstrange::pairing_tolerance (frame_duration);
   for (;;) {
@@ -106,7 +106,7 @@ PairMatcher::record_output (GstClockTime running_time, GstClockTime duration)
 }
 
 bool
-PairMatcher::take_gap (GstClockTime until, GstClockTime &begin, GstClockTime &end)
+PairMatcher::pop_gap (GstClockTime until, GstClockTime &begin, GstClockTime &end)
 {
   const bool found = GST_CLOCK_TIME_IS_VALID (gap_begin_);
   begin = std::max (gap_begin_, output_end_);
@@ -154,7 +154,7 @@ PairMatcher::reset ()
 }
 
 GstFlowReturn
-take_companion (GstAggregatorPad *pad, GstDebugCategory *category, GstClockTime running_time,
+pop_companion (GstAggregatorPad *pad, GstDebugCategory *category, GstClockTime running_time,
     GstClockTime tolerance, bool timeout, guint64 &dropped, GstBuffer **result)
 {
   *result = nullptr;

@@ -8,8 +8,8 @@
 #include <optional>
 
 /** Pairs the buffers of two sink pads of an aggregator by running time, and announces downstream
- * the times without pairs. Streaming thread. All times are running times in ns; each dropped buffer
- * is logged with its reason. */
+ *  the times without pairs. Streaming thread. All times are running times in ns; each dropped
+ *  buffer is logged with its reason. */
 class PairMatcher {
 public:
   PairMatcher (GstAggregatorPad *first, GstAggregatorPad *second, GstDebugCategory *category)
@@ -24,21 +24,21 @@ public:
 
   /** Takes the next pair off the pads. Buffers whose running times differ by no more than
    *  gstrange::pairing_tolerance() are a pair; of two that differ more, the older one is dropped
-   * and counted. Buffers without PTS are paired in order of arrival. A GAP on one pad drops (and
-   * counts) the buffers of the other pad during that time.
+   *  and counted. Buffers without PTS are paired in order of arrival. A GAP on one pad drops (and
+   *  counts) the buffers of the other pad during that time.
    *  @param frame_duration  ns, or GST_CLOCK_TIME_NONE
    *  @return GST_FLOW_OK with a pair, GST_FLOW_EOS once one pad has ended,
    *          GST_AGGREGATOR_FLOW_NEED_DATA while one pad has no buffer */
-  GstFlowReturn take (GstClockTime frame_duration, Pair &pair);
+  GstFlowReturn pop_pair (GstClockTime frame_duration, Pair &pair);
 
   /** A buffer is about to be pushed. Both times may be GST_CLOCK_TIME_NONE. */
   void record_output (GstClockTime running_time, GstClockTime duration);
 
-  /** Takes the time without pairs that take() has found since the last call, from the end of the
-   *  output so far.
+  /** Takes the time without pairs that pop_pair() has found since the last call, from the end of
+   *  the output so far.
    *  @param until  running time of the next pair, or GST_CLOCK_TIME_NONE
    *  @return false if there is none */
-  bool take_gap (GstClockTime until, GstClockTime &begin, GstClockTime &end);
+  bool pop_gap (GstClockTime until, GstClockTime &begin, GstClockTime &end);
 
   /** Pushes a GAP event, preceded by the segment if that was not sent yet. Caps must have been
    *  sent. */
@@ -73,7 +73,7 @@ private:
  *  @param dropped       is increased by the number of dropped buffers, without GAPs
  *  @param[out] buffer   transfer full; null if it was lost or the pad has ended
  *  @return GST_FLOW_OK, or GST_AGGREGATOR_FLOW_NEED_DATA while it may still arrive */
-GstFlowReturn take_companion (GstAggregatorPad *pad, GstDebugCategory *category,
+GstFlowReturn pop_companion (GstAggregatorPad *pad, GstDebugCategory *category,
     GstClockTime running_time, GstClockTime tolerance, bool timeout, guint64 &dropped,
     GstBuffer **buffer);
 
@@ -82,7 +82,7 @@ GstFlowReturn take_companion (GstAggregatorPad *pad, GstDebugCategory *category,
 void log_waiting (GstDebugCategory *category, GstAggregatorPad *pad);
 
 /** Frame duration of a pad's caps, ns; GST_CLOCK_TIME_NONE if there are none or the rate is
- * unknown. */
+ *  unknown. */
 GstClockTime frame_duration (const std::optional<GstVideoInfo> &info);
 
 /** Adds the always pad of this name from its template; for instance_init.

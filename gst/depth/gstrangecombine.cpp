@@ -390,7 +390,7 @@ push_gap (GstRangeCombine *self, GstBuffer *waiting)
   GstClockTime begin, end;
   const GstClockTime until =
       waiting ? gstrange::running_time_of (priv->colour_pad, waiting) : GST_CLOCK_TIME_NONE;
-  if (!priv->matcher->take_gap (until, begin, end) || !priv->colour || !priv->depth)
+  if (!priv->matcher->pop_gap (until, begin, end) || !priv->colour || !priv->depth)
     return GST_FLOW_OK;
   if (priv->negotiate)
     if (const GstFlowReturn flow = negotiate (self); flow != GST_FLOW_OK)
@@ -409,7 +409,7 @@ gst_range_combine_aggregate (GstAggregator *aggregator, gboolean)
   const GstClockTime duration =
       std::min (frame_duration (priv->colour), frame_duration (priv->depth));
   PairMatcher::Pair pair;
-  const GstFlowReturn taken = priv->matcher->take (duration, pair);
+  const GstFlowReturn taken = priv->matcher->pop_pair (duration, pair);
   GstFlowReturn flow = push_gap (self, pair.first);
   if (taken != GST_FLOW_OK)
     return flow == GST_FLOW_OK ? taken : flow;

@@ -63,15 +63,18 @@ GST_DEBUG_CATEGORY_STATIC (gst_stereo_depth_debug);
  *
  *   sink_event       records the caps of each pad
  *   aggregate
- *     take_pair      takes a left and a right image of one running time off their pads. A left
- * image waits for a right one without a deadline: it is dropped when a later right image or a GAP
- * arrives push_gap       announces time without pairs drop_if_late   drops the pair if its depth
- * would arrive too late (QoS) take_third     takes the third image of that time, if there is a pad
- * for it; waits for it until the deadline negotiate      after new caps: loads the view, configures
- * the matcher, sets output caps push_pair      rectifies, matches and pushes
+ *     dequeue_pair   takes a left and a right image of one running time off their pads. A left
+ *                    image waits for a right one without a deadline: it is dropped when a later
+ *                    right image or a GAP arrives
+ *     push_gap       announces time without pairs
+ *     drop_if_late   drops the pair if its depth would arrive too late (QoS)
+ *     dequeue_third  takes the third image of that time, if there is a pad for it; waits for it
+ *                    until the deadline
+ *     negotiate      after new caps: loads the view, configures the matcher, sets output caps
+ *     push_pair      rectifies, matches and pushes
  *
  * A pair that waits for its third image is kept in `pair`, off its pads: a source that feeds all
- * pads from one thread and loses a third image would otherwise block on pad left for ever. So caps
+ * pads from one thread and loses a third image would otherwise block on pad left forever. So caps
  * of later images can arrive before the pair is matched, see Input::next_info. */
 
 namespace {
@@ -228,12 +231,12 @@ warn_if_unpaired (GstStereoDepth *self, bool paired)
 }
 
 static GstFlowReturn
-take_pair (GstStereoDepth *self)
+dequeue_pair (GstStereoDepth *self)
 {
   GstStereoDepthPrivate *priv = self->priv;
   WaitingPair &pair = priv->pair;
   const GstFlowReturn flow =
-      priv->matcher->take (frame_duration (priv->inputs[kLeft].info), pair.buffers);
+      priv->matcher->pop_pair (frame_duration (priv->inputs[kLeft].info), pair.buffers);
   warn_if_unpaired (self, flow == GST_FLOW_OK);
   if (flow == GST_FLOW_OK) {
     pair.running = gstrange::running_time_of (priv->left, pair.buffers.first);
@@ -296,14 +299,14 @@ drop_if_late (GstStereoDepth *self)
  * the pair is then matched without it.
  * @return GST_AGGREGATOR_FLOW_NEED_DATA while it may still arrive */
 static GstFlowReturn
-take_third (GstStereoDepth *self, bool timeout, GstBuffer **third)
+dequeue_third (GstStereoDepth *self, bool timeout, GstBuffer **third)
 {
   GstStereoDepthPrivate *priv = self->priv;
   GstPad *pad = gst_element_get_static_pad (GST_ELEMENT (self), "third");
   if (!pad)
     return GST_FLOW_OK;
   guint64 dropped = 0;
-  const GstFlowReturn flow = take_companion (GST_AGGREGATOR_PAD (pad), GST_CAT_DEFAULT,
+  const GstFlowReturn flow = pop_companion (GST_AGGREGATOR_PAD (pad), GST_CAT_DEFAULT,
       priv->pair.running, gstrange::pairing_tolerance (frame_duration (priv->inputs[kLeft].info)),
       timeout, dropped, third);
   gst_object_unref (pad);
@@ -409,7 +412,7 @@ push_gap (GstStereoDepth *self)
 {
   GstStereoDepthPrivate *priv = self->priv;
   GstClockTime begin, end;
-  if (!priv->matcher->take_gap (priv->pair.running, begin, end))
+  if (!priv->matcher->pop_gap (priv->pair.running, begin, end))
     return GST_FLOW_OK;
   if (!priv->pool) { /* caps come before a GAP */
     if (!priv->inputs[kLeft].info || !priv->inputs[kRight].info)
@@ -534,7 +537,7 @@ gst_stereo_depth_aggregate (GstAggregator *aggregator, gboolean timeout)
   GstStereoDepthPrivate *priv = self->priv;
   apply_release_of_third (priv);
   if (!priv->pair.buffers.first) {
-    const GstFlowReturn taken = take_pair (self);
+    const GstFlowReturn taken = dequeue_pair (self);
     if (const GstFlowReturn flow = push_gap (self); flow != GST_FLOW_OK)
       return flow;
     if (taken == GST_FLOW_EOS)
@@ -545,7 +548,7 @@ gst_stereo_depth_aggregate (GstAggregator *aggregator, gboolean timeout)
   if (drop_if_late (self))
     return GST_FLOW_OK;
   GstBuffer *third = nullptr;
-  GstFlowReturn flow = take_third (self, timeout, &third);
+  GstFlowReturn flow = dequeue_third (self, timeout, &third);
   if (flow != GST_FLOW_OK)
     return flow;
   if (priv->negotiate || (priv->negotiate_third && third))

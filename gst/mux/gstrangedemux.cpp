@@ -391,7 +391,7 @@ gst_range_demux_sink_event (GstPad *sink, GstObject *parent, GstEvent *event)
       gst_flow_combiner_reset (self->priv->combiner);
       break;
     case GST_EVENT_EOS:
-      if (!self->priv->had_pads) /* sinks behind it would wait for EOS for ever */
+      if (!self->priv->had_pads) /* sinks behind it would wait for EOS forever */
         GST_ELEMENT_ERROR (self, STREAM, DEMUX,
             ("The stream ended before caps with a rig, which names the views"), (nullptr));
       self->priv->reporter.finish ();

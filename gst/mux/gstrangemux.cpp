@@ -325,10 +325,10 @@ compare_recordings (GstRangeMux *self)
     GST_DEBUG_OBJECT (self, "the recordings have begun again");
     priv->last.capture = GST_CLOCK_TIME_NONE;
   }
-  if (const WaitingBuffer *apart = Recordings::find_apart (priv->waiting.list);
-      apart && !apart->stream->apart_reported) {
-    apart->stream->apart_reported = true;
-    set_state (self, *apart->stream, StreamState::kApart, apart->running);
+  if (const WaitingBuffer *ahead = Recordings::find_different_time (priv->waiting.list);
+      ahead && !ahead->stream->different_time_reported) {
+    ahead->stream->different_time_reported = true;
+    set_state (self, *ahead->stream, StreamState::kDifferentTime, ahead->running);
   }
 }
 
@@ -337,9 +337,9 @@ static void
 report_unmatched (GstRangeMux *self, const MuxStreams &streams)
 {
   while (MuxStream *unmatched = Recordings::find_unmatched (streams)) {
-    unmatched->apart_reported = true;
+    unmatched->different_time_reported = true;
     unmatched->ahead = 0;
-    set_state (self, *unmatched, StreamState::kApart, GST_CLOCK_TIME_NONE);
+    set_state (self, *unmatched, StreamState::kDifferentTime, GST_CLOCK_TIME_NONE);
   }
 }
 
@@ -420,9 +420,16 @@ drop_unusable (GstRangeMux *self, GstClockTime tolerance)
     {
       std::lock_guard guard (priv->lock);
       stream.received++;
-      (state == StreamState::kLate           ? stream.late
-          : state == StreamState::kOutOfSync ? stream.out_of_sync
-                                             : stream.left_out)++;
+      switch (state) {
+        case StreamState::kLate:
+          stream.late++;
+          break;
+        case StreamState::kOutOfSync:
+          stream.out_of_sync++;
+          break;
+        default:
+          stream.left_out++;
+      }
     }
     set_state (self, stream, state, w.running);
   }

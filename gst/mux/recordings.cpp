@@ -25,7 +25,7 @@ Recordings::compare (std::span<const WaitingBuffer> waiting, GstClockTime last_c
 }
 
 const WaitingBuffer *
-Recordings::find_apart (std::span<const WaitingBuffer> waiting)
+Recordings::find_different_time (std::span<const WaitingBuffer> waiting)
 {
   if (waiting.size () == 2)
     for (const WaitingBuffer &w : waiting)
@@ -43,7 +43,7 @@ Recordings::find_unmatched (const MuxStreams &streams)
     received += stream->received > 0;
     if (stream->received == 0 || stream->matched_others)
       continue;
-    if (stream->apart_reported || stream->reported != StreamState::kIn) {
+    if (stream->different_time_reported || stream->reported != StreamState::kIn) {
       reported++;
       continue;
     }

@@ -31,7 +31,7 @@ public:
 
   /** Of two streams the one that would wait for more than kMaxLater, or nullptr. After compare().
    */
-  static const WaitingBuffer *find_apart (std::span<const WaitingBuffer> waiting);
+  static const WaitingBuffer *find_different_time (std::span<const WaitingBuffer> waiting);
   /** A stream that has ended without being matched with another one and was not yet reported, or
    *  nullptr. Once all others are reported, the last one need not be. */
   static MuxStream *find_unmatched (const MuxStreams &streams);

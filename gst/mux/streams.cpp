@@ -13,7 +13,7 @@ void
 MuxStream::reset ()
 {
   has_caps = coded = chosen = alive = clash_reported = offset_known = shift_known = matched_others =
-      apart_reported = false;
+      different_time_reported = false;
   other_rig = clash = {};
   seen = since = GST_CLOCK_TIME_NONE;
   reported = state = StreamState::kIn;
@@ -111,7 +111,7 @@ name_of (StreamState state)
       return "late";
     case StreamState::kOutOfSync:
       return "out-of-step";
-    case StreamState::kApart:
+    case StreamState::kDifferentTime:
       return "apart";
     case StreamState::kClash:
       return "clash";
@@ -140,7 +140,7 @@ explain (const MuxStream &stream, StreamState state, GstClockTimeDiff offset)
     case StreamState::kOutOfSync:
       return ": its capture times are " + seconds + (offset < 0 ? " behind" : " ahead of") +
              " the others': the host's clock is not synchronised; left out until it is";
-    case StreamState::kApart:
+    case StreamState::kDifferentTime:
       return (offset > 0 ? ": its capture times are " + seconds +
                                " ahead of the others': it waits until they catch up"
                          : std::string (": it has ended, and no frame set contains both its views "

@@ -11,12 +11,12 @@
 /** Whether a stream's buffers become part of frame sets, and why not. */
 enum class StreamState {
   kIn,
-  kSilent,    ///< no buffers for kSilentAfter
-  kLate,      ///< its buffers arrive after their frame sets were pushed
-  kOutOfSync, ///< its capture times are of another clock
-  kApart,     ///< a recording of another time, or with another clock, than the others
-  kClash,     ///< other streams have its view-id, or another format
-  kOtherRig,  ///< its cameras are not those of the property `rig`
+  kSilent,        ///< no buffers for kSilentAfter
+  kLate,          ///< its buffers arrive after their frame sets were pushed
+  kOutOfSync,     ///< its capture times are of another clock
+  kDifferentTime, ///< a recording of another time, or with another clock, than the others
+  kClash,         ///< other streams have its view-id, or another format
+  kOtherRig,      ///< its cameras are not those of the property `rig`
 };
 
 /** A stream without buffers for so long is silent: frame sets and caps are made without it. */
@@ -48,7 +48,7 @@ struct MuxStream {
   bool in_sync = true;                      ///< its capture times are of the clock of most streams
   bool shift_known = false;                 ///< `shift` is valid
   bool matched_others = false;              ///< was in a frame set with another stream
-  bool apart_reported = false;              ///< state kApart was reported
+  bool different_time_reported = false;     ///< state kDifferentTime was reported
   GstClockTimeDiff shift = 0;               ///< capture time - running time of its last buffer, ns
   GstClockTimeDiff ahead = 0;               ///< recordings: capture time - that of the others, ns
   GstClockTime seen = GST_CLOCK_TIME_NONE;  ///< running time of its last buffer

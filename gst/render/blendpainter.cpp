@@ -74,8 +74,8 @@ void main ()
 )";
 
 /* The largest weight: half floats (up to 65504) hold the sum of four surfaces of each view. The
- * least one is a share of it. The inside of a surface weighs so little that the sum tells a pixel
- * in which all views show an inside from one in which a view shows an outside. */
+ * smallest weight is a share of it. The inside of a surface weighs so little that the sum tells a
+ * pixel in which all views show an inside from one in which a view shows an outside. */
 constexpr float kMaxWeight = 1000, kMaxSum = 64000, kMinShare = 2e-6f;
 
 struct Weights {

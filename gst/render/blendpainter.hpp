@@ -11,14 +11,14 @@
  *
  *  1. Depth: the nearest surface of each pixel, moved back by the blend range.
  *  2. Sum: colour times weight, and weight, of all views in front of that. A view's weight falls
- * with the angle between its ray and the viewer's; its slant and distance to a depth edge are in
- * its vertices (lib/rangecast/surface/blend_planes.hpp).
+ *     with the angle between its ray and the viewer's; its slant and distance to a depth edge are
+ *     in its vertices (lib/rangecast/surface/blend_planes.hpp).
  *  3. Division, with smooth outlines, and small gaps filled.
  *
  *  After C. Buehler et al., "Unstructured lumigraph rendering", SIGGRAPH 2001, and M. Zwicker et
- * al., "Surface splatting", SIGGRAPH 2001. The targets take 12 bytes a pixel (20 if precise),
- * whatever the number of views. OpenGL 3.3, or OpenGL ES 3.0 with half-float render targets. All
- * functions on the OpenGL thread. */
+ *  al., "Surface splatting", SIGGRAPH 2001. The targets take 12 bytes a pixel (20 if precise),
+ *  whatever the number of views. OpenGL 3.3, or OpenGL ES 3.0 with half-float render targets. All
+ *  functions on the OpenGL thread. */
 class BlendPainter {
 public:
   /** Whether OpenGL can render to half-float textures. */
@@ -32,7 +32,7 @@ public:
   guint64 upload (std::span<const RenderLayer> layers);
   /** Draws one picture of what was uploaded last into the bound framebuffer, whose depth has been
    *  cleared if the picture keeps depth. If the picture does not fill the framebuffer, scissors
-   * keep to its part afterwards.
+   *  keep to its part afterwards.
    *  @return false if OpenGL has no float framebuffer of the picture's size; nothing is drawn */
   bool draw (const RenderPicture &picture, std::span<const RenderLayer> layers);
 

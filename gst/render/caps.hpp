@@ -18,7 +18,7 @@ GstCaps *strip_input_caps (const GstCaps *output, GstCaps *input_template, GstCa
 GstCaps *strip_fixate_output (GstCaps *caps, const GstCaps *input);
 
 /** Whether multiview-flags are a string, as gst-launch-1.0 reads them without a type: no element
- * would interpret it. */
+ *  would interpret it. */
 bool strip_has_flags_as_text (const GstCaps *output);
 
 /** The output's frame rate; none if the caps have none. */

@@ -41,7 +41,7 @@ GstGLShader *make_shader (
     GstGLContext *context, const char *vertex, const char *fragment, GError **error);
 
 /** Covers the viewport with one triangle, see draw_covering(), at a depth of u_covering_depth (-1
- * to 1; 0 unless it is set). */
+ *  to 1; 0 unless it is set). */
 extern const char *const kCoveringVertexShader;
 /** Draws kCoveringVertexShader. @param array  without attributes: the core profile draws nothing
  *  without a vertex array */

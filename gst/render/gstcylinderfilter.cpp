@@ -85,7 +85,7 @@ G_DEFINE_TYPE (GstCylinderFilter, gst_cylinder_filter, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
     cylinderfilter, "cylinderfilter", GST_RANK_NONE, GST_TYPE_CYLINDER_FILTER)
 
-/* ---- caps and events: what resets the state ---- */
+/* ---- resets, corrections and statistics ---- */
 
 namespace {
 
@@ -116,7 +116,151 @@ set_rig (GstCylinderFilterPrivate *priv, const rangecast::Rig &rig)
   return priv->colours.set_rig (rig);
 }
 
+/* Sets the corrected rig here, and downstream by caps. */
+Status
+send_rig (GstCylinderFilter *self)
+{
+  auto priv = self->priv;
+  const Status valid = validate (priv->agreement.rig ());
+  if (!valid.ok ())
+    GST_WARNING_OBJECT (
+        self, "keeping the original rig; the corrected one: %s", valid.message ().c_str ());
+  const rangecast::Rig &rig = valid.ok () ? priv->agreement.rig () : priv->agreement.nominal_rig ();
+  priv->rig_pending = false;
+  if (Status status = priv->core.change_rig (rig); !status.ok ())
+    return status;
+  if (Status status = priv->colours.change_rig (rig); !status.ok ())
+    return status;
+  GstPad *pad = GST_BASE_TRANSFORM_SRC_PAD (self);
+  GstCaps *present = gst_pad_get_current_caps (pad);
+  if (!present)
+    return {};
+  GstCaps *caps = gstrange::with_rig (present, rig);
+  if (!gst_caps_is_equal (caps, present)) {
+    GST_DEBUG_OBJECT (self, "sending caps with other poses");
+    if (!gst_pad_push_event (pad, gst_event_new_caps (caps)))
+      GST_DEBUG_OBJECT (self, "downstream refused them"); /* pushing the buffer returns why */
+  }
+  gst_caps_unref (caps);
+  gst_caps_unref (present);
+  return {};
+}
+
+/* Corrects poses, depth and colours, and removes redundant points. */
+Status
+process (GstCylinderFilter *self, std::span<const RangeImage> views,
+    const CylinderFilterSettings &settings, rangecast::CylinderResult &result)
+{
+  auto priv = self->priv;
+  const rangecast::ColourSettings colours = settings.colours ();
+  const rangecast::ColourBalance &balance = priv->colours.balance ();
+  for (const RangeImage &view : views)
+    priv->agreement.set_gains (view.view_id, colours.balance && balance.has_gains (view.view_id)
+                                                 ? std::optional (balance.gains (view.view_id))
+                                                 : std::nullopt);
+  if (Status status = priv->agreement.process (views, settings.agreement ()); !status.ok ())
+    return status;
+  if (priv->rig_pending || priv->agreement.rig_changed ())
+    if (Status status = send_rig (self); !status.ok ())
+      return status;
+  if (Status status = priv->colours.before (views, colours); !status.ok ())
+    return status;
+  if (Status status = priv->core.process (views, settings.core, result); !status.ok ())
+    return status;
+  return priv->colours.after (views, colours);
+}
+
+void
+count (GstCylinderFilterPrivate *priv, const rangecast::CylinderResult &result)
+{
+  const std::lock_guard guard (priv->lock);
+  CylinderCounts &counts = priv->counts;
+  counts.frames++;
+  counts.points_contradicted += priv->agreement.contradicted_points ();
+  counts.points_in += result.points_in;
+  counts.points_out += result.points_out;
+  counts.units += result.cells;
+  counts.units_shared += result.cells_shared;
+  counts.units_held += result.cells_held;
+  counts.units_changed += result.cells_changed;
+  counts.bodies = result.clusters;
+  counts.axis = result.axis;
+  for (auto &[view_id, consistency] : priv->views)
+    consistency = priv->agreement.view (view_id);
+}
+
+/* Posts one warning for each view that is left out from now on. */
+void
+warn_left_out (GstCylinderFilter *self)
+{
+  auto priv = self->priv;
+  for (const auto &[view_id, view] : priv->views) {
+    const guint64 bit = guint64{1} << view_id;
+    if (view.left_out && !(priv->left_out & bit))
+      GST_ELEMENT_WARNING (self, STREAM, FAILED,
+          ("View %d contradicts the other views and is left out.", view_id),
+          ("%.0f %% of its points agree with the other views; check its pose in the rig and its "
+           "depth",
+              100 * view.consistency));
+    else if (!view.left_out && (priv->left_out & bit))
+      GST_INFO_OBJECT (self, "view %d agrees again", view_id);
+    priv->left_out = view.left_out ? priv->left_out | bit : priv->left_out & ~bit;
+  }
+}
+
+std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  auto priv = GST_CYLINDER_FILTER (element)->priv;
+  const std::lock_guard guard (priv->lock);
+  return {{.counters = {.frames = priv->counts.frames + priv->counts.untouched,
+               .points = priv->counts.points_out}}};
+}
+
+void
+add_view_stats (GstStructure *stats, const GstCylinderFilterPrivate *priv)
+{
+  GValue array = G_VALUE_INIT;
+  g_value_init (&array, GST_TYPE_ARRAY);
+  for (const auto &[view_id, view] : priv->views) {
+    GValue value = G_VALUE_INIT;
+    g_value_init (&value, GST_TYPE_STRUCTURE);
+    g_value_take_boxed (&value,
+        gst_structure_new ("view", "view-id", G_TYPE_INT, view_id, "moved", G_TYPE_DOUBLE,
+            1000 * norm (view.correction.translation), "turned", G_TYPE_DOUBLE,
+            180 / M_PI * norm (view.correction.rotation), "consistency", G_TYPE_DOUBLE,
+            view.consistency, "left-out", G_TYPE_BOOLEAN, gboolean (view.left_out), nullptr));
+    gst_value_array_append_and_take_value (&array, &value);
+  }
+  gst_structure_take_value (stats, "views", &array);
+}
+
+GstStructure *
+make_stats (const GstCylinderFilterPrivate *priv)
+{
+  const CylinderCounts &counts = priv->counts;
+  GstStructure *stats =
+      gst_structure_new ("application/x-cylinderfilter-stats", "frames", G_TYPE_UINT64,
+          counts.frames, "points-contradicted", G_TYPE_UINT64, counts.points_contradicted,
+          "points-in", G_TYPE_UINT64, counts.points_in, "points-out", G_TYPE_UINT64,
+          counts.points_out, "units", G_TYPE_UINT64, counts.units, "units-shared", G_TYPE_UINT64,
+          counts.units_shared, "units-held", G_TYPE_UINT64, counts.units_held, "units-changed",
+          G_TYPE_UINT64, counts.units_changed, "bodies", G_TYPE_INT, counts.bodies, nullptr);
+  const char *names[] = {"axis-position", "axis-direction"};
+  const rangecast::Vec3 vectors[] = {counts.axis.position, counts.axis.direction};
+  for (int i = 0; i < 2; i++) {
+    GValue array = G_VALUE_INIT;
+    g_value_init (&array, GST_TYPE_ARRAY);
+    set_vector (&array, vectors[i]);
+    gst_structure_take_value (stats, names[i], &array);
+  }
+  add_view_stats (stats, priv);
+  return stats;
+}
+
 } // namespace
+
+/* ---- caps and events: what resets the state ---- */
 
 static gboolean
 gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
@@ -197,40 +341,6 @@ gst_cylinder_filter_submit_input_buffer (
       ->submit_input_buffer (base, is_discont, buffer);
 }
 
-namespace {
-
-/* Sets the corrected rig here, and downstream by caps. */
-Status
-send_rig (GstCylinderFilter *self)
-{
-  auto priv = self->priv;
-  const Status valid = validate (priv->agreement.rig ());
-  if (!valid.ok ())
-    GST_WARNING_OBJECT (
-        self, "keeping the original rig; the corrected one: %s", valid.message ().c_str ());
-  const rangecast::Rig &rig = valid.ok () ? priv->agreement.rig () : priv->agreement.nominal_rig ();
-  priv->rig_pending = false;
-  if (Status status = priv->core.change_rig (rig); !status.ok ())
-    return status;
-  if (Status status = priv->colours.change_rig (rig); !status.ok ())
-    return status;
-  GstPad *pad = GST_BASE_TRANSFORM_SRC_PAD (self);
-  GstCaps *present = gst_pad_get_current_caps (pad);
-  if (!present)
-    return {};
-  GstCaps *caps = gstrange::with_rig (present, rig);
-  if (!gst_caps_is_equal (caps, present)) {
-    GST_DEBUG_OBJECT (self, "sending caps with other poses");
-    if (!gst_pad_push_event (pad, gst_event_new_caps (caps)))
-      GST_DEBUG_OBJECT (self, "downstream refused them"); /* pushing the buffer returns why */
-  }
-  gst_caps_unref (caps);
-  gst_caps_unref (present);
-  return {};
-}
-
-} // namespace
-
 /* Controlled properties take their values of this buffer's time; the mode may be one of them. */
 static void
 gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
@@ -256,72 +366,6 @@ gst_cylinder_filter_before_transform (GstBaseTransform *base, GstBuffer *buffer)
   priv->was_off = off;
   gst_base_transform_set_passthrough (base, off);
 }
-
-namespace {
-
-/* Corrects poses, depth and colours, and removes redundant points. */
-Status
-process (GstCylinderFilter *self, std::span<const RangeImage> views,
-    const CylinderFilterSettings &settings, rangecast::CylinderResult &result)
-{
-  auto priv = self->priv;
-  const rangecast::ColourSettings colours = settings.colours ();
-  const rangecast::ColourBalance &balance = priv->colours.balance ();
-  for (const RangeImage &view : views)
-    priv->agreement.set_gains (view.view_id, colours.balance && balance.has_gains (view.view_id)
-                                                 ? std::optional (balance.gains (view.view_id))
-                                                 : std::nullopt);
-  if (Status status = priv->agreement.process (views, settings.agreement ()); !status.ok ())
-    return status;
-  if (priv->rig_pending || priv->agreement.rig_changed ())
-    if (Status status = send_rig (self); !status.ok ())
-      return status;
-  if (Status status = priv->colours.before (views, colours); !status.ok ())
-    return status;
-  if (Status status = priv->core.process (views, settings.core, result); !status.ok ())
-    return status;
-  return priv->colours.after (views, colours);
-}
-
-void
-count (GstCylinderFilterPrivate *priv, const rangecast::CylinderResult &result)
-{
-  const std::lock_guard guard (priv->lock);
-  CylinderCounts &counts = priv->counts;
-  counts.frames++;
-  counts.points_contradicted += priv->agreement.contradicted_points ();
-  counts.points_in += result.points_in;
-  counts.points_out += result.points_out;
-  counts.units += result.cells;
-  counts.units_shared += result.cells_shared;
-  counts.units_held += result.cells_held;
-  counts.units_changed += result.cells_changed;
-  counts.bodies = result.clusters;
-  counts.axis = result.axis;
-  for (auto &[view_id, consistency] : priv->views)
-    consistency = priv->agreement.view (view_id);
-}
-
-/* Posts one warning for each view that is left out from now on. */
-void
-warn_left_out (GstCylinderFilter *self)
-{
-  auto priv = self->priv;
-  for (const auto &[view_id, view] : priv->views) {
-    const guint64 bit = guint64{1} << view_id;
-    if (view.left_out && !(priv->left_out & bit))
-      GST_ELEMENT_WARNING (self, STREAM, FAILED,
-          ("View %d contradicts the other views and is left out.", view_id),
-          ("%.0f %% of its points agree with the other views; check its pose in the rig and its "
-           "depth",
-              100 * view.consistency));
-    else if (!view.left_out && (priv->left_out & bit))
-      GST_INFO_OBJECT (self, "view %d agrees again", view_id);
-    priv->left_out = view.left_out ? priv->left_out | bit : priv->left_out & ~bit;
-  }
-}
-
-} // namespace
 
 static GstFlowReturn
 gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
@@ -355,19 +399,6 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
 
 /* ---- states ---- */
 
-namespace {
-
-std::vector<StatsRow>
-collect_stats (GstElement *element)
-{
-  auto priv = GST_CYLINDER_FILTER (element)->priv;
-  const std::lock_guard guard (priv->lock);
-  return {{.counters = {.frames = priv->counts.frames + priv->counts.untouched,
-               .points = priv->counts.points_out}}};
-}
-
-} // namespace
-
 static gboolean
 gst_cylinder_filter_start (GstBaseTransform *base)
 {
@@ -397,51 +428,6 @@ gst_cylinder_filter_stop (GstBaseTransform *base)
 }
 
 /* ---- properties ---- */
-
-namespace {
-
-void
-add_view_stats (GstStructure *stats, const GstCylinderFilterPrivate *priv)
-{
-  GValue array = G_VALUE_INIT;
-  g_value_init (&array, GST_TYPE_ARRAY);
-  for (const auto &[view_id, view] : priv->views) {
-    GValue value = G_VALUE_INIT;
-    g_value_init (&value, GST_TYPE_STRUCTURE);
-    g_value_take_boxed (&value,
-        gst_structure_new ("view", "view-id", G_TYPE_INT, view_id, "moved", G_TYPE_DOUBLE,
-            1000 * norm (view.correction.translation), "turned", G_TYPE_DOUBLE,
-            180 / M_PI * norm (view.correction.rotation), "consistency", G_TYPE_DOUBLE,
-            view.consistency, "left-out", G_TYPE_BOOLEAN, gboolean (view.left_out), nullptr));
-    gst_value_array_append_and_take_value (&array, &value);
-  }
-  gst_structure_take_value (stats, "views", &array);
-}
-
-GstStructure *
-make_stats (const GstCylinderFilterPrivate *priv)
-{
-  const CylinderCounts &counts = priv->counts;
-  GstStructure *stats =
-      gst_structure_new ("application/x-cylinderfilter-stats", "frames", G_TYPE_UINT64,
-          counts.frames, "points-contradicted", G_TYPE_UINT64, counts.points_contradicted,
-          "points-in", G_TYPE_UINT64, counts.points_in, "points-out", G_TYPE_UINT64,
-          counts.points_out, "units", G_TYPE_UINT64, counts.units, "units-shared", G_TYPE_UINT64,
-          counts.units_shared, "units-held", G_TYPE_UINT64, counts.units_held, "units-changed",
-          G_TYPE_UINT64, counts.units_changed, "bodies", G_TYPE_INT, counts.bodies, nullptr);
-  const char *names[] = {"axis-position", "axis-direction"};
-  const rangecast::Vec3 vectors[] = {counts.axis.position, counts.axis.direction};
-  for (int i = 0; i < 2; i++) {
-    GValue array = G_VALUE_INIT;
-    g_value_init (&array, GST_TYPE_ARRAY);
-    set_vector (&array, vectors[i]);
-    gst_structure_take_value (stats, names[i], &array);
-  }
-  add_view_stats (stats, priv);
-  return stats;
-}
-
-} // namespace
 
 static void
 gst_cylinder_filter_finalize (GObject *object)

@@ -49,26 +49,7 @@ GST_ELEMENT_REGISTER_DEFINE (striprender, "striprender", GST_RANK_NONE, GST_TYPE
 
 enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_CAMERA };
 
-/* ---- caps ---- */
-
-static GstCaps *
-gst_strip_render_transform_caps (
-    GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *filter)
-{
-  const bool forward = direction == GST_PAD_SINK;
-  GstCaps *other = gst_static_pad_template_get_caps (forward ? &src_template : &sink_template);
-  GstCaps *transformed =
-      forward ? strip_output_caps (caps, other, filter) : strip_input_caps (caps, other, filter);
-  gst_caps_unref (other);
-  return transformed;
-}
-
-static GstCaps *
-gst_strip_render_fixate_caps (
-    GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *other)
-{
-  return direction == GST_PAD_SINK ? strip_fixate_output (other, caps) : gst_caps_fixate (other);
-}
+/* ---- input caps and output pool ---- */
 
 namespace {
 
@@ -111,48 +92,6 @@ handle_input_caps (GstStripRender *self, GstCaps *caps)
     gst_range_flow_return (GST_ELEMENT (self), status);
   return status.ok ();
 }
-
-} // namespace
-
-static gboolean
-gst_strip_render_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
-{
-  auto self = GST_STRIP_RENDER (base);
-  GstStripRenderPrivate *priv = self->priv;
-  GST_INFO_OBJECT (self, "from %" GST_PTR_FORMAT " to %" GST_PTR_FORMAT, in, out);
-  if (strip_has_flags_as_text (out)) {
-    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-        ("The caps' multiview-flags are a string, expected (GstVideoMultiviewFlagsSet)"),
-        (nullptr));
-    return FALSE;
-  }
-  if (!handle_input_caps (self, in) || !gst_video_info_from_caps (&priv->out, out))
-    return FALSE;
-  {
-    std::lock_guard guard (priv->lock);
-    priv->rate = strip_output_rate (in, out);
-  }
-  strip_select_mode (self);
-  return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->set_caps (base, in, out);
-}
-
-static gboolean
-gst_strip_render_get_unit_size (GstBaseTransform *, GstCaps *, gsize *size)
-{
-  *size = 1; /* both sides have buffers of their own; sizes do not follow from one another */
-  return TRUE;
-}
-
-/* ---- allocation ---- */
-
-/* Frame sets are read on the CPU: upstream has no use for a pool of OpenGL memory. */
-static gboolean
-gst_strip_render_propose_allocation (GstBaseTransform *, GstQuery *, GstQuery *)
-{
-  return TRUE;
-}
-
-namespace {
 
 struct PoolSizes {
   guint size = 0, min = 0, max = 0; /* bytes of a buffer; numbers of buffers */
@@ -220,6 +159,65 @@ choose_pool (GstStripRender *self, GstQuery *query)
 }
 
 } // namespace
+
+/* ---- caps ---- */
+
+static GstCaps *
+gst_strip_render_transform_caps (
+    GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *filter)
+{
+  const bool forward = direction == GST_PAD_SINK;
+  GstCaps *other = gst_static_pad_template_get_caps (forward ? &src_template : &sink_template);
+  GstCaps *transformed =
+      forward ? strip_output_caps (caps, other, filter) : strip_input_caps (caps, other, filter);
+  gst_caps_unref (other);
+  return transformed;
+}
+
+static GstCaps *
+gst_strip_render_fixate_caps (
+    GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *other)
+{
+  return direction == GST_PAD_SINK ? strip_fixate_output (other, caps) : gst_caps_fixate (other);
+}
+
+static gboolean
+gst_strip_render_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
+{
+  auto self = GST_STRIP_RENDER (base);
+  GstStripRenderPrivate *priv = self->priv;
+  GST_INFO_OBJECT (self, "from %" GST_PTR_FORMAT " to %" GST_PTR_FORMAT, in, out);
+  if (strip_has_flags_as_text (out)) {
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+        ("The caps' multiview-flags are a string, expected (GstVideoMultiviewFlagsSet)"),
+        (nullptr));
+    return FALSE;
+  }
+  if (!handle_input_caps (self, in) || !gst_video_info_from_caps (&priv->out, out))
+    return FALSE;
+  {
+    std::lock_guard guard (priv->lock);
+    priv->rate = strip_output_rate (in, out);
+  }
+  strip_select_mode (self);
+  return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->set_caps (base, in, out);
+}
+
+static gboolean
+gst_strip_render_get_unit_size (GstBaseTransform *, GstCaps *, gsize *size)
+{
+  *size = 1; /* both sides have buffers of their own; sizes do not follow from one another */
+  return TRUE;
+}
+
+/* ---- allocation ---- */
+
+/* Frame sets are read on the CPU: upstream has no use for a pool of OpenGL memory. */
+static gboolean
+gst_strip_render_propose_allocation (GstBaseTransform *, GstQuery *, GstQuery *)
+{
+  return TRUE;
+}
 
 static gboolean
 gst_strip_render_decide_allocation (GstBaseTransform *base, GstQuery *query)
@@ -310,6 +308,18 @@ handle_navigation (GstStripRender *self, GstEvent *event)
   return handled;
 }
 
+std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  GstStripRenderPrivate *priv = GST_STRIP_RENDER (element)->priv;
+  std::lock_guard guard (priv->lock);
+  const RenderStats &stats = priv->stats;
+  return {{.counters = {.frames = stats.frames,
+               .points = stats.points_total,
+               .bytes = stats.uploaded_total,
+               .late = stats.dropped}}};
+}
+
 } // namespace
 
 static gboolean
@@ -326,22 +336,6 @@ gst_strip_render_src_event (GstBaseTransform *base, GstEvent *event)
 }
 
 /* ---- states ---- */
-
-namespace {
-
-std::vector<StatsRow>
-collect_stats (GstElement *element)
-{
-  GstStripRenderPrivate *priv = GST_STRIP_RENDER (element)->priv;
-  std::lock_guard guard (priv->lock);
-  const RenderStats &stats = priv->stats;
-  return {{.counters = {.frames = stats.frames,
-               .points = stats.points_total,
-               .bytes = stats.uploaded_total,
-               .late = stats.dropped}}};
-}
-
-} // namespace
 
 static gboolean
 gst_strip_render_start (GstBaseTransform *base)

@@ -7,7 +7,7 @@
 #include <rangecast/surface/orbit.hpp>
 
 /** The orbit camera, moved by mouse, touch and keys (GstNavigation) and by time. Has no lock:
- * callers share it between threads under theirs. */
+ *  callers share it between threads under theirs. */
 class OrbitControl {
 public:
   rangecast::Orbit orbit;  ///< as the properties; azimuth -360 to 360

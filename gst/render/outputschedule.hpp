@@ -19,7 +19,7 @@ struct FrameRate {
  *  Pictures are at whole multiples of the output's period, counted from stream position 0: the same
  *  moments wherever a stream was entered. A picture shows the newest frame set that is no more than
  *  a quarter of a period after it, so that slightly uneven times neither repeat a frame set nor
- * skip one. Has no lock: callers share it between threads under theirs. Allocates nothing. */
+ *  skip one. Has no lock: callers share it between threads under theirs. Allocates nothing. */
 class OutputSchedule {
 public:
   /** Pictures a second; above that a period is too short for times in ns. */
@@ -41,7 +41,7 @@ public:
   /** ns by which a frame set may be after the picture that shows it */
   [[nodiscard]] GstClockTime tolerance () const { return period () / 4; }
   /** For how long after its own duration the last frame set is shown, ns; GST_CLOCK_TIME_NONE:
-   *  for ever. If not live, where no clock limits the number of pictures, kMaxDuration at most. */
+   *  forever. If not live, where no clock limits the number of pictures, kMaxDuration at most. */
   void set_hold (GstClockTime hold) { hold_ = hold; }
   void set_live (bool live) { live_ = live; }
 
@@ -54,7 +54,7 @@ public:
    *  if it is earlier by more than its duration, the predecessor's time was wrong: that one is
    *  removed, because it would delay all that follow. If too many wait, the oldest of them is
    *  removed. A frame set more than G_MAXINT64 ns, 292 years, from the stream's beginning is
-   * dropped.
+   *  dropped.
    *  @param frame_set  transfer full; without PTS it follows the last one at once
    *  @param duration   ns, at most kMaxDuration counts; 0 or GST_CLOCK_TIME_NONE: the period
    *  @return how many frame sets were removed or dropped without ever being shown */
@@ -88,7 +88,7 @@ public:
    */
   [[nodiscard]] GstClockTime next_pts () const;
   /** Removes the next picture from the schedule if its frame set is certain, given that no frame
-   * set before `limit` (stream position, ns) follows. @return false if there is none */
+   *  set before `limit` (stream position, ns) follows. @return false if there is none */
   bool next (GstClockTime limit, Picture &picture);
   /** Stream position of the last picture from next(), or GST_CLOCK_TIME_NONE */
   [[nodiscard]] GstClockTime last () const { return last_; }

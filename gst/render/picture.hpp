@@ -22,7 +22,7 @@ struct RenderPicture {
                                ///< one pixel
 
   /** Metres by which a view's surfaces are moved away from the viewer, times 1 - cosine of the
-   * angle between the two's directions; not in mode blend. */
+   *  angle between the two's directions; not in mode blend. */
   double view_gap_m = 0.012;
   /** Mode blend: metres behind the nearest surface within which views are blended. */
   double blend_range_m = 0.02;

@@ -14,7 +14,7 @@ constexpr GLenum kContextLost = 0x0507; /* of OpenGL 4.5 and OpenGL ES 3.2 */
 const char *
 fatal_error (const GstGLFuncs *gl)
 {
-  constexpr int kMaxErrors = 8; /* several may be queued; a lost context may report for ever */
+  constexpr int kMaxErrors = 8; /* several may be queued; a lost context may report indefinitely */
   for (int i = 0; i < kMaxErrors; i++)
     switch (gl->GetError ()) {
       case GL_NO_ERROR:

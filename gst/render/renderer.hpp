@@ -21,7 +21,7 @@ struct RenderJob {
 };
 
 /** Renders scenes into buffers of OpenGL memory: the frame set, for one or two eyes, the
- * background, the rig's cameras and the panel. Has objects of OpenGL's from start() to stop(). */
+ *  background, the rig's cameras and the panel. Has objects of OpenGL's from start() to stop(). */
 class Renderer {
 public:
   /** @name On the OpenGL thread @{ */

@@ -29,8 +29,8 @@ public:
   /** Makes the strips of images that check() accepted. If it is the same frame set as last time and
    *  nothing that strips depend on has changed, they are kept. Colours are those of the images, or
    *  tinted (tint-views). In mode blend, views that look against the viewer only fill holes: they
-   * are reduced to half their resolution. The images must stay mapped as long as the layers are
-   * used. */
+   *  are reduced to half their resolution. The images must stay mapped as long as the layers are
+   *  used. */
   void build (std::span<const rangecast::RangeImage> images, const StripRenderSettings &settings,
       const rangecast::Orbit &orbit, bool same_frame_set);
   /** Changes with each build() that does not keep everything; never 0. */

@@ -9,9 +9,9 @@
 #include "scene.hpp"
 
 /** Fits the camera to the first frame sets of a stream: to the first one with points, then every
- * half second until two fits agree and every view that had points still has some, or some have had
- * none for five seconds. From then on the fit holds, so that the camera does not follow movements.
- * For one thread at a time. */
+ *  half second until two fits agree and every view that had points still has some, or some have had
+ *  none for five seconds. From then on the fit holds, so that the camera does not follow movements.
+ *  For one thread at a time. */
 class ViewFit {
 public:
   /** What a fit depends on. */

@@ -67,10 +67,12 @@ struct GstRtpNeighbourCodeDepayPrivate {
   guint64 view_bits = 0;              /* of the rig, by view-id; 0: not known yet */
   std::optional<guint16> sequence;    /* of the last packet */
   std::optional<guint8> payload_type; /* of the last undamaged packet */
-  AccessUnitAssembler access_unit;    /* the units so far */
-  rangecast::KeyCheck key_check;      /* of them, as the four below */
-  bool has_gap = false;               /* packets were lost before or between them */
-  guint32 timestamp = 0;              /* RTP time */
+
+  /* the access unit that is being assembled; streaming thread only */
+  AccessUnitAssembler access_unit; /* its units so far */
+  rangecast::KeyCheck key_check;
+  bool has_gap = false;  /* packets were lost before or between its units */
+  guint32 timestamp = 0; /* RTP time */
   GstClockTime pts = GST_CLOCK_TIME_NONE, capture_time = GST_CLOCK_TIME_NONE;
 };
 
@@ -262,7 +264,7 @@ handle_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
   }
   bad += !reader.status ().ok ();
   if (bad > 0)
-    GST_DEBUG_OBJECT (self, "dropping %" G_GUINT64_FORMAT " units: damaged, or see above", bad);
+    GST_DEBUG_OBJECT (self, "dropped %" G_GUINT64_FORMAT " damaged or unusable units", bad);
   {
     std::lock_guard guard (priv->lock);
     priv->counters.packets++;

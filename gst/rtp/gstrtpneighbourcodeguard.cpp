@@ -257,7 +257,8 @@ enum class Verdict {
   kPasses,
   kPassesAsFirst, /* a new sender is accepted */
   kForeign,       /* dropped */
-  kInvalid,       /* dropped, and a warning is due; as the two below */
+  /* dropped, with a warning */
+  kInvalid,
   kRival,
   kOtherVersion
 };

@@ -6,7 +6,7 @@
 #include <gst/gst.h>
 
 /** The running time at which udpsrc received a packet, or the current one if the buffer has no
- * time. Without a pipeline clock, when no packet can have a time, it is the monotonic time. */
+ *  time. Without a pipeline clock, when no packet can have a time, it is the monotonic time. */
 inline GstClockTime
 arrival_time (GstElement *element, GstBuffer *buffer)
 {

@@ -5,7 +5,7 @@
 
 /** Detects other sources that send at the same time as the accepted sender. SenderFilter may pass
  *  only a sample of their packets, so that sequence numbers need not be consecutive, as they are
- * for SenderProbation. */
+ *  for SenderProbation. */
 class SenderRivals {
 public:
   /* A rival is one source with kPackets packets while the sender has sent for kBeside since the

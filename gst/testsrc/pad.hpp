@@ -60,7 +60,7 @@ private:
        peer_ended_ = false, ended_ = false;
   GstVideoInfo video_{};
 
-  std::mutex lock_; /* guards the two below; pool_ is written by the streaming thread alone */
+  std::mutex lock_; /* guards pool_, which only the streaming thread writes, and flushing_ */
   GstBufferPool *pool_ = nullptr;
   bool flushing_ = false;
 };

@@ -69,8 +69,7 @@ avatar_properties ()
           kMutableReady),
       P::number<&S::loop_frames> ("loop-frames", "Loop frames",
           "Render this many frames once and replay them forwards and backwards to save CPU time; "
-          "left, "
-          "right and third pads only, at most 1 GiB per camera (0 = render every frame)",
+          "left, right and third pads only, at most 1 GiB per camera (0 = render every frame)",
           0u, G_MAXUINT, kMutableReady),
       P::number<&S::num_buffers> ("num-buffers", "Number of buffers",
           "Number of frames to output before EOS (-1 = unlimited)", -1, G_MAXINT, kMutableReady),
@@ -83,8 +82,7 @@ avatar_properties ()
       P::number<&S::scene, &Scene::model_top_m> ("model-top", "Model top",
           "Part of the model to keep, in metres below the crown after scaling it to a person 1.8 m "
           "tall (0 = the whole model scaled to 0.5 m, -1 = 0.5 for models of a standing person, "
-          "else "
-          "0)",
+          "else 0)",
           -1., 1.8, kMutableReady),
       P::text<&S::scene, &Scene::texture> ("texture", "Texture",
           "Image file used as texture of all meshes of the model (unset = as the model's materials "

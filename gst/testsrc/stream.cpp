@@ -154,7 +154,7 @@ AvatarStream::output_frame (const AvatarPads &pads)
     time = clock_.next ();
   else if (!clock_.wait (element_, time))
     return kAgain;
-  if (any_needs_negotiation (pads)) /* pads may have been linked anew during the wait */
+  if (any_needs_negotiation (pads)) /* pads may have been linked again during the wait */
     flow = negotiate (pads);
   if (flow != GST_FLOW_OK)
     return flow;
@@ -411,7 +411,7 @@ AvatarStream::flush_stop (GstEvent *event)
   }
   g_rec_mutex_lock (&task_lock_);
   push_flush (false, gst_event_get_seqnum (event), reset_time);
-  if (reset_time && !is_live_) { /* running time starts anew, with the next frame */
+  if (reset_time && !is_live_) { /* running time starts again, with the next frame */
     segment_.start = segment_.time = segment_.position;
     segment_.base = segment_.offset = 0;
   }

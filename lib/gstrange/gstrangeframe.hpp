@@ -28,7 +28,7 @@ GST_RANGE_API rangecast::Status add_view (
 GST_RANGE_API bool append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base);
 
 /** Maps all views of a frame set during its lifetime, without allocations. After a failure views()
- * is empty and status() names the view. */
+ *  is empty and status() names the view. */
 class GST_RANGE_API RangeFrameMap {
 public:
   RangeFrameMap (GstBuffer *buffer, GstMapFlags flags);

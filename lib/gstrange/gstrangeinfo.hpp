@@ -21,10 +21,10 @@ struct RangeInfo {
 };
 
 /** Parses fixed caps. The rig is required; it must have as many views as the caps, all of them
- * range views no larger than width x height.
+ *  range views no larger than width x height.
  *  @param[out] info  unchanged on failure
  *  @return kNotFound, kBadValue, kBadSize, or the error of decode_rig(); the message names the
- * field */
+ *  field */
 GST_RANGE_API rangecast::Status parse_caps (const GstCaps *caps, RangeInfo &info);
 
 /** Width and height are those of the rig's largest views. */

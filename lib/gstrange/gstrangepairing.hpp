@@ -17,7 +17,7 @@ GST_RANGE_API GstClockTime pairing_tolerance (GstClockTime frame_duration);
 GST_RANGE_API GstClockTime running_time_of (GstAggregatorPad *pad, GstBuffer *buffer);
 
 /** When a buffer was captured: the time of its GstReferenceTimestampMeta; without one the clock
- * time of its running time in a live pipeline, else its running time. */
+ *  time of its running time in a live pipeline, else its running time. */
 GST_RANGE_API GstClockTime capture_time_of (GstAggregatorPad *pad, GstBuffer *buffer, bool live);
 
 /** Whether this is the empty buffer into which GstAggregator turns a GAP event. */

@@ -62,7 +62,7 @@ set (BoardSpec &board, const std::string &name, const std::string &value)
   return "expected a property of rigcalibrate's board; see --help";
 }
 
-/* The words after the file name. @return false if one is wrong, which is then said */
+/* Reads the words after the file name. @return false after printing an error for a wrong one */
 bool
 read_properties (const std::vector<std::string> &words, BoardSpec &board)
 {

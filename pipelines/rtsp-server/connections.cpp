@@ -235,7 +235,7 @@ close_in_its_thread (GstRTSPClient *client, GstRTSPThread *thread)
 } // namespace
 
 /* gst-rtsp-server 1.22 must close a connection in the thread that serves it, which may otherwise
- * read from it for ever. Closing a TLS connection before the end of its handshake leaks its
+ * read from it forever. Closing a TLS connection before the end of its handshake leaks its
  * descriptor and memory, but shutting down its socket, as a peer would, does not. A connection that
  * survives this is closed when it has been idle again. */
 void

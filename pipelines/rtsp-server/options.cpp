@@ -211,15 +211,15 @@ check_numbers (const RtspOptions &options)
 }
 
 bool
-take_strings (const Strings &strings, RtspOptions &options)
+assign_strings (const Strings &strings, RtspOptions &options)
 {
-  const auto take = [] (const gchar *from, std::string &to) {
+  const auto assign = [] (const gchar *from, std::string &to) {
     if (from)
       to = from;
   };
-  take (strings.address, options.address);
-  take (strings.mount, options.mount);
-  take (strings.realm, options.realm);
+  assign (strings.address, options.address);
+  assign (strings.mount, options.mount);
+  assign (strings.realm, options.realm);
   if (options.realm.find_first_of ("\"\\") != std::string::npos)
     return bad_option ("--realm", "a name without quotation marks and backslashes", options.realm);
   for (const auto &[option, file] :
@@ -314,5 +314,5 @@ parse_arguments (int argc, char **argv, RtspOptions &options)
   g_option_context_free (context);
   g_strfreev (arguments);
   wipe_passwords (argc, argv);
-  return parsed && take_strings (strings, options) && check_numbers (options);
+  return parsed && assign_strings (strings, options) && check_numbers (options);
 }

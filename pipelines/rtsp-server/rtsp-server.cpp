@@ -175,7 +175,7 @@ on_late_timer (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
-/* A viewer that got the media when it had just ended would wait for ever. */
+/* A viewer that got the media when it had just ended would wait forever. */
 void
 disconnect_late_viewers (Server &server, GstRTSPMedia *media)
 {

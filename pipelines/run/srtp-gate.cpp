@@ -13,14 +13,14 @@ namespace {
 constexpr std::size_t kMaxKnown = 256, kKept = 128; /* senders; after some are forgotten */
 constexpr guint kClosedPackets = 64;                /* in a row of a sender who is known, ... */
 constexpr gint64 kClosedTimeUs = 2'000'000; /* ... and for so long: look where it is by now */
-constexpr gint64 kGoneTimeUs = 10'000'000;  /* and after so long it may have begun anew */
+constexpr gint64 kGoneTimeUs = 10'000'000;  /* and after so long it may have started over */
 
 /* A sender who has the key. An index is a packet's sequence number with the roll-over counter
  * before it, as RFC 3711, 3.3.1 has it. */
 struct Known {
   guint32 ssrc = 0;
   std::optional<gint64> index = {}; /* the largest one; nothing before a packet of RTP */
-  gint64 peak = -1;                 /* the same, of before it seemed to begin anew, too */
+  gint64 peak = -1;                 /* the same, of before it seemed to start over, too */
   gint64 floor = -1;                /* no packet with a smaller or the same one: a replay */
   guint roll_over = 0;              /* of the packet that goes to the srtpdec next */
   bool asked = false;               /* the srtpdec has its key */
@@ -29,7 +29,7 @@ struct Known {
   guint64 use = 0;
 
   /* Or a replay of its packets: the sender may come back. */
-  [[nodiscard]] bool began_anew () const { return index < peak; }
+  [[nodiscard]] bool started_over () const { return index < peak; }
 };
 
 struct Gate {
@@ -56,7 +56,7 @@ struct Before {
   bool known = false;  /* has shown that it has the key; where it is RTP, by RTP */
   bool old = false;    /* the packet may be a replay */
   bool closed = false; /* its packets do not open any longer */
-  bool gone = false;   /* for so long that it may have begun anew */
+  bool gone = false;   /* for so long that it may have started over */
   guint roll_over = 0; /* probably */
 };
 
@@ -133,7 +133,7 @@ look_up (Gate &gate, guint32 ssrc, GstBuffer *buffer, bool is_rtcp)
   before.old = index <= known->floor;
   const gint64 silent_us = now_us - known->opened_us;
   before.closed =
-      known->closed >= kClosedPackets && (silent_us >= kClosedTimeUs || known->began_anew ());
+      known->closed >= kClosedPackets && (silent_us >= kClosedTimeUs || known->started_over ());
   before.gone = before.closed && silent_us >= kGoneTimeUs;
   before.roll_over = guint (known->peak >> 16);
   return before;
@@ -223,7 +223,7 @@ on_opened (GstPad *, GstPadProbeInfo *info, gpointer user_data)
     known->index = std::max (*known->index, guess_index (*known->index, sequence_of (buffer)));
     known->peak = std::max (known->peak, *known->index);
     /* With replays between them, too, a sender's packets that do not open add up. */
-    known->closed = known->began_anew () ? known->closed - std::min (known->closed, 1U) : 0;
+    known->closed = known->started_over () ? known->closed - std::min (known->closed, 1U) : 0;
     known->opened_us = g_get_monotonic_time ();
   }
   return GST_PAD_PROBE_OK;

@@ -84,8 +84,8 @@ SrtpTrial::~SrtpTrial ()
   gst_buffer_unref (key_);
 }
 
-/* A stream's counter is asked for only once, and its packets count as replayed later: so it begins
- * anew for each. */
+/* A stream's counter is asked for only once, and its packets count as replayed later, so
+ * every trial begins by clearing the keys. */
 bool
 SrtpTrial::try_one (const char *pad, GstBuffer *buffer, guint roll_over)
 {

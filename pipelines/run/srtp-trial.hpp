@@ -24,10 +24,10 @@ private:
 
 /** Tells genuine packets from others, by a srtpdec of its own that keeps nothing.
  *
- *  A packet of RTP does not say how often its sender's sequence numbers have begun anew, and opens
- *  only with that number. Each SSRC that goes on sending has one number after the other tried, 16
- *  from its first one, then 256, then 4096, and again: 400 a second in all, in equal parts for all
- *  such SSRCs. A flood with an SSRC for each packet has no part in it. */
+ *  A packet of RTP does not say how often its sender's sequence numbers have started over, and
+ *  opens only with that number. Each SSRC that goes on sending has one number after the other
+ *  tried, 16 from its first one, then 256, then 4096, and again: 400 a second in all, in equal
+ *  parts for all such SSRCs. A flood with an SSRC for each packet has no part in it. */
 class SrtpTrial {
 public:
   static constexpr guint kMaxRollOvers = 4096;

@@ -135,8 +135,7 @@ const char *const kFaultOptions =
     "  --delay MS         of every packet (default 0)\n"
     "  --jitter MS        more delay by chance, evenly from 0; packets may overtake (default 0)\n"
     "  --bandwidth KBIT   1,000 bits per second; what waits for more than 200 ms is lost (default "
-    "0: no "
-    "limit)\n"
+    "0: no limit)\n"
     "  --seed N           of all chances (default 1)\n";
 
 namespace {

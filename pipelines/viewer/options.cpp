@@ -83,9 +83,9 @@ check_display ()
   const bool is_seen =
       g_strcmp0 (window, "egl-device") != 0 && g_strcmp0 (window, "surfaceless") != 0;
   if (!g_getenv ("DISPLAY") && !g_getenv ("WAYLAND_DISPLAY"))
-    g_printerr ("rangecast-viewer: there is no display: expected DISPLAY or WAYLAND_DISPLAY in the "
-                "environment; "
-                "pipelines/play.sh --film and viewer-host.sh --out make films without one\n");
+    g_printerr (
+        "rangecast-viewer: there is no display: expected DISPLAY or WAYLAND_DISPLAY in the "
+        "environment; pipelines/play.sh --film and viewer-host.sh --out make films without one\n");
   else if (!is_seen)
     g_printerr (
         "rangecast-viewer: GST_GL_WINDOW=%s draws without a window: expected it not to be set\n",

@@ -57,9 +57,9 @@ add (Viewer &viewer, const char *factory)
 {
   GstElement *element = gst_element_factory_make (factory, nullptr);
   if (!element) {
-    g_printerr ("rangecast-viewer: there is no element %s: expected GST_PLUGIN_PATH to lead to the "
-                "plugins of "
-                "gst-rangecast, as pipelines/env.sh does, and gst-plugins-base and -good\n",
+    g_printerr (
+        "rangecast-viewer: there is no element %s: expected GST_PLUGIN_PATH to lead to the plugins "
+        "of gst-rangecast, as pipelines/env.sh does, and gst-plugins-base and -good\n",
         factory);
     std::exit (1);
   }

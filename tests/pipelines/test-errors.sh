@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Bad input to launch strings: one clear error each, and an end.
 
-# rangecast-run takes launch strings, too. gst-launch-1.0 of GStreamer 1.22 now and then waits for ever
+# rangecast-run takes launch strings, too. gst-launch-1.0 of GStreamer 1.22 now and then waits forever
 # after an error that comes before the sink's preroll, h264parse's no less than ours.
 run () { rangecast-run "$@"; }
 pair () { # caps of left, caps of right, stereodepth's properties...

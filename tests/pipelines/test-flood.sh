@@ -173,8 +173,8 @@ test_a_flood_at_an_encrypted_port_keeps_no_sender_out () {
   [ "$kb" -lt 8192 ] || fail "the recorder grew by $kb kB"
 }
 
-# SRTP counts outside of the packets how often their numbers began anew: who comes later has to find out.
-test_an_encrypted_stream_opens_for_who_comes_after_its_numbers_began_anew () {
+# SRTP counts outside of the packets how often their numbers started over: who comes later has to find out.
+test_an_encrypted_stream_opens_for_who_comes_after_its_numbers_started_over () {
   port=$((ports + 160))
   make_key
   "$pipelines/record.sh" early.rcnc --listen $((port + 8)) --key right.key >parent.log 2>&1 &

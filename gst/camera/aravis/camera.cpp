@@ -259,7 +259,7 @@ Camera::Impl::create_stream (const std::shared_ptr<CameraRun> &run)
       run.get (), nullptr, &error); /* end() keeps the run until the stream is deleted */
   if (!stream)
     return error ? control->status ("stream", error, CameraFault::kFailed)
-                 : control->refuse (CameraFault::kFailed, "does not provide a stream");
+                 : control->refuse (CameraFault::kFailed, "the camera does not provide a stream");
   g_clear_error (&error);
   set_stream_properties (stream);
   std::lock_guard run_guard (run->lock);
@@ -277,7 +277,7 @@ Camera::Impl::fill (CameraRun &run)
   CameraStatus status = control->status ("payload size", error, CameraFault::kFailed);
   if (status.ok () && (payload < format.size () || payload > 2 * format.size () + kMaxChunkBytes))
     status = control->refuse (CameraFault::kUnsupported,
-        "sends " + std::to_string (payload) + " bytes a picture; expected " +
+        "the camera sends " + std::to_string (payload) + " bytes an image; expected " +
             std::to_string (format.size ()) + " for " + std::to_string (format.width) + "x" +
             std::to_string (format.height) + " " + format.pixel_format);
   if (!status.ok ())
@@ -294,12 +294,13 @@ Camera::start (Arrived arrived, Lost lost)
 {
   CameraControl &control = *impl_->control;
   if (impl_->format.width == 0)
-    return control.refuse (CameraFault::kBadSetting, "was started before it was configured");
+    return control.refuse (
+        CameraFault::kBadSetting, "the camera was started before it was configured");
   if (impl_->watch->lost)
-    return control.refuse (CameraFault::kLost, "was lost; it must be opened again");
+    return control.refuse (CameraFault::kLost, "the camera was lost; it must be opened again");
   stop ();
   if (!impl_->teardown.wait (TeardownQueue::kMaxWait))
-    return control.refuse (CameraFault::kTimedOut, "is still stopping");
+    return control.refuse (CameraFault::kTimedOut, "the camera is still stopping");
   auto run = std::make_shared<CameraRun> ();
   run->arrived = std::move (arrived);
   run->format = impl_->format;
@@ -400,7 +401,7 @@ Camera::trigger_software ()
 {
   CameraControl &control = *impl_->control;
   if (is_lost ())
-    return control.refuse (CameraFault::kLost, "cannot be triggered: it was lost");
+    return control.refuse (CameraFault::kLost, "the camera cannot be triggered: it was lost");
   const auto guard = control.lock ();
   GError *error = nullptr;
   arv_camera_software_trigger (control.camera (), &error);
@@ -411,7 +412,7 @@ CameraStatus
 Camera::read_imaging (ImagingParameters &parameters)
 {
   if (is_lost ())
-    return impl_->control->refuse (CameraFault::kLost, "was lost");
+    return impl_->control->refuse (CameraFault::kLost, "the camera was lost");
   std::lock_guard guard (impl_->imaging_lock);
   return impl_->classify (::read_imaging (*impl_->control, parameters));
 }
@@ -420,7 +421,7 @@ CameraStatus
 Camera::write_imaging (const ImagingParameters &parameters)
 {
   if (is_lost ())
-    return impl_->control->refuse (CameraFault::kLost, "was lost");
+    return impl_->control->refuse (CameraFault::kLost, "the camera was lost");
   std::lock_guard guard (impl_->imaging_lock);
   return impl_->classify (::write_imaging (*impl_->control, parameters, impl_->written));
 }
@@ -442,12 +443,12 @@ Camera::read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us)
   CameraControl &control = *impl_->control;
   camera_time_ns = 0;
   if (is_lost ())
-    return control.refuse (CameraFault::kLost, "was lost");
+    return control.refuse (CameraFault::kLost, "the camera was lost");
   std::lock_guard guard (impl_->imaging_lock);
   CameraStatus status =
       is_gige () ? read_gige_clock (control, impl_->tick_frequency, camera_time_ns, read_at_us)
                  : read_usb_clock (control, camera_time_ns, read_at_us);
   if (status.ok () && (camera_time_ns == 0 || camera_time_ns >= kMaxCameraTime_ns))
-    return control.refuse (CameraFault::kFailed, "has no readable clock");
+    return control.refuse (CameraFault::kFailed, "the camera has no readable clock");
   return impl_->classify (status);
 }

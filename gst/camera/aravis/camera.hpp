@@ -80,11 +80,11 @@ public:
 
   /** Finds, opens and takes control of a camera.
    *  @param name  its serial number, Aravis id (as "Aravis-Fake-GV01"), MAC address, IP address,
-   * user-defined name (GigE), or host name with a dot in it. Empty: the only camera.
+   *  user-defined name (GigE), or host name with a dot in it. Empty: the only camera.
    *  @param[out] camera  set if ok
    *  @return kNotFound (the text says which cameras answered), kBusy (another program has control),
-   * kNoPermission (USB, the text says which udev rule), kTimedOut, kFailed. Any thread; calls wait
-   * for each other.
+   *  kNoPermission (USB, the text says which udev rule), kTimedOut, kFailed. Any thread; calls wait
+   *  for each other.
    *  @param[out] seen  what discovery tells about that camera, also if it is busy; may be null */
   static CameraStatus open (
       const std::string &name, std::unique_ptr<Camera> &camera, CameraInfo *seen = nullptr);
@@ -104,8 +104,8 @@ public:
   CameraStatus abilities (CameraAbilities &abilities);
 
   /** Applies the settings, while stopped. What was applied before a failure stays.
-   *  @return kBadSetting (the text names feature, value and what the camera accepts),
-   * kUnsupported, kTimedOut, kLost */
+   *  @return kBadSetting (the text names feature, value and what the camera accepts), kUnsupported,
+   *  kTimedOut, kLost */
   CameraStatus configure (const CameraSettings &settings);
   /** Valid after configure(). */
   [[nodiscard]] const CameraFormat &format () const;
@@ -115,7 +115,7 @@ public:
   /** Starts streaming; frame numbers begin at 0.
    *  @param arrived  a frame came, or was given up; in order of `number`
    *  @param lost     at most once: the camera does not answer any more, or another program took
-   * control. With GigE that takes up to 6 s; class Heartbeat is quicker. */
+   *  control. With GigE that takes up to 6 s; class Heartbeat is quicker. */
   CameraStatus start (Arrived arrived, Lost lost);
   /** No callback runs or comes after it. */
   void stop ();
@@ -124,19 +124,19 @@ public:
   void give_up ();
 
   /** Any thread: captures one image (TriggerMode::kSoftware). Returns when the camera has
-   * acknowledged, usually within a millisecond. */
+   *  acknowledged, usually within a millisecond. */
   CameraStatus trigger_software ();
   CameraStatistics statistics () const; ///< any thread
   /** Any thread: the current values. Takes a few round trips. */
   CameraStatus read_imaging (ImagingParameters &parameters);
   /** Any thread: sets those values, within the ranges of this camera, where they differ by more
-   * than a thousandth from what was last written. Automatic adjustment must be off
-   * (AutoMode::kManual). */
+   *  than a thousandth from what was last written. Automatic adjustment must be off
+   *  (AutoMode::kManual). */
   CameraStatus write_imaging (const ImagingParameters &parameters);
   /** Any thread: whether the camera's clock follows IEEE 1588 now (PtpStatus Slave or Master). */
   bool clock_is_ptp ();
   /** Any thread: the camera's clock, ns, and when it was read (g_get_monotonic_time, middle of the
-   * round trip, microseconds), to compare clocks of cameras that do not follow IEEE 1588. */
+   *  round trip, microseconds), to compare clocks of cameras that do not follow IEEE 1588. */
   CameraStatus read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us);
 
 private:

@@ -55,7 +55,7 @@ read_usb_clock (CameraControl &control, std::uint64_t &time_ns, std::int64_t &re
   CameraStatus status = control.execute ("TimestampLatch");
   read_at_us = (before + g_get_monotonic_time ()) / 2;
   if (status.ok () && !control.read ("TimestampLatchValue", ticks))
-    return control.refuse (CameraFault::kFailed, "has no feature 'TimestampLatchValue'");
+    return control.refuse (CameraFault::kFailed, "the camera has no feature 'TimestampLatchValue'");
   time_ns = static_cast<std::uint64_t> (std::max<std::int64_t> (ticks, 0)); /* USB3 Vision: ns */
   return status;
 }

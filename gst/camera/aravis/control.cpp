@@ -101,7 +101,7 @@ CameraControl::writable (const std::string &feature, ArvGcNode *&node) const
 {
   node = arv_device_get_feature (device (), feature.c_str ());
   if (!ARV_IS_GC_FEATURE_NODE (node) || ARV_IS_GC_CATEGORY (node))
-    return refuse (CameraFault::kBadSetting, "has no feature '" + feature + "'");
+    return refuse (CameraFault::kBadSetting, "the camera has no feature '" + feature + "'");
   if (!arv_device_is_feature_available (device (), feature.c_str (), nullptr))
     return refuse (CameraFault::kBadSetting, "feature '" + feature +
                                                  "' is not available as the camera is set now; "

@@ -10,7 +10,7 @@
 
 /** Keeps exposure, gain and white balance of cameras equal: reads what the leader has chosen and
  *  writes it to the followers. Its thread is detached, and no GstTask, since nobody may have to
- * wait for a camera that does not answer. */
+ *  wait for a camera that does not answer. */
 class ExposureSync {
 public:
   using Failed = std::function<void (const CameraStatus &)>;

@@ -17,7 +17,7 @@ struct CameraFeature {
 };
 
 /** Splits "Name=Value Name='two words' Command ..." at spaces, commas or semicolons; '"' and "'"
- * quote values. Names are letters, digits, '_', and begin with a letter.
+ *  quote values. Names are letters, digits, '_', and begin with a letter.
  *  @param[out] features  in order of the string; empty after a failure
  *  @return kBadSetting: the text shows the place and what was expected */
 CameraStatus parse_camera_features (std::string_view text, std::vector<CameraFeature> &features);

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 /** Continues the frame ids of one stream as 64-bit numbers. GigE Vision has 16 bits without 0
- * (65535 is followed by 1), or 64 bits from 1; USB3 Vision 64 bits from 0. */
+ *  (65535 is followed by 1), or 64 bits from 1; USB3 Vision 64 bits from 0. */
 class FrameCounter {
 public:
   enum class Ids { kGigE, kUsb };
@@ -14,7 +14,7 @@ public:
   /** Whether the standard allows such an id. */
   [[nodiscard]] bool is_id (std::uint64_t id) const { return ids_ == Ids::kUsb || id != 0; }
   /** The number of that id, from 0 for the standard's first id. Grows strictly: an id that cannot
-   * follow the last one (a camera that starts over, a leap) counts as the next. */
+   *  follow the last one (a camera that starts over, a leap) counts as the next. */
   std::uint64_t number (std::uint64_t id)
   {
     if (!begun_)

@@ -10,10 +10,10 @@
 #include "frame.hpp"
 
 /** The buffers of one stream, each an ArvBuffer with a GstBuffer around its pixels. A GstBuffer
- * that is released returns its ArvBuffer to the stream and is used again: nothing is allocated per
- * frame. If its memory was kept or the buffer was changed, the memory returns the ArvBuffer when it
- * is released, and the next frame gets a new GstBuffer. Buffers that are downstream when the store
- * is closed are freed with their last reference.
+ *  that is released returns its ArvBuffer to the stream and is used again: nothing is allocated per
+ *  frame. If its memory was kept or the buffer was changed, the memory returns the ArvBuffer when
+ *  it is released, and the next frame gets a new GstBuffer. Buffers that are downstream when the
+ *  store is closed are freed with their last reference.
  *
  *  The lock guards stream_; it is not held while Aravis or GStreamer could call back. */
 class FrameStore : public std::enable_shared_from_this<FrameStore> {

@@ -7,8 +7,8 @@
 #include "gvcp.hpp"
 
 /** Tells whether a silent GigE camera still answers. Aravis' own heartbeat waits 3 s for each
- * answer and tries for 5 s; this one asks on its own socket while other calls wait, and never
- * blocks. Needs no control of the camera. One thread. */
+ *  answer and tries for 5 s; this one asks on its own socket while other calls wait, and never
+ *  blocks. Needs no control of the camera. One thread. */
 class Heartbeat {
 public:
   /** @param address  IP address; empty (USB, whose driver reports a loss at once): always alive

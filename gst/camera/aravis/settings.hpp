@@ -24,7 +24,7 @@ enum class AutoMode {
 struct LineTrigger {
   std::string source = "Line1"; ///< TriggerSource of all cameras but the master
   /** This camera runs freely at its frame rate, and signals its exposure on `output_line`, which is
-   * wired to `source` of the others. */
+   *  wired to `source` of the others. */
   bool master = false;
   std::string output_line = "Line2"; ///< LineSelector, set to LineMode Output
 };

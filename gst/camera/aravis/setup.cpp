@@ -86,7 +86,7 @@ choose_pixel_format (CameraControl &control, const std::string &wanted, std::str
   all.insert (all.end (), abilities.other_formats.begin (), abilities.other_formats.end ());
   if (fit.empty ())
     return control.refuse (CameraFault::kUnsupported,
-        "none of its pixel formats is supported: it has " + joined (all) +
+        "none of the camera's pixel formats is supported: it has " + joined (all) +
             "; expected Mono8, RGB8, BGR8 or an 8-bit Bayer format");
   name = wanted;
   if (wanted.empty () && (!control.read ("PixelFormat", name) || !find_pixel_format (name)))
@@ -100,8 +100,8 @@ choose_pixel_format (CameraControl &control, const std::string &wanted, std::str
         "pixel format " + name +
             " is not supported; supported formats of this camera: " + joined (fit));
   if (found == fit.end ())
-    return control.refuse (
-        CameraFault::kBadSetting, "has no pixel format " + name + "; it has " + joined (all));
+    return control.refuse (CameraFault::kBadSetting,
+        "the camera has no pixel format " + name + "; it has " + joined (all));
   name = *found; /* as this camera writes it */
   return {};
 }
@@ -192,18 +192,18 @@ read_format (CameraControl &control, CameraFormat &format)
   if (!status.ok ())
     return status;
   if (!control.read ("PixelFormat", format.pixel_format))
-    return control.refuse (CameraFault::kFailed, "does not report its pixel format");
+    return control.refuse (CameraFault::kFailed, "the camera does not report its pixel format");
   const PixelFormat *pixel = find_pixel_format (format.pixel_format);
   if (!pixel || format.width < 1 || format.height < 1 || format.width > kMaxSide ||
       format.height > kMaxSide)
     return control.refuse (CameraFault::kUnsupported,
-        "pictures of " + std::to_string (format.width) + "x" + std::to_string (format.height) +
-            " " + format.pixel_format + " is not supported");
+        "images of " + std::to_string (format.width) + "x" + std::to_string (format.height) + " " +
+            format.pixel_format + " are not supported");
   format.video_format = pixel->video_format;
   format.bayer = pixel->bayer;
   if (std::uint64_t (format.width) * format.height * pixel->bytes > kMaxImageBytes)
     return control.refuse (CameraFault::kUnsupported,
-        "pictures of " + std::to_string (format.width) + "x" + std::to_string (format.height) +
+        "images of " + std::to_string (format.width) + "x" + std::to_string (format.height) +
             " are too large: expected at most " + std::to_string (kMaxImageBytes) + " bytes");
   format.stride = format.width * pixel->bytes;
   return {};
@@ -219,7 +219,7 @@ enable_trigger (CameraControl &control, const std::string &source)
   const std::vector<std::string> sources = control.entries ("TriggerSource");
   if (std::find (sources.begin (), sources.end (), source) == sources.end ())
     return control.refuse (
-        CameraFault::kBadSetting, "has no trigger source " + source + "; it has " +
+        CameraFault::kBadSetting, "the camera has no trigger source " + source + "; it has " +
                                       (sources.empty () ? "none at all" : joined (sources)));
   CameraStatus status = control.assign_if_there ({"AcquisitionFrameRateEnable"}, "false");
   if (status.ok ())
@@ -235,7 +235,8 @@ output_exposure (CameraControl &control, const LineTrigger &line)
 {
   if (!control.has ("LineSelector") || !control.has ("LineSource"))
     return control.refuse (CameraFault::kBadSetting,
-        "cannot be the master of a line trigger: it has no feature LineSelector or LineSource");
+        "the camera cannot be the master of a line trigger: it has no "
+        "feature LineSelector or LineSource");
   CameraStatus status = control.assign ("LineSelector", line.output_line);
   if (status.ok ())
     status = control.assign_if_there ({"LineMode"}, "Output");
@@ -252,8 +253,8 @@ enable_actions (CameraControl &control, const ActionTrigger &action)
       sources, [] (const std::string &entry) { return entry.starts_with ("Action"); });
   if (source == sources.end ())
     return control.refuse (
-        CameraFault::kBadSetting, "does not support action commands: none of its trigger sources "
-                                  "begins with Action; it has " +
+        CameraFault::kBadSetting, "the camera does not support action commands: none of its "
+                                  "trigger sources begins with Action; it has " +
                                       joined (sources));
   /* "Action1" is selected by its number, 0 or 1 for the first */
   const std::string number = source->substr (std::string_view ("Action").size ());
@@ -264,7 +265,7 @@ enable_actions (CameraControl &control, const ActionTrigger &action)
         {"ActionGroupMask", std::to_string (action.group_mask)}});
   if (status.ok () && action.ptp && !control.has ("PtpEnable") && !control.has ("GevIEEE1588"))
     return control.refuse (CameraFault::kBadSetting,
-        "does not support IEEE 1588, which scheduled action commands require");
+        "the camera does not support IEEE 1588, which scheduled action commands require");
   if (status.ok () && action.ptp)
     status = control.assign_if_there ({"PtpEnable", "GevIEEE1588"}, "true");
   return status.ok () ? enable_trigger (control, *source) : status;
@@ -339,7 +340,7 @@ set_value (CameraControl &control, const AdjustableValue &value, AutoMode mode,
   if (value.is_auto_available (camera, nullptr))
     value.set_auto (camera, automatic ? ARV_AUTO_CONTINUOUS : ARV_AUTO_OFF, &error);
   else if (automatic)
-    return control.refuse (CameraFault::kBadSetting, "has no automatic " + name);
+    return control.refuse (CameraFault::kBadSetting, "the camera has no automatic " + name);
   CameraStatus status = control.status ("automatic " + name, error);
   if (!status.ok () || automatic || !wanted)
     return status;
@@ -362,9 +363,9 @@ set_white_balance (CameraControl &control, AutoMode mode)
   if (mode == AutoMode::kUnchanged)
     return {};
   if (!control.has ("BalanceWhiteAuto"))
-    return mode == AutoMode::kManual
-               ? CameraStatus ()
-               : control.refuse (CameraFault::kBadSetting, "has no automatic white balance");
+    return mode == AutoMode::kManual ? CameraStatus ()
+                                     : control.refuse (CameraFault::kBadSetting,
+                                           "the camera has no automatic white balance");
   return control.assign ("BalanceWhiteAuto", mode == AutoMode::kAuto ? "Continuous" : "Off");
 }
 
@@ -384,7 +385,8 @@ set_frame_rate (CameraControl &control, const CameraSettings &settings)
   ArvCamera *camera = control.camera ();
   const std::string what = "frame rate of " + number_text (settings.frame_rate);
   if (!arv_camera_is_frame_rate_available (camera, nullptr))
-    return control.refuse (CameraFault::kBadSetting, what + ": its frame rate cannot be set");
+    return control.refuse (
+        CameraFault::kBadSetting, what + ": the camera's frame rate cannot be set");
   GError *error = nullptr;
   arv_camera_set_frame_rate (camera, settings.frame_rate, &error);
   CameraStatus status = control.status (what, error);

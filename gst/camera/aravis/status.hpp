@@ -38,8 +38,9 @@ enum class CameraFault {
 inline std::string
 lost_text (const std::string &label)
 {
-  return label + ": does not answer any more; expected it plugged in and powered, and no other "
-                 "program to take control of it";
+  return label +
+         ": the camera does not answer any more; expected it plugged in and powered, and no other "
+         "program to take control of it";
 }
 
 /** The result of a camera function: ok, or a fault and one sentence that names the camera and what

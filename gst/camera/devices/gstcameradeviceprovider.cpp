@@ -93,7 +93,7 @@ GST_DEVICE_PROVIDER_REGISTER_DEFINE (rangecastdeviceprovider, "rangecastdevicepr
 namespace {
 
 /** A camera's user-defined name, which is not part of discovery. A camera is asked until it
- * answers, and then no more while it stays. */
+ *  answers, and then no more while it stays. */
 std::optional<std::string>
 user_name_of (const CameraInfo &info, const std::vector<CameraInfo> &known)
 {

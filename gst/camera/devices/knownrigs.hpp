@@ -29,7 +29,7 @@ std::vector<std::string> known_rig_files ();
 class KnownRigs {
 public:
   /** The views of these rig files whose cameras are all among `found`. Files that cannot be read
-   * are left out, with one line in `problems`, the message of load_rig(). */
+   *  are left out, with one line in `problems`, the message of load_rig(). */
   std::vector<KnownPair> pairs (const std::vector<std::string> &files,
       const std::vector<CameraInfo> &found, std::vector<std::string> &problems);
 

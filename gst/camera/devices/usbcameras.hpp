@@ -22,7 +22,7 @@ public:
   std::vector<CameraInfo> list ();
 
   /** Calls `on_change` from a thread of libusb events whenever a USB device comes or goes, until
-   * the object is destroyed.
+   *  the object is destroyed.
    *  @return false if this host's libusb has no hotplug */
   bool watch (std::function<void ()> on_change);
 

@@ -359,7 +359,7 @@ GST_START_TEST (test_camera_that_sends_another_size_than_its_pictures_is_refused
     configure (*camera, small_pictures ());
     Listener listener;
     assert_refused (camera->start (listener.arrived (), listener.lost ()),
-        CameraFault::kUnsupported, "bytes a picture; expected 3072 for 64x48 Mono8");
+        CameraFault::kUnsupported, "bytes an image; expected 3072 for 64x48 Mono8");
   }
 }
 GST_END_TEST;

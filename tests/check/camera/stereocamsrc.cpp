@@ -475,7 +475,7 @@ GST_START_TEST (test_pictures_go_on_after_a_flush_that_the_application_pushes_on
 GST_END_TEST;
 
 /* The pipeline takes a new base time, so running time begins at 0 again. */
-GST_START_TEST (test_running_time_begins_anew_after_a_flush_that_resets_it)
+GST_START_TEST (test_running_time_starts_over_after_a_flush_that_resets_it)
 {
   TestCameras cameras;
   CameraPipeline p ("trigger=free-run");
@@ -553,7 +553,7 @@ stereocamsrc_suite ()
   tcase_add_test (tc, test_eos_event_ends_a_stream_that_has_not_begun);
   tcase_add_test (tc, test_flush_goes_out_on_all_pads_and_pictures_go_on);
   tcase_add_test (tc, test_pictures_go_on_after_a_flush_that_the_application_pushes_on_one_pad);
-  tcase_add_test (tc, test_running_time_begins_anew_after_a_flush_that_resets_it);
+  tcase_add_test (tc, test_running_time_starts_over_after_a_flush_that_resets_it);
   tcase_add_test (tc, test_downstream_may_want_another_size_mid_stream);
   return suite;
 }

@@ -158,7 +158,7 @@ expect_comeback (const char *trigger)
   }
   fail_unless (gaps > 2, "%d gaps", gaps.load ());
   fail_unless_equals_uint64 (p.stat ("reconnects"), 2);
-  fail_unless (p.stat ("sets") + 3 >= p.seen (0).size (), "the statistics began anew");
+  fail_unless (p.stat ("sets") + 3 >= p.seen (0).size (), "the statistics started over");
   p.stop ();
   auto left_pictures = p.seen (0), right_pictures = p.seen (1);
   const std::size_t n = std::min (left_pictures.size (), right_pictures.size ());

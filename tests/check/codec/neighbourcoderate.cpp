@@ -312,7 +312,7 @@ push_some (GstHarness *h, const Rig &rig, int first, int n, bool timed = true)
   return last;
 }
 
-GST_START_TEST (test_goes_on_after_a_flush_and_begins_anew_after_ready)
+GST_START_TEST (test_goes_on_after_a_flush_and_starts_over_after_ready)
 {
   const Rig rig = ring_rig (1);
   GstHarness *h = harness_of ("neighbourcodeenc profile=packed target-bitrate=3500000");
@@ -395,7 +395,7 @@ neighbourcoderate_suite ()
   tcase_add_test (tc, test_stats_tell_the_rate_of_the_last_two_seconds);
   tcase_add_test (tc, test_max_depth_error_follows_the_thresholds);
   tcase_add_test (tc, test_target_follows_a_controller);
-  tcase_add_test (tc, test_goes_on_after_a_flush_and_begins_anew_after_ready);
+  tcase_add_test (tc, test_goes_on_after_a_flush_and_starts_over_after_ready);
   tcase_add_test (tc, test_frame_sets_without_time_come_at_the_frame_rate_of_the_caps);
   tcase_add_test (tc, test_temporal_is_within_a_tenth_of_the_target_and_thresholds_hardly_swing);
   return suite;

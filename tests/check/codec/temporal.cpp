@@ -114,7 +114,7 @@ GST_START_TEST (test_only_the_first_frame_set_is_a_key_one_and_a_still_scene_tak
 }
 GST_END_TEST;
 
-GST_START_TEST (test_each_row_is_coded_anew_within_the_refresh_period)
+GST_START_TEST (test_each_row_is_coded_again_within_the_refresh_period)
 {
   const Rig rig = ring_rig (1, 160, 200);
   GstHarness *h = encoder (rig, "profile=packed refresh-period=500");
@@ -231,7 +231,7 @@ GST_START_TEST (test_a_late_slice_wipes_nothing_out)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_key_interval_flush_caps_and_changed_bits_begin_anew)
+GST_START_TEST (test_key_interval_flush_caps_and_changed_bits_start_over)
 {
   const Rig rig = ring_rig (1);
   GstHarness *h = encoder (rig, "profile=packed refresh-period=0 key-interval=100");
@@ -412,13 +412,13 @@ temporal_suite (void)
   TCase *tc = tcase_create ("general");
   suite_add_tcase (s, tc);
   tcase_add_test (tc, test_only_the_first_frame_set_is_a_key_one_and_a_still_scene_takes_few_bytes);
-  tcase_add_test (tc, test_each_row_is_coded_anew_within_the_refresh_period);
+  tcase_add_test (tc, test_each_row_is_coded_again_within_the_refresh_period);
   tcase_add_test (tc, test_a_request_from_downstream_makes_a_key_frame_set_and_is_announced);
   tcase_add_test (tc, test_a_request_from_upstream_waits_for_its_running_time);
   tcase_add_test (tc, test_requests_for_several_times_are_all_answered);
   tcase_add_test (tc, test_a_decoder_can_begin_at_every_frame_set_without_the_delta_flag);
   tcase_add_test (tc, test_a_late_slice_wipes_nothing_out);
-  tcase_add_test (tc, test_key_interval_flush_caps_and_changed_bits_begin_anew);
+  tcase_add_test (tc, test_key_interval_flush_caps_and_changed_bits_start_over);
   tcase_add_test (tc, test_lossless_stays_lossless);
   tcase_add_test (tc, test_what_refers_to_a_lost_frame_set_is_left_out_and_a_key_one_is_asked_for);
   tcase_add_test (tc, test_a_lost_slice_is_whole_again_after_the_refresh_period_without_requests);

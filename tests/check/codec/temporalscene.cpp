@@ -299,7 +299,7 @@ private:
   GstBuffer *in_ = nullptr;
 };
 
-GST_START_TEST (test_decoder_keeps_no_reference_that_is_255_numbers_late_and_begins_anew_at_256)
+GST_START_TEST (test_decoder_keeps_no_reference_that_is_255_numbers_late_and_starts_over_at_256)
 {
   const Rig rig = ring_rig (1, 96, 72);
   for (const guint32 late : {1u, 255u, 256u}) {
@@ -407,7 +407,7 @@ public:
     gst_harness_teardown (decoder_);
   }
 
-  /* The second camera begins anew, as after a loss of power. */
+  /* The second camera starts over, as after a loss of power. */
   void restart ()
   {
     gst_harness_teardown (cameras_[1].encoder);
@@ -520,7 +520,7 @@ GST_START_TEST (test_camera_that_was_cut_off_is_whole_in_the_next_frame_set_wher
 }
 GST_END_TEST;
 
-GST_START_TEST (test_camera_that_began_anew_is_whole_at_once)
+GST_START_TEST (test_camera_that_started_over_is_whole_at_once)
 {
   const TwoCameras::Scenes scenes;
   for (const char *profile : kProfiles) {
@@ -553,12 +553,12 @@ temporalscene_suite (void)
   tcase_add_test (tc, test_decoder_bears_frame_numbers_that_wrap_around);
   tcase_add_test (tc, test_encoder_refers_over_255_numbers_and_across_2_to_the_32_but_no_further);
   tcase_add_test (
-      tc, test_decoder_keeps_no_reference_that_is_255_numbers_late_and_begins_anew_at_256);
+      tc, test_decoder_keeps_no_reference_that_is_255_numbers_late_and_starts_over_at_256);
   tcase_add_test (tc, test_encoder_of_each_view_and_rangemux_give_what_one_encoder_of_all_gives);
   tcase_add_test (tc, test_camera_that_was_cut_off_is_whole_again_within_the_refresh_period);
   tcase_add_test (
       tc, test_camera_that_was_cut_off_is_whole_in_the_next_frame_set_where_it_can_be_asked);
-  tcase_add_test (tc, test_camera_that_began_anew_is_whole_at_once);
+  tcase_add_test (tc, test_camera_that_started_over_is_whole_at_once);
   return s;
 }
 

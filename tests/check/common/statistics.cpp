@@ -461,7 +461,7 @@ frames_at_the_end (GstElement *pipeline)
   return frames;
 }
 
-GST_START_TEST (test_counters_begin_anew_with_each_start)
+GST_START_TEST (test_counters_start_over_with_each_start)
 {
   GstElement *pipeline = gst_parse_launch (
       "avatartestsrc name=source view-id=0 ! video/x-range,width=64,height=48 ! roiextract "
@@ -625,7 +625,7 @@ statistics_suite ()
   tcase_add_test (tc, test_stream_that_stalls_is_told_of_with_zero_fps);
   tcase_add_test (tc, test_nothing_is_posted_when_off_or_paused);
   tcase_add_test (tc, test_can_be_switched_while_playing);
-  tcase_add_test (tc, test_counters_begin_anew_with_each_start);
+  tcase_add_test (tc, test_counters_start_over_with_each_start);
   tcase_add_test (tc, test_flush_changes_no_count);
   tcase_add_test (tc, test_elements_that_come_and_go_while_the_timer_runs_are_no_fault);
   tcase_add_test (tc, test_the_thread_of_all_timers_neither_posts_nor_has_the_last_reference);

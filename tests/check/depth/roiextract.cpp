@@ -125,7 +125,7 @@ GST_START_TEST (test_margin_grows_the_roi)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_capture_background_learns_anew)
+GST_START_TEST (test_capture_background_learns_again)
 {
   const Rig rig = ring_rig (1);
   GstHarness *h = roi_harness (rig, "roiextract background-frames=2");
@@ -142,7 +142,7 @@ GST_START_TEST (test_capture_background_learns_anew)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_learning_anew_asks_for_the_whole_picture)
+GST_START_TEST (test_learning_again_asks_for_the_whole_picture)
 {
   const Rig rig = ring_rig (1);
   GstHarness *h = roi_harness (rig, "roiextract background-frames=1");
@@ -326,7 +326,7 @@ GST_START_TEST (test_growing_person_is_told_before_the_edge_is_reached)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_new_size_is_learnt_anew_and_same_size_keeps_the_background)
+GST_START_TEST (test_new_size_is_learnt_again_and_same_size_keeps_the_background)
 {
   const Rig rig = ring_rig (1), larger = ring_rig (1, 640, 480);
   GstHarness *h = roi_harness (rig, "roiextract background-frames=1");
@@ -576,8 +576,8 @@ roiextract_suite ()
   tcase_add_test (tc, test_nobody_is_an_empty_roi_and_no_error);
   tcase_add_test (tc, test_frames_before_the_camera_has_settled_teach_nothing);
   tcase_add_test (tc, test_margin_grows_the_roi);
-  tcase_add_test (tc, test_capture_background_learns_anew);
-  tcase_add_test (tc, test_learning_anew_asks_for_the_whole_picture);
+  tcase_add_test (tc, test_capture_background_learns_again);
+  tcase_add_test (tc, test_learning_again_asks_for_the_whole_picture);
   tcase_add_test (tc, test_new_caps_leave_a_captured_background_alone);
   tcase_add_test (tc, test_flush_gap_and_eos_keep_the_background);
   tcase_add_test (tc, test_background_is_saved_and_loaded);
@@ -586,7 +586,7 @@ roiextract_suite ()
   tcase_add_test (tc, test_missing_background_file_is_one_error_that_names_it);
   tcase_add_test (tc, test_tells_upstream_the_roi_once_for_a_person_who_stays);
   tcase_add_test (tc, test_growing_person_is_told_before_the_edge_is_reached);
-  tcase_add_test (tc, test_new_size_is_learnt_anew_and_same_size_keeps_the_background);
+  tcase_add_test (tc, test_new_size_is_learnt_again_and_same_size_keeps_the_background);
   tcase_add_test (tc, test_stats_count_points);
   tcase_add_test (tc, test_forgets_the_background_in_null);
   tcase_add_test (tc, test_who_sits_still_stays_and_the_wall_may_change_slowly);

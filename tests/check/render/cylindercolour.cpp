@@ -113,7 +113,7 @@ GST_START_TEST (test_blend_changes_colours_about_seams_and_no_depth)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_gains_start_anew_after_a_flush)
+GST_START_TEST (test_gains_start_over_after_a_flush)
 {
   const Scene scene (4, kWidth, kHeight, 1);
   GstHarness *h = gst_harness_new_parse ("cylinderfilter");
@@ -172,7 +172,7 @@ cylindercolour_suite ()
   tcase_add_test (tc, test_without_balance_and_blend_colours_are_the_cameras);
   tcase_add_test (tc, test_balance_is_on_and_lifts_the_darker_camera);
   tcase_add_test (tc, test_blend_changes_colours_about_seams_and_no_depth);
-  tcase_add_test (tc, test_gains_start_anew_after_a_flush);
+  tcase_add_test (tc, test_gains_start_over_after_a_flush);
   tcase_add_test (tc, test_colour_properties_can_be_controlled);
   return suite;
 }

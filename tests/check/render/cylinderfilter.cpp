@@ -251,7 +251,7 @@ GST_START_TEST (test_a_lost_packet_is_no_reason_to_forget_but_a_jump_in_time_is)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_another_stream_and_another_unit_height_begin_anew)
+GST_START_TEST (test_another_stream_and_another_unit_height_start_over)
 {
   const Rig rig = same_place_rig (2);
   GstHarness *h = harness_for (rig, "cylinderfilter axis=vertical");
@@ -310,7 +310,7 @@ GST_START_TEST (test_memory_that_ends_anywhere_is_one_error)
 {
   if (!memory_can_end ())
     RANGECAST_SKIP ("operator new is somebody else's");
-  /* On one thread: OpenCV's pool waits for ever where it has no memory for its own threads. */
+  /* On one thread: OpenCV's pool waits forever where it has no memory for its own threads. */
   const Rig rig = same_place_rig (2, 32, 24);
   ck_assert_int_gt (run_out_of_memory ("cylinderfilter n-threads=1 mode=blend", rig), 20);
 }
@@ -531,7 +531,7 @@ cylinderfilter_suite ()
   tcase_add_test (tc, test_stats_count_frames_points_and_units);
   tcase_add_test (tc, test_forgets_winners_on_discont_flush_and_another_rig);
   tcase_add_test (tc, test_a_lost_packet_is_no_reason_to_forget_but_a_jump_in_time_is);
-  tcase_add_test (tc, test_another_stream_and_another_unit_height_begin_anew);
+  tcase_add_test (tc, test_another_stream_and_another_unit_height_start_over);
   tcase_add_test (tc, test_forgets_winners_while_it_is_off);
   tcase_add_test (tc, test_jump_in_time_counts_though_its_buffer_is_too_late);
   tcase_add_test (tc, test_memory_that_ends_anywhere_is_one_error);

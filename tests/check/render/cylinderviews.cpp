@@ -184,8 +184,8 @@ GST_START_TEST (test_view_with_a_wrong_pose_is_left_out_and_a_warning_and_stats_
 }
 GST_END_TEST;
 
-/* A seek moves no camera. Without poses no correction is made anew, and one goes only 15 frame sets
- * after the last change. */
+/* A seek moves no camera. Without poses no correction is made again, and one goes only 15 frame
+ * sets after the last change. */
 GST_START_TEST (test_corrections_outlast_a_flush_but_not_the_stream)
 {
   const Scene scene (4, kWidth, kHeight, 1, kStill);
@@ -239,7 +239,7 @@ GST_START_TEST (test_corrections_outlast_a_reconfigure_from_downstream)
   Filter filter ("cylinderfilter", nudged_caps (scene, {0.003, 0, 0.002}, 0));
   filter.run (scene, 2);
   GstCaps *corrected = filter.caps ();
-  filter.set ("agree", "views"); /* so that nothing is corrected anew */
+  filter.set ("agree", "views"); /* so that nothing is corrected again */
   gst_harness_push_upstream_event (filter.h, gst_event_new_reconfigure ());
   filter.run (scene, 1);
   GstCaps *caps = filter.caps ();

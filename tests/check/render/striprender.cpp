@@ -497,7 +497,7 @@ GST_START_TEST (test_opengl_is_left_as_it_was)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_flush_begins_auto_orbit_anew)
+GST_START_TEST (test_flush_begins_auto_orbit_again)
 {
   const Rig rig = ring_rig (1);
   GstHarness *h = render_harness (rig, "auto-orbit=40");
@@ -729,7 +729,7 @@ striprender_suite ()
   tcase_add_test (tc, test_late_frames_are_dropped_undrawn);
   tcase_add_test (tc, test_pictures_carry_a_sync_point);
   tcase_add_test (tc, test_opengl_is_left_as_it_was);
-  tcase_add_test (tc, test_flush_begins_auto_orbit_anew);
+  tcase_add_test (tc, test_flush_begins_auto_orbit_again);
   tcase_add_test (tc, test_input_without_a_rate_gets_30_where_downstream_wants_one);
   tcase_add_test (tc, test_old_opengl_is_one_error_that_says_so);
   tcase_add_test (tc, test_pictures_larger_than_opengl_has_are_one_error);

@@ -241,7 +241,7 @@ GST_START_TEST (test_held_picture_follows_keys_and_properties)
   g_object_set (live.r, "mode", 2, "azimuth", 40.0, nullptr);
   fail_unless_cmp (live.next ().rgba, !=, turned.rgba);
   g_object_set (live.r, "mode", 0, "azimuth", 0.0, nullptr);
-  fail_unless (live.next ().rgba == still.rgba, "strips are not made anew");
+  fail_unless (live.next ().rgba == still.rgba, "strips are not made again");
 }
 GST_END_TEST;
 

@@ -180,7 +180,7 @@ GST_START_TEST (test_repeated_packets_change_nothing)
 }
 GST_END_TEST;
 
-/* Before it knows their rate, rtpjitterbuffer starts anew if 120 packets are out of order. */
+/* Before it knows their rate, rtpjitterbuffer starts over if 120 packets are out of order. */
 GST_START_TEST (test_packets_out_of_order_change_nothing)
 {
   NEED_NETSIM;

@@ -98,7 +98,7 @@ GST_START_TEST (test_a_flood_from_the_senders_own_host_does_not_drive_out_one_of
 }
 GST_END_TEST;
 
-/* Else 64 strangers of two packets each would keep everybody out for ever. */
+/* Else 64 strangers of two packets each would keep everybody out forever. */
 GST_START_TEST (test_strangers_who_fell_silent_make_room)
 {
   Probation p;

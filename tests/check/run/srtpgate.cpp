@@ -41,7 +41,7 @@ struct Encrypter {
     gst_rtp_buffer_unmap (&rtp);
     return gst_harness_push_and_pull (h, buffer);
   }
-  /* Sends until the sequence number has begun anew so often, in steps that count as losses. */
+  /* Sends until the sequence number has started over so often, in steps that count as losses. */
   void wrap (guint32 ssrc, int times)
   {
     for (gint64 i = 0; i < gint64 (times) << 16; i += 0x4000)
@@ -166,7 +166,7 @@ GST_START_TEST (test_the_streams_of_genuine_senders_are_bounded_and_those_who_se
   NEED_SRTP;
   Encrypter good (1);
   Decrypter decrypter;
-  for (int i = 65530; i < 65550; i++) /* its sequence numbers begin anew */
+  for (int i = 65530; i < 65550; i++) /* its sequence numbers start over */
     fail_unless (decrypter.opens (good.packet (7, guint16 (i))));
   for (guint32 i = 0; i < 300; i++) {
     ck_assert_int_gt (decrypter.opens_after (good, 1000 + i), 0);
@@ -190,7 +190,7 @@ check_late (int wraps, int most)
   fail_unless_equals_int (decrypter.streams (), 1);
 }
 
-GST_START_TEST (test_a_receiver_that_comes_after_the_sequence_numbers_began_anew_opens_the_stream)
+GST_START_TEST (test_a_receiver_that_comes_after_the_sequence_numbers_started_over_opens_the_stream)
 {
   NEED_SRTP;
   check_late (0, 1);
@@ -233,7 +233,7 @@ GST_START_TEST (test_a_wrong_key_opens_with_no_roll_over)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_sequence_numbers_may_begin_anew_while_the_roll_over_is_looked_for)
+GST_START_TEST (test_sequence_numbers_may_start_over_while_the_roll_over_is_looked_for)
 {
   NEED_SRTP;
   {
@@ -341,10 +341,10 @@ srtpgate_suite ()
   tcase_add_test (tc, test_bytes_that_are_no_packets_do_not_pass);
   tcase_add_test (tc, test_the_streams_of_genuine_senders_are_bounded_and_those_who_send_go_on);
   tcase_add_test (
-      tc, test_a_receiver_that_comes_after_the_sequence_numbers_began_anew_opens_the_stream);
+      tc, test_a_receiver_that_comes_after_the_sequence_numbers_started_over_opens_the_stream);
   tcase_add_test (tc, test_a_flood_of_strangers_does_not_keep_out_a_sender_of_unknown_roll_over);
   tcase_add_test (tc, test_a_wrong_key_opens_with_no_roll_over);
-  tcase_add_test (tc, test_sequence_numbers_may_begin_anew_while_the_roll_over_is_looked_for);
+  tcase_add_test (tc, test_sequence_numbers_may_start_over_while_the_roll_over_is_looked_for);
   tcase_add_test (tc, test_a_known_sender_is_found_again_after_a_long_loss_and_replays_are_not);
   tcase_add_test (tc, test_a_sender_that_begins_again_with_the_same_ssrc_is_found);
   tcase_add_test (tc, test_replays_stay_out_when_senders_were_forgotten);

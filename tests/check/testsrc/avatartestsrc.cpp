@@ -265,7 +265,7 @@ GST_START_TEST (test_loop_goes_forwards_and_backwards_through_the_first_pictures
 }
 GST_END_TEST;
 
-GST_START_TEST (test_loop_is_drawn_anew_for_another_size_and_rate)
+GST_START_TEST (test_loop_is_drawn_again_for_another_size_and_rate)
 {
   GstHarness *h =
       source_harness ("left", "video/x-raw,format=RGBx,width=32,height=24,framerate=5/1");
@@ -613,7 +613,7 @@ avatartestsrc_suite ()
   tcase_add_test (tc, test_caps_change_mid_stream_changes_the_size);
   tcase_add_test (tc, test_same_seed_and_capture_time_give_the_same_picture);
   tcase_add_test (tc, test_loop_goes_forwards_and_backwards_through_the_first_pictures);
-  tcase_add_test (tc, test_loop_is_drawn_anew_for_another_size_and_rate);
+  tcase_add_test (tc, test_loop_is_drawn_again_for_another_size_and_rate);
   tcase_add_test (tc, test_loop_that_needs_too_much_memory_is_an_error_that_names_it);
   tcase_add_test (tc, test_each_camera_pad_gives_its_own_cameras_picture);
   tcase_add_test (tc, test_padded_strides_of_downstreams_pool_are_kept_to);

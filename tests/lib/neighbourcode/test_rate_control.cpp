@@ -483,7 +483,7 @@ TEST (RateMeter, of_fast_streams_it_is_that_of_what_it_remembers)
   EXPECT_NEAR (meter.bits_per_s (), 800'000, 1);
 }
 
-TEST (RateMeter, begins_anew_where_time_goes_back)
+TEST (RateMeter, starts_over_where_time_goes_back)
 {
   RateMeter meter;
   meter.add (1'000'000'000, 100);

@@ -162,7 +162,7 @@ TEST_P (ReferenceChoices, when_all_moves_references_end_within_a_few_frame_sets)
   EXPECT_EQ (coded.delta_rows (kStill + 11), 0);
 }
 
-TEST_P (ReferenceChoices, each_row_is_coded_anew_within_the_refresh_period_whatever_moves)
+TEST_P (ReferenceChoices, each_row_is_coded_again_within_the_refresh_period_whatever_moves)
 {
   EncoderSettings settings = settings_of (GetParam (), true);
   constexpr int kPeriod = 10;

@@ -88,7 +88,7 @@ TEST (StorageCheck, as_many_collections_as_are_let_through_do_no_harm)
 
 TEST (StorageCheck, binary_data_without_a_type_are_refused)
 {
-  /* OpenCV would read these for ever. */
+  /* OpenCV would read these forever. */
   const std::string nothing (64, 'A');
   expect_refused (
       TestFile ("a.yml", "%YAML:1.0\n---\na: !!binary |\n    " + nothing + "\n"), "binary");

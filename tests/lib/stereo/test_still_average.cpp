@@ -68,7 +68,7 @@ TEST (StillAverage, first_picture_comes_out_as_it_is)
   EXPECT_EQ (cv::norm (still.add (picture), picture, cv::NORM_INF), 0);
 }
 
-TEST (StillAverage, what_moves_and_what_is_beside_it_begin_anew)
+TEST (StillAverage, what_moves_and_what_is_beside_it_start_over)
 {
   StillAverage still;
   still.set (10);
@@ -102,7 +102,7 @@ TEST (StillAverage, what_drifts_slowly_does_not_trail)
   EXPECT_LT (with, 1.1 * without);
 }
 
-TEST (StillAverage, picture_of_another_size_begins_anew)
+TEST (StillAverage, picture_of_another_size_starts_over)
 {
   StillAverage still;
   still.set (10);

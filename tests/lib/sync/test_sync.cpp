@@ -211,7 +211,7 @@ TEST (TriggerMatcher, restarted_camera_is_said_to_have_lost_step)
   EXPECT_TRUE (camera.finder.lost_sync ());
   camera.finder.start (kPeriod);
   camera.settle ();
-  camera.expect_in_step ("after it was learnt anew");
+  camera.expect_in_step ("after it was learnt again");
 }
 
 TEST (TriggerMatcher, frames_before_any_trigger_are_not_known)
@@ -423,7 +423,7 @@ TEST (CameraClock, camera_without_stamps_is_known_by_arrival)
   EXPECT_EQ (clock.host_time (0, 12345), 12345);
 }
 
-TEST (CameraClock, restarted_clock_begins_anew)
+TEST (CameraClock, restarted_clock_starts_over)
 {
   CameraClock clock;
   clock.host_time (500 * kSecond, 10 * kSecond);
