@@ -226,8 +226,8 @@ assign_strings (const Strings &strings, RtspOptions &options)
       {std::pair ("--cert", strings.certificate), {"--key", strings.key}})
     if (file && !*file)
       return bad_option (option, "a file", file);
-  take (strings.certificate, options.certificate_file);
-  take (strings.key, options.key_file);
+  assign (strings.certificate, options.certificate_file);
+  assign (strings.key, options.key_file);
   options.always = strings.always;
   if (options.mount.size () < 2 || options.mount[0] != '/')
     return bad_option ("--mount", "a path that begins with /", options.mount);
