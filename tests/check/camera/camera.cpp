@@ -285,7 +285,7 @@ GST_START_TEST (test_refused_features_name_feature_value_and_range)
       {"AcquisitionStart=1", "is a command and takes no value"},
       {"GainRaw", "is no command; give it a value"},
       {"GainRaw=1 =", "features: expected a feature's name"},
-      {"PixelFormat=Mono16", "Mono16 is not supported"},
+      {"PixelFormat=Mono16", "Mono16 are not supported"},
   };
   for (const auto &c : cases) {
     CameraSettings settings = small_pictures ();
