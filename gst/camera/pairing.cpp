@@ -244,7 +244,7 @@ FramePairing::capture_time (int camera, const CameraFrame &frame)
       clocks_[camera].host_time (timestamp (frame), frame.arrived_us * 1000);
   const auto exposed_ns = exposure_time (camera, frame);
   std::optional<std::int64_t> taken_ns;
-  if (frame.buffer || frame.camera_time_ns > 0) /* else it was given up long after its arrival */
+  if (frame.buffer || frame.camera_time_ns > 0) /* otherwise it timed out long after its arrival */
     taken_ns = exposed_ns ? *exposed_ns : arrived_ns - exposure_ns_;
   if (by_ == TriggeredBy::kCamera)
     return taken_ns;

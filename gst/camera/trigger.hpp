@@ -18,11 +18,11 @@
 #include "settings.hpp"
 
 /** The thread that triggers the cameras at the multiples of the frame period on the pipeline clock,
- * or at requested times, by software triggers or action commands. All hosts that share the clock
- * trigger at the same moments. Does nothing where cameras run freely or others trigger them.
+ *  or at requested times, by software triggers or action commands. All hosts that share the clock
+ *  trigger at the same moments. Does nothing where cameras run freely or others trigger them.
  *
- *  It is no GstTask: it has real-time priority, and GstTask borrows its threads from a pool
- *  of the process. */
+ *  A thread of its own instead of a GstTask, because it has real-time priority, and GstTask borrows
+ *  threads from a pool of the process. */
 class CameraTrigger {
 public:
   /** Called from trigger threads. */

@@ -9,7 +9,7 @@ namespace {
 /* A few are downstream, in queues; more than that are freed after use. */
 constexpr std::size_t kMaxKept = 16;
 /* A free memory that is so many times as large as what is needed is freed: one huge frame set does
- * not hold its memory for ever. Those of up to kMinExcess bytes may stay. */
+ * not hold its memory forever. Those of up to kMinExcess bytes may stay. */
 constexpr gsize kMaxExcess = 8, kMinExcess = gsize{1} << 20;
 
 /* gst_allocator_alloc() aborts where memory is short. */

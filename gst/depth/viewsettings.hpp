@@ -16,7 +16,7 @@ struct ViewSettings {
 /** Loads a view from a rig file and scales it to the size of the images.
  *  @param property  the name of the property that gives `view_id`, for the error
  *  @return the error of load_rig(); kNotFound if the rig lacks the view; kBadSize if it is for
- * images of another shape */
+ *  images of another shape */
 rangecast::Status load_view (const std::string &rig_file, int view_id, const char *property,
     int width, int height, rangecast::View &view);
 

@@ -180,7 +180,7 @@ check_control (const std::string &name, ArvDevice *device)
   return {CameraFault::kBusy,
       "camera '" + name + "': " +
           (privilege ? "another program has control of it"
-                     : "it refuses control, although no other program has it") +
+                     : "the camera refuses control although no other program has it") +
           " (GigE Vision gives it to one at a time; it is free again 3 s after that one is gone)"};
 }
 

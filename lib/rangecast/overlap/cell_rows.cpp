@@ -140,7 +140,7 @@ CellRows::decide_slice (const RowRules &rules, std::size_t number, Pass pass)
 }
 
 /* A sweep decides every other slice, then the rest: so the neighbours that a slice reads do not
- * change meanwhile, with any number of threads, and two neighbours cannot swap for ever. */
+ * change meanwhile, with any number of threads, and two neighbours cannot swap forever. */
 RowCounts
 CellRows::decide (const RowRules &rules, int threads)
 {

@@ -167,7 +167,7 @@ struct Cells::Cutter {
     return span <= gap;
   }
 
-  /* Makes the layers of those entries. Layers are written anew with each of their entries, for the
+  /* Makes the layers of those entries. Layers are written again with each of their entries, for the
    * same reason. */
   void finish_entries ()
   {
