@@ -55,6 +55,7 @@ CameraTrigger::stop ()
   }
   if (thread_.joinable ())
     thread_.join ();
+  clock_wait_.reset ();
   action_.close ();
   cameras_.clear ();
 }

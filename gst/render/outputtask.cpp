@@ -38,16 +38,14 @@ OutputTask::stop ()
     gst_pad_stop_task (src);
   std::lock_guard guard (lock_);
   src_ = nullptr;
-  g_clear_pointer (&id_, gst_clock_id_unref);
-  gst_clear_object (&clock_);
+  clock_wait_.reset ();
 }
 
-/* With the lock. A clock that is about to be waited for returns at once, too. */
+/* With the lock. */
 void
 OutputTask::interrupt ()
 {
-  if (waiting_)
-    gst_clock_id_unschedule (id_);
+  clock_wait_.interrupt ();
   changed_.notify_all ();
 }
 
@@ -77,19 +75,8 @@ OutputTask::wait (std::unique_lock<std::mutex> &guard, GstClockTime due)
     changed_.wait (guard, [this] { return quit_ || woken_; });
     return;
   }
-  const GstClockTime time = gst_element_get_base_time (element) + due;
-  if (clock != clock_ || !gst_clock_single_shot_id_reinit (clock, id_, time)) {
-    if (id_)
-      gst_clock_id_unref (id_);
-    id_ = gst_clock_new_single_shot_id (clock, time);
-    gst_object_replace (reinterpret_cast<GstObject **> (&clock_), GST_OBJECT (clock));
-  }
+  clock_wait_.wait_until (guard, clock, gst_element_get_base_time (element) + due);
   gst_object_unref (clock);
-  waiting_ = true;
-  guard.unlock ();
-  gst_clock_id_wait (id_, nullptr);
-  guard.lock ();
-  waiting_ = false;
 }
 
 /* GstTask calls this again and again. */

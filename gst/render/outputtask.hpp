@@ -6,6 +6,8 @@
 #include <condition_variable>
 #include <mutex>
 
+#include "common/clockwait.hpp"
+
 /** The task of a source pad: calls back at times of the element's clock while the element plays.
  *
  *  GstTask calls its function with the pad's stream lock. That lock is released at once and taken
@@ -40,7 +42,6 @@ private:
   std::condition_variable changed_;
   GstPad *src_ = nullptr; /* while the task runs */
   Tick tick_ = nullptr;
-  GstClock *clock_ = nullptr; /* of id_, which is used again and again */
-  GstClockID id_ = nullptr;
-  bool quit_ = false, playing_ = false, woken_ = false, waiting_ = false;
+  ClockWait clock_wait_;
+  bool quit_ = false, playing_ = false, woken_ = false;
 };

@@ -30,6 +30,8 @@ public:
   void seek (GstClockTime position);
   /** Time goes on where the old rate left it. @return whether the rate has changed */
   bool set_rate (int fps_n, int fps_d);
+  /** Gives up the clock that wait() used. */
+  void stop () { clock_wait_.reset (); }
   /** The frame after the last one. */
   FrameTime next ();
   /** Waits for the next multiple of the frame period. Those that have passed are skipped, except

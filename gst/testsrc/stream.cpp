@@ -520,6 +520,7 @@ AvatarStream::stop ()
     gst_task_join (task);
   gst_clear_object (&task);
   g_rec_mutex_lock (&task_lock_); /* a seek may be in progress */
+  clock_.stop ();
   painter_.start ({});
   for (const auto &pad : pads ())
     pad->stop ();
