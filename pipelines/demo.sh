@@ -125,8 +125,8 @@ case "$input" in
     model=()
     [[ "$input" != avatar=* ]] || model=("location=${input#avatar=}")
     [[ "$input" != avatar=* || -f "${input#avatar=}" ]] || die "--input: no model '${input#avatar=}'"
-    gst-launch-1.0 -q avatartestsrc "views=$views" num-buffers=1 "rig-export=$rig" "${model[@]}" \
-      ! "video/x-range,width=${size%x*},height=${size#*x}" ! fakesink || exit 1 ;;
+    (launch avatartestsrc "views=$views" num-buffers=1 "rig-export=$rig" "${model[@]}" \
+      ! "video/x-range,width=${size%x*},height=${size#*x}" ! fakesink) || exit 1 ;;
   *)
     [ -f "$input/rig.yaml" ] || die "--input: '$input' is not avatar, avatar=MODEL, range, cameras, or a folder with a rig.yaml"
     cp "$input/rig.yaml" "$rig"
