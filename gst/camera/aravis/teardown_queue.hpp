@@ -1,31 +1,31 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <future>
 #include <glib.h>
 #include <memory>
+#include <utility>
 
 /** Runs functions that may have to wait for a camera that does not answer, one after the other in a
- *  thread of GLib's pool. They are finished also when this object is gone. */
+ *  thread of GLib's pool. They are finished also when this object is gone. If no thread can be
+ *  started, the calling thread runs them. */
 class TeardownQueue {
 public:
-  TeardownQueue () : pool_ (g_thread_pool_new (run_task, nullptr, 1, FALSE, nullptr)) {}
-  ~TeardownQueue () { g_thread_pool_free (pool_, FALSE, FALSE); }
+  TeardownQueue ()
+      : pool_ (g_thread_pool_new_full (run_task, nullptr, drop_task, 1, FALSE, nullptr))
+  {
+  }
+  /* Immediately if all are finished: without a thread, tasks that were run here are still queued.
+   */
+  ~TeardownQueue () { g_thread_pool_free (pool_, wait (std::chrono::milliseconds (0)), FALSE); }
   TeardownQueue (const TeardownQueue &) = delete;
   TeardownQueue &operator= (const TeardownQueue &) = delete;
 
   /** @param wait_for_it  wait up to a second, unless an earlier function is still running */
-  void run (std::function<void ()> function, bool wait_for_it)
-  {
-    wait_for_it = wait_for_it && wait (std::chrono::milliseconds (0));
-    auto task = std::make_unique<Task> (std::move (function));
-    done_ = task->get_future ();
-    g_thread_pool_push (pool_, task.release (), nullptr);
-    if (wait_for_it)
-      wait (std::chrono::seconds (1));
-  }
+  void run (std::function<void ()> function, bool wait_for_it);
   /** @return false if the last function is still running after that time */
   bool wait (std::chrono::milliseconds limit)
   {
@@ -36,12 +36,27 @@ public:
   static constexpr std::chrono::milliseconds kMaxWait = std::chrono::seconds (15);
 
 private:
-  using Task = std::packaged_task<void ()>;
+  struct Task {
+    explicit Task (std::function<void ()> f) : function (std::move (f)) {}
+    void run ()
+    {
+      if (started.exchange (true))
+        return;
+      auto once = std::move (function); /* the queue keeps the task, but not what it holds */
+      once ();
+    }
+
+    std::packaged_task<void ()> function;
+    std::atomic<bool> started = false;
+  };
+  using TaskPointer = std::shared_ptr<Task>;
 
   static void run_task (gpointer task, gpointer)
   {
-    (*std::unique_ptr<Task> (static_cast<Task *> (task))) ();
+    (*static_cast<TaskPointer *> (task))->run ();
+    drop_task (task);
   }
+  static void drop_task (gpointer task) { delete static_cast<TaskPointer *> (task); }
 
   GThreadPool *pool_;
   std::future<void> done_;

@@ -76,11 +76,11 @@ ViewAgreement::correct_rig (bool poses)
 {
   if (evaluated_ && frame_ - changed_at_ < kChangeEvery)
     return;
-  double most = 0, change = 0;
+  double largest = 0, change = 0;
   for (const View &view : nominal_.views)
-    most = std::max (most, poses_.correction (view.id).size ());
+    largest = std::max (largest, poses_.correction (view.id).size ());
   const double needed = kNeedsCorrection + kErrorsOff * poses_.depth_error ();
-  const bool corrects = poses && most > (corrected_ ? kStaysCorrected * needed : needed);
+  const bool corrects = poses && largest > (corrected_ ? kStaysCorrected * needed : needed);
   const auto wanted = [&] (int id) { return corrects ? poses_.correction (id) : PoseCorrection{}; };
   for (const View &view : nominal_.views) {
     const PoseCorrection by = wanted (view.id),

@@ -6,9 +6,13 @@
 #include "camera/aravis/features.hpp"
 #include "camera/aravis/frame_counter.hpp"
 #include "camera/aravis/receive_buffer.hpp"
+#include "camera/aravis/teardown_queue.hpp"
 #include "camera/aravis/user_name.hpp"
+#include <cerrno>
+#include <dlfcn.h>
 #include <filesystem>
 #include <fstream>
+#include <pthread.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -363,6 +367,50 @@ GST_START_TEST (test_usb_camera_without_permission_is_found_once)
 }
 GST_END_TEST;
 
+/* ---- teardown ---- */
+
+static bool no_threads = false;
+
+/* In place of the C library's: fails where a test says so. */
+extern "C" int
+pthread_create (
+    pthread_t *thread, const pthread_attr_t *attributes, void *(*start) (void *), void *data)
+{
+  using Create = decltype (&pthread_create);
+  static const auto create = reinterpret_cast<Create> (dlsym (RTLD_NEXT, "pthread_create"));
+  return no_threads ? EAGAIN : create (thread, attributes, start, data);
+}
+
+GST_START_TEST (test_teardown_runs_in_a_thread_of_its_own)
+{
+  GThread *here = g_thread_self (), *there = nullptr;
+  TeardownQueue queue;
+  queue.run ([&there] { there = g_thread_self (); }, true);
+  fail_unless (queue.wait (TeardownQueue::kMaxWait));
+  fail_unless (there && there != here);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_teardown_without_a_thread_runs_in_the_caller_once)
+{
+  std::vector<int> ran;
+  auto held = std::make_shared<int> (1);
+  {
+    TeardownQueue queue;
+    no_threads = true;
+    for (const int number : {1, 2})
+      queue.run ([&ran, held, number] { ran.push_back (number); }, number == 1);
+    assert_equals_int (ran.size (), 2);
+    assert_equals_int (held.use_count (), 2); /* the last function is kept until the next one */
+    fail_unless (queue.wait (std::chrono::milliseconds (0)));
+    no_threads = false;
+    queue.run ([&ran, held] { ran.push_back (3); }, false);
+    fail_unless (queue.wait (TeardownQueue::kMaxWait)); /* those before it are not run again */
+  }
+  fail_unless (ran == std::vector<int> ({1, 2, 3}));
+}
+GST_END_TEST;
+
 static Suite *
 cameraparts_suite ()
 {
@@ -386,6 +434,8 @@ cameraparts_suite ()
   tcase_add_test (tc, test_user_name_is_asked_for_with_the_bytes_of_the_standard);
   tcase_add_test (tc, test_user_name_is_taken_from_answers_of_the_standard_alone);
   tcase_add_test (tc, test_usb_camera_without_permission_is_found_once);
+  tcase_add_test (tc, test_teardown_runs_in_a_thread_of_its_own);
+  tcase_add_test (tc, test_teardown_without_a_thread_runs_in_the_caller_once);
   return suite;
 }
 

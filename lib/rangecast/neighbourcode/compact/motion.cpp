@@ -46,7 +46,7 @@ MotionSearch::MotionSearch ()
 
 /* Every second pixel of every second row, or all pixels of small blocks. */
 void
-MotionSearch::take_samples (const Pictures &pictures, const Area &area)
+MotionSearch::collect_samples (const Pictures &pictures, const Area &area)
 {
   const ConstRangeImage &image = pictures.image;
   const ColourQuantiser &colour = pictures.colour;
@@ -103,7 +103,7 @@ BlockMotion
 MotionSearch::find (const Pictures &pictures, Components threshold, const Area &area,
     std::span<const BlockMotion> near_by, MotionMemory &memory)
 {
-  take_samples (pictures, area);
+  collect_samples (pictures, area);
   Match best = match (pictures, threshold, area, 0, 0);
   const auto all = static_cast<int> (samples_.size ());
   const auto attempt = [&] (int dx, int dy) {

@@ -98,7 +98,7 @@ private:
     BlockMotion motion;
     int hits = -1;
   };
-  void take_samples (const Pictures &pictures, const Area &area);
+  void collect_samples (const Pictures &pictures, const Area &area);
   Match match (const Pictures &pictures, Components threshold, const Area &area, int dx, int dy);
 
   std::vector<Sample> samples_;
