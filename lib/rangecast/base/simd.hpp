@@ -17,13 +17,15 @@
 
 namespace rangecast {
 
-/** Vectors of 32-bit numbers without alignment (hence aligned (4)). Functions take and return them
- * by reference, because the calling convention for values depends on the processor. */
+/** Vectors of 32-bit numbers, and of as many bytes, without alignment (hence aligned (4)).
+ * Functions take and return them by reference, because the calling convention for values depends on
+ * the processor. */
 template <int kNumbers> struct Lanes {
   static constexpr int kLanes = kNumbers;
   typedef float F __attribute__ ((vector_size (4 * kNumbers), aligned (4), may_alias));
   typedef std::int32_t I __attribute__ ((vector_size (4 * kNumbers), aligned (4), may_alias));
   typedef std::uint32_t U __attribute__ ((vector_size (4 * kNumbers), aligned (4), may_alias));
+  typedef std::uint8_t B __attribute__ ((vector_size (4 * kNumbers), aligned (1), may_alias));
 
   static F &at (float *p) { return *reinterpret_cast<F *> (p); }
   static const F &at (const float *p) { return *reinterpret_cast<const F *> (p); }
@@ -31,6 +33,8 @@ template <int kNumbers> struct Lanes {
   static const I &at (const std::int32_t *p) { return *reinterpret_cast<const I *> (p); }
   static U &at (std::uint32_t *p) { return *reinterpret_cast<U *> (p); }
   static const U &at (const std::uint32_t *p) { return *reinterpret_cast<const U *> (p); }
+  static B &at (std::uint8_t *p) { return *reinterpret_cast<B *> (p); }
+  static const B &at (const std::uint8_t *p) { return *reinterpret_cast<const B *> (p); }
 
   /** v = |v| */
   static void make_positive (F &v) { v = (F)((I)v & 0x7fffffff); }

@@ -70,7 +70,9 @@ Matcher::set_range (int min_disparity, int max_disparity)
                                        " to " + std::to_string (max_disparity) +
                                        " pixels, expected less than 2000; is near too near?"};
   min_disparity_ = min_disparity;
-  disparities_ = (max_disparity - min_disparity + 1 + 15) / 16 * 16;
+  /* OpenCV needs multiples of 16. Semi-global matching gains by them, too: what is not in the range
+   * matches the excess as often as the rest, and is cleared as inconsistent. */
+  disparities_ = (max_disparity - min_disparity + 16) / 16 * 16;
   if (settings_.algorithm == MatchAlgorithm::kSgm)
     return {};
   try {

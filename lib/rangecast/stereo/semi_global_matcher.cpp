@@ -4,9 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "../base/simd.hpp"
+
+/* Functions that return vectors are all inlined, into code for the processor. */
+#pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace rangecast {
 namespace {
@@ -28,12 +32,14 @@ constexpr int kStep = 10, kJump = 60, kMinJump = 15, kEdge = 8;
 constexpr std::uint8_t kNever = 200;
 static_assert (kMaxCost + kJump < kNever && kNever + kStep < 256);
 
-constexpr int kPad = 16;                    /* padding around the costs of a pixel, bytes */
-constexpr int kRows = 16, kColumns = 32;    /* per job */
+constexpr int kSide = 32;                   /* of a tile, pixels */
 constexpr int kOverlap = 16;                /* rows in which paths converge */
-constexpr std::size_t kMaxCells = 24 << 20; /* maximum number in memory, of three bytes each */
-constexpr int kMaxKnown = 128;              /* disparities */
+constexpr std::size_t kMaxCells = 36 << 20; /* maximum number in memory, of two bytes each */
 constexpr std::int16_t kAmbiguous = INT16_MIN;
+
+/* Number of disparities from which half the size is searched first; margin around what was found
+ * there, disparities; pixels of half the size around a tile from which it is taken. */
+constexpr int kMany = 64, kMargin = 2, kAround = 4;
 
 constexpr auto kJumps = [] {
   std::array<std::uint8_t, 256> jumps{};
@@ -44,46 +50,72 @@ constexpr auto kJumps = [] {
 
 template <typename T>
 constexpr T
-lesser (T a, T b)
+lesser (const T &a, const T &b)
 {
   return a < b ? a : b;
 }
 
 template <typename T>
 constexpr T
-greater (T a, T b)
+greater (const T &a, const T &b)
 {
   return a > b ? a : b;
 }
 
+/* The same for vectors. Types of template arguments lose their alignment, hence not of B. */
+template <typename Lanes>
+inline typename Lanes::B
+min_of (const typename Lanes::B &a, const typename Lanes::B &b)
+{
+  return a < b ? a : b;
+}
+
+template <typename Lanes>
+inline typename Lanes::B
+max_of (const typename Lanes::B &a, const typename Lanes::B &b)
+{
+  return a > b ? a : b;
+}
+
+/* a + b, at most 255. */
+template <typename Lanes>
+inline typename Lanes::B
+add_up_to_255 (const typename Lanes::B &a, const typename Lanes::B &b)
+{
+  return min_of<Lanes> (a, ~b) + b;
+}
+
 /* Computes the differences of a row's pixels to one neighbour, offset to start at 0, and adds them
- * up. */
+ * up. @param n  a multiple of kSide, as below */
 void
 compare_with (const std::uint8_t *__restrict other, const std::uint8_t *__restrict own, int n,
     std::uint8_t *__restrict differences, std::uint8_t *__restrict sums)
 {
-  for (int x = 0; x < n; x++) {
-    const int by = lesser (greater (other[x] - own[x], -kMaxDifference), kMaxDifference);
-    differences[x] = std::uint8_t (by + kMaxDifference);
-    sums[x] = std::uint8_t (sums[x] + by + kMaxDifference);
-  }
+  constexpr std::uint8_t kMost = kMaxDifference;
+  for (int begin = 0; begin < n; begin += kSide)
+    for (int x = begin; x < begin + kSide; x++) {
+      const std::uint8_t high = greater (other[x], own[x]);
+      const auto above = std::uint8_t (high - own[x]), below = std::uint8_t (high - other[x]);
+      differences[x] = std::uint8_t (kMost + lesser (above, kMost) - lesser (below, kMost));
+      sums[x] = std::uint8_t (sums[x] + differences[x]);
+    }
 }
 
-/* @param way  -1: the image is reversed
- * @param[out] planes  by neighbour and column, and a plane of their sums */
+/* @param[out] planes  by neighbour and column, and a plane of their sums */
 void
-transform_row (const cv::Mat &padded, int y, int way, std::vector<std::uint8_t> &planes)
+transform_row (const cv::Mat &padded, int y, std::vector<std::uint8_t> &planes)
 {
   const int width = padded.cols - 2 * kRadiusX;
-  planes.assign (std::size_t (kNeighbours + 1) * std::size_t (width), 0);
+  planes.resize (std::size_t (kNeighbours + 1) * std::size_t (width));
   const std::uint8_t *own = padded.ptr<std::uint8_t> (y + kRadiusY) + kRadiusX;
   std::uint8_t *plane = planes.data (), *sums = plane + std::ptrdiff_t (kNeighbours) * width;
+  std::fill_n (sums, width, std::uint8_t{0});
   for (int v = -kRadiusY; v <= kRadiusY; v++)
     for (int u = -kRadiusX; u <= kRadiusX; u++) {
       if ((u + v) % 2 != 0 || (u == 0 && v == 0))
         continue;
-      compare_with (padded.ptr<std::uint8_t> (y + kRadiusY + v) + kRadiusX + way * u, own, width,
-          plane, sums);
+      compare_with (
+          padded.ptr<std::uint8_t> (y + kRadiusY + v) + kRadiusX + u, own, width, plane, sums);
       plane += width;
     }
 }
@@ -93,207 +125,446 @@ void
 range_of_row (const std::uint8_t *__restrict grey, int n, std::uint8_t *__restrict low,
     std::uint8_t *__restrict high)
 {
-  for (int x = 0; x < n; x++) {
-    const int left = (grey[x - 1] + grey[x]) / 2, right = (grey[x + 1] + grey[x]) / 2,
-              own = grey[x];
-    low[x] = std::uint8_t (lesser (lesser (left, right), own));
-    high[x] = std::uint8_t (greater (greater (left, right), own));
-  }
+  const auto mean = [] (std::uint8_t a, std::uint8_t b) {
+    return std::uint8_t ((a & b) + std::uint8_t ((a ^ b) >> 1));
+  };
+  for (int begin = 0; begin < n; begin += kSide)
+    for (int x = begin; x < begin + kSide; x++) {
+      const std::uint8_t own = grey[x], left = mean (grey[x - 1], own),
+                         right = mean (grey[x + 1], own);
+      low[x] = lesser (lesser (left, right), own);
+      high[x] = greater (greater (left, right), own);
+    }
 }
 
-/* The cost of each disparity of a pixel.
- * @param left       differences to the neighbours and their sum; `own`: the grey level
- * @param right      the same for right pixels in order of disparity, by neighbour
- * @param low, high  range_of_row() of the right pixels */
-template <int kCount>
+/* One row of a picture, described for matching. */
+struct RowView {
+  const std::uint8_t *planes; /* see transform_row() */
+  int stride;
+  const std::uint8_t *low, *high; /* of the right picture: see range_of_row() */
+};
+
+/* Adds up the greater of both descriptors' elements, for half of the neighbours and all
+ * disparities. Adding up |a - b| is adding up 2 max (a, b) - a - b. */
+template <typename Lanes, bool kFirst>
 inline void
-compare (const std::uint8_t *__restrict left, std::uint8_t own,
-    const std::uint8_t *__restrict right, int stride, const std::uint8_t *__restrict low,
-    const std::uint8_t *__restrict high, int disparities, std::uint8_t *__restrict cost)
+add_greater (const std::uint8_t *left, int left_stride, const std::uint8_t *right, int right_stride,
+    int count, std::uint8_t *sums)
 {
-  const int n = kCount > 0 ? kCount : disparities;
-  for (int d = 0; d < n; d++) {
-    const auto above = std::uint8_t (greater (own, high[d]) - high[d]),
-               below = std::uint8_t (greater (own, low[d]) - own);
-    auto sum =
-        std::uint8_t (kGreyWeight * lesser (greater (above, below), std::uint8_t (kMaxGrey)));
-    /* The sum of |a - b| is that of 2 max (a, b) - a - b; overflow cancels. */
-    std::uint8_t greatest = 0;
-#pragma GCC unroll 16
-    for (int k = 0; k < kNeighbours; k++)
-      greatest = std::uint8_t (greatest + greater (left[k], right[k * stride + d]));
-    sum = std::uint8_t (sum + 2 * greatest - left[kNeighbours] - right[kNeighbours * stride + d]);
-    cost[d] = std::uint8_t (sum >> kCostShift);
+  using B = typename Lanes::B;
+  constexpr int kHalf = kNeighbours / 2;
+  B own[kHalf];
+#pragma GCC unroll 8
+  for (int k = 0; k < kHalf; k++)
+    own[k] = Lanes::at (left + k * left_stride);
+  for (int d = 0; d < count; d++, sums += kSide) {
+    B sum = kFirst ? B{} : Lanes::at (sums);
+#pragma GCC unroll 8
+    for (int k = 0; k < kHalf; k++)
+      sum += max_of<Lanes> (own[k], Lanes::at (right + k * right_stride - d));
+    Lanes::at (sums) = sum;
   }
 }
 
-/* One step of a path: costs of the disparities of a pixel, given those of the previous pixel.
- * @param before, now  padded by kPad bytes on both sides
- * @param lowest  minimum of `before`. @return the minimum of `now` */
-template <int kCount>
-inline std::uint8_t
-step (const std::uint8_t *__restrict cost, const std::uint8_t *__restrict before,
-    std::uint8_t lowest, std::uint8_t jump, int disparities, std::uint8_t *__restrict now)
+/* The costs of a row of a tile.
+ * @param x      its first column; @param grey  of the left row from there on
+ * @param right  the right row
+ * @param[out] costs  by disparity and column */
+template <typename Lanes>
+inline void
+compare (const RowView &left, const std::uint8_t *grey, int x, const RowView &right, int low,
+    int count, std::uint8_t *costs)
 {
-  const int n = kCount > 0 ? kCount : disparities;
-  const auto far = std::uint8_t (lowest + jump);
-  std::uint8_t min = 255;
-  for (int d = 0; d < n; d++) {
-    const auto beside = std::uint8_t (lesser (before[d - 1], before[d + 1]) + kStep);
-    const auto value = std::uint8_t (cost[d] + lesser (lesser (before[d], far), beside) - lowest);
-    now[d] = value;
-    min = lesser (min, value);
-  }
-  return min;
-}
-
-} // namespace
-
-std::size_t
-SemiGlobalMatcher::at (const Stripe &stripe, int x, int y) const
-{
-  return (std::size_t (y - stripe.y0) * std::size_t (stripe.columns) + std::size_t (x)) *
-         std::size_t (disparities_);
-}
-
-/* Costs of all disparities of a row. */
-template <int kCount>
-void
-SemiGlobalMatcher::compare_row (const Stripe &stripe, int y, Memory &m)
-{
-  const int n = kCount > 0 ? kCount : disparities_, width = stripe.left.cols;
-  transform_row (padded_[0], y, 1, m.transformed[0]);
-  transform_row (padded_[1], y, -1, m.transformed[1]);
-  m.low.resize (std::size_t (width));
-  m.high.resize (std::size_t (width));
-  range_of_row (
-      padded_[1].ptr<std::uint8_t> (y + kRadiusY) + kRadiusX, width, m.low.data (), m.high.data ());
-  const std::uint8_t *left = m.transformed[0].data () + stripe.x0,
-                     *grey = stripe.left.ptr<std::uint8_t> (y) + stripe.x0;
-  std::uint8_t *costs = &costs_[at (stripe, 0, y)];
-  for (int x = 0; x < stripe.columns; x++) {
-    /* In the reversed row. */
-    const int first = width - 1 - (stripe.x0 + x - stripe.min_disparity);
-    const std::uint8_t *right = m.transformed[1].data () + first, *low = m.low.data () + first,
-                       *high = m.high.data () + first;
-    const std::uint8_t own = grey[x];
-    std::uint8_t of_left[kNeighbours + 1];
-    for (int k = 0; k <= kNeighbours; k++)
-      of_left[k] = left[k * width + x];
-    compare<kCount> (of_left, own, right, width, low, high, n, costs + std::ptrdiff_t (x) * n);
-  }
-}
-
-/* Both paths along a row. */
-template <int kCount>
-void
-SemiGlobalMatcher::walk_row (const Stripe &stripe, int y, Memory &m)
-{
-  const int n = kCount > 0 ? kCount : disparities_;
-  const std::uint8_t *grey = stripe.left.ptr<std::uint8_t> (y) + stripe.x0;
-  compare_row<kCount> (stripe, y, m);
-  const std::uint8_t *costs = &costs_[at (stripe, 0, y)];
-  std::uint8_t *sums = &across_[at (stripe, 0, y)];
-  for (const int way : {1, -1}) {
-    m.paths.assign (2 * std::size_t (n + 2 * kPad), kNever);
-    std::uint8_t *before = m.paths.data () + kPad, *now = before + n + 2 * kPad, lowest = 0;
-    const int first = way > 0 ? 0 : stripe.columns - 1;
-    std::fill_n (before, n, std::uint8_t{0});
-    for (int i = 0, x = first; i < stripe.columns; i++, x += way) {
-      const int edge = std::abs (grey[x] - grey[i > 0 ? x - way : x]);
-      lowest = step<kCount> (
-          costs + std::ptrdiff_t (x) * n, before, lowest, kJumps[std::size_t (edge)], n, now);
-      std::uint8_t *__restrict sum = sums + std::ptrdiff_t (x) * n;
-      const std::uint8_t *__restrict path = now;
-      if (way > 0)
-        std::copy_n (path, n, sum);
-      else
-        for (int d = 0; d < n; d++)
-          sum[d] = std::uint8_t (sum[d] + lesser (path[d], std::uint8_t (255 - sum[d])));
-      std::swap (before, now);
+  using B = typename Lanes::B;
+  constexpr int kHalf = kNeighbours / 2;
+  for (int part = 0; part < kSide; part += int (sizeof (B))) {
+    const int from = x + part, to = from - low;
+    const std::uint8_t *l = left.planes + from, *r = right.planes + to;
+    add_greater<Lanes, true> (l, left.stride, r, right.stride, count, costs + part);
+    add_greater<Lanes, false> (l + kHalf * left.stride, left.stride, r + kHalf * right.stride,
+        right.stride, count, costs + part);
+    const B own = Lanes::at (grey + part), sum = Lanes::at (l + kNeighbours * left.stride),
+            most = B{} + std::uint8_t (kMaxGrey);
+    const std::uint8_t *sums = r + kNeighbours * right.stride;
+    for (int d = 0; d < count; d++) {
+      const B high = Lanes::at (right.high + to - d), above = max_of<Lanes> (own, high) - high,
+              below = max_of<Lanes> (own, Lanes::at (right.low + to - d)) - own,
+              differs = min_of<Lanes> (max_of<Lanes> (above, below), most);
+      static_assert (kGreyWeight == 2);
+      B &cost = Lanes::at (costs + part + d * kSide);
+      const B all = (cost + differs) * 2 - sum - Lanes::at (sums - d);
+      cost = all >> kCostShift;
     }
   }
 }
 
-/* Whether no cost but those next to the best one is nearly as good. */
-template <int kCount>
-bool
-SemiGlobalMatcher::is_unique (const std::uint16_t *sums, int best, int disparities) const
+/* One step of kSide paths: costs of the disparities of a pixel, given those of the previous one.
+ * @param path    of the previous pixel, then of this one, by disparity; one more at both ends
+ * @param lowest  minimum of `path`
+ * @param use     called with each disparity and its new costs */
+template <typename Lanes, typename Use>
+inline void
+step (const std::uint8_t *cost, std::uint8_t *path, std::uint8_t *lowest, const std::uint8_t *jump,
+    int count, const Use &use)
 {
-  const int n = kCount > 0 ? kCount : disparities, share = 100 - settings_.uniqueness_ratio;
-  const auto like = std::uint16_t (share > 0 ? (100 * sums[best] + share - 1) / share : UINT16_MAX);
-  std::uint16_t rivals = 0;
-  for (int d = 0; d < n; d++)
-    rivals = std::uint16_t (rivals + (sums[d] < like ? 1 : 0));
-  for (int d = std::max (best - 1, 0); d <= std::min (best + 1, n - 1); d++)
-    rivals -= sums[d] < like;
-  return rivals == 0;
+  using B = typename Lanes::B;
+  const B low = Lanes::at (lowest), far = low + Lanes::at (jump);
+  B least = B{} + std::uint8_t{255}, before = Lanes::at (path - kSide), own = Lanes::at (path);
+  for (int d = 0; d < count; d++, path += kSide, cost += kSide) {
+    const B after = Lanes::at (path + kSide),
+            beside = min_of<Lanes> (before, after) + std::uint8_t (kStep),
+            now = Lanes::at (cost) + min_of<Lanes> (min_of<Lanes> (own, far), beside) - low;
+    Lanes::at (path) = now;
+    least = min_of<Lanes> (least, now);
+    use (d, now);
+    before = own;
+    own = after;
+  }
+  Lanes::at (lowest) = least;
 }
 
-/* The disparity of a pixel with the lowest cost, with subpixel precision by a parabola through it
- * and its neighbours; none if another one is nearly as good.
- * @param up  costs along the path from below */
-template <int kCount>
-SemiGlobalMatcher::Match
-SemiGlobalMatcher::choose (
-    const Stripe &stripe, std::size_t cell, const std::uint8_t *__restrict up, Memory &m) const
+/* Interleaves the bytes of the low, or of the high, halves of 16 bytes. */
+template <typename Lanes>
+inline typename Lanes::B
+interleave_low (const typename Lanes::B &a, const typename Lanes::B &b)
 {
-  const int n = kCount > 0 ? kCount : disparities_;
-  std::uint16_t *__restrict sums = m.sums.data ();
-  const std::uint8_t *__restrict across = &across_[cell], *__restrict down = &down_[cell];
-  std::uint16_t min_cost = UINT16_MAX;
-  for (int d = 0; d < n; d++) {
-    sums[d] = std::uint16_t (across[d] + down[d] + up[d]);
-    min_cost = lesser (min_cost, sums[d]);
-  }
-  auto place = std::uint16_t (n);
-  for (int d = 0; d < n; d++)
-    place = lesser (place, sums[d] == min_cost ? std::uint16_t (d) : std::uint16_t (n));
-  const int best = place;
-  Match match = {kAmbiguous, std::int16_t (best + stripe.min_disparity), min_cost};
-  if (settings_.uniqueness_ratio > 0 && !is_unique<kCount> (sums, best, disparities_))
-    return match;
-  match.disparity = std::int16_t (16 * match.whole);
-  if (best > 0 && best < n - 1) {
-    const int nearer = sums[best + 1], farther = sums[best - 1];
-    const int bend = greater (nearer + farther - 2 * min_cost, 1);
-    match.disparity =
-        std::int16_t (match.disparity + ((farther - nearer) * 16 + bend) / (2 * bend));
-  }
-  return match;
+  using B = typename Lanes::B;
+  if constexpr (sizeof (B) == 32)
+    return __builtin_shuffle (a, b,
+        B{0, 32, 1, 33, 2, 34, 3, 35, 4, 36, 5, 37, 6, 38, 7, 39, 16, 48, 17, 49, 18, 50, 19, 51,
+            20, 52, 21, 53, 22, 54, 23, 55});
+  else
+    return __builtin_shuffle (a, b, B{0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23});
 }
 
-/* Both paths along columns x to end: down, then up with the choice of disparities. */
-template <int kCount>
-void
-SemiGlobalMatcher::walk_columns (const Stripe &stripe, int x, int end, Memory &m)
+template <typename Lanes>
+inline typename Lanes::B
+interleave_high (const typename Lanes::B &a, const typename Lanes::B &b)
 {
-  const int n = kCount > 0 ? kCount : disparities_, width = end - x;
-  const std::ptrdiff_t each = n + 2 * kPad;
-  m.sums.resize (std::size_t (n));
-  for (const int way : {1, -1}) {
-    m.paths.assign (2 * std::size_t (width) * std::size_t (each), kNever);
-    m.lowest.assign (std::size_t (width), 0);
-    std::uint8_t *before = m.paths.data () + kPad, *now = before + width * each;
-    for (int k = 0; k < width; k++)
-      std::fill_n (before + k * each, n, std::uint8_t{0});
-    const int first = way > 0 ? stripe.y0 : stripe.y0 + stripe.rows - 1;
-    for (int i = 0, y = first; i < stripe.rows; i++, y += way) {
-      const std::uint8_t *grey = stripe.left.ptr<std::uint8_t> (y) + stripe.x0 + x,
-                         *last =
-                             stripe.left.ptr<std::uint8_t> (i > 0 ? y - way : y) + stripe.x0 + x;
-      for (int k = 0; k < width; k++) {
-        const std::size_t cell = at (stripe, x + k, y);
-        std::uint8_t &lowest = m.lowest[std::size_t (k)];
-        lowest = step<kCount> (&costs_[cell], before + k * each, lowest,
-            kJumps[std::size_t (std::abs (grey[k] - last[k]))], n,
-            way > 0 ? &down_[cell] : now + k * each);
-        if (way > 0)
-          std::copy_n (&down_[cell], n, now + k * each);
-        else
-          matches_[cell / std::size_t (n)] = choose<kCount> (stripe, cell, now + k * each, m);
+  using B = typename Lanes::B;
+  if constexpr (sizeof (B) == 32)
+    return __builtin_shuffle (a, b,
+        B{8, 40, 9, 41, 10, 42, 11, 43, 12, 44, 13, 45, 14, 46, 15, 47, 24, 56, 25, 57, 26, 58, 27,
+            59, 28, 60, 29, 61, 30, 62, 31, 63});
+  else
+    return __builtin_shuffle (
+        a, b, B{8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31});
+}
+
+/* Two of four rounds of a transposition of 16 x 16 bytes, for four rows. */
+template <typename Lanes> inline void transpose_four (typename Lanes::B (&rows)[4])
+{
+  using B = typename Lanes::B;
+  const B a = interleave_low<Lanes> (rows[0], rows[2]),
+          b = interleave_high<Lanes> (rows[0], rows[2]),
+          c = interleave_low<Lanes> (rows[1], rows[3]),
+          d = interleave_high<Lanes> (rows[1], rows[3]);
+  rows[0] = interleave_low<Lanes> (a, c);
+  rows[1] = interleave_high<Lanes> (a, c);
+  rows[2] = interleave_low<Lanes> (b, d);
+  rows[3] = interleave_high<Lanes> (b, d);
+}
+
+/* A vector from memory; one of 32 bytes from two places. */
+template <typename Lanes>
+inline typename Lanes::B
+load_halves (const std::uint8_t *low, const std::uint8_t *high)
+{
+  if constexpr (sizeof (typename Lanes::B) == 32)
+    return __builtin_shufflevector (rangecast::Lanes<4>::at (low), rangecast::Lanes<4>::at (high),
+        0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24,
+        25, 26, 27, 28, 29, 30, 31);
+  else
+    return Lanes::at (low);
+}
+
+/* Transposes kSide x kSide bytes: with 16-byte vectors in four squares of 16 x 16, with those of 32
+ * bytes in pairs of squares, one below the other. */
+template <typename Lanes>
+inline void
+transpose (
+    const std::uint8_t *from, std::ptrdiff_t from_step, std::uint8_t *to, std::ptrdiff_t to_step)
+{
+  using B = typename Lanes::B;
+  constexpr int kBytes = sizeof (B), kSquare = 16;
+  for (int y = 0; y < kSide; y += kBytes)
+    for (int x = 0; x < kSide; x += kSquare) {
+      std::uint8_t half[kSquare * kBytes], *out = half;
+      const std::uint8_t *in = from + y * from_step + x, *below = in + kSquare * from_step;
+      for (int i = 0; i < 4; i++, in += from_step, below += from_step) {
+        B rows[4];
+#pragma GCC unroll 4
+        for (int k = 0; k < 4; k++)
+          rows[k] = load_halves<Lanes> (in + 4 * k * from_step, below + 4 * k * from_step);
+        transpose_four<Lanes> (rows);
+#pragma GCC unroll 4
+        for (int k = 0; k < 4; k++, out += kBytes)
+          Lanes::at (out) = rows[k];
       }
-      std::swap (before, now);
+      std::uint8_t *at = to + x * to_step + y;
+      for (int i = 0; i < 4; i++) {
+        B rows[4];
+#pragma GCC unroll 4
+        for (int k = 0; k < 4; k++)
+          rows[k] = Lanes::at (half + (i + 4 * k) * kBytes);
+        transpose_four<Lanes> (rows);
+#pragma GCC unroll 4
+        for (int k = 0; k < 4; k++, at += to_step)
+          Lanes::at (at) = rows[k];
+      }
+    }
+}
+
+/* Begins paths: no cost at any disparity. Paths have a row of kNever at both ends. */
+void
+begin_paths (std::vector<std::uint8_t> &path, int count)
+{
+  const std::size_t n = std::size_t (count) * kSide;
+  path.resize (std::max (path.size (), n + 2 * kSide));
+  std::fill_n (path.begin (), n + 2 * kSide, std::uint8_t{0});
+  std::fill_n (path.begin (), kSide, kNever);
+  std::fill_n (path.begin () + std::ptrdiff_t (n) + kSide, kSide, kNever);
+}
+
+} // namespace
+
+/* The costs of all tiles of a band, row by row. */
+template <typename Lanes>
+void
+SemiGlobalMatcher::compare_band (const Stripe &stripe, int band, Memory &m)
+{
+  const Tile *tiles = &tiles_[std::size_t (band * stripe.across)];
+  const int width = padded_[0].cols - 2 * kRadiusX, begin = band * kSide,
+            end = std::min (begin + kSide, stripe.rows);
+  m.low.resize (std::size_t (width));
+  m.high.resize (std::size_t (width));
+  for (int row = begin; row < end; row++) {
+    const int y = stripe.y0 + row;
+    for (int i = 0; i < 2; i++)
+      transform_row (padded_[i], y, m.transformed[i]);
+    const std::uint8_t *grey = padded_[0].ptr<std::uint8_t> (y + kRadiusY) + kRadiusX;
+    range_of_row (padded_[1].ptr<std::uint8_t> (y + kRadiusY) + kRadiusX, width, m.low.data (),
+        m.high.data ());
+    const RowView left = {m.transformed[0].data (), width, nullptr, nullptr},
+                  right = {m.transformed[1].data (), width, m.low.data (), m.high.data ()};
+    for (int i = 0, x = stripe.x0; i < stripe.across; i++, x += kSide) {
+      const Tile &tile = tiles[i];
+      compare<Lanes> (left, grey + x, x, right, tile.low, tile.count,
+          &costs_[tile.at + std::size_t (row - begin) * std::size_t (tile.count) * kSide]);
+    }
+  }
+}
+
+/* Both paths along the rows of a band, together. */
+template <typename Lanes>
+void
+SemiGlobalMatcher::walk_band (const Stripe &stripe, int band, Memory &m)
+{
+  using B = typename Lanes::B;
+  const Tile *tiles = &tiles_[std::size_t (band * stripe.across)];
+  compare_band<Lanes> (stripe, band, m);
+  /* Jumps between each column and the one before. */
+  const int columns = stripe.columns;
+  m.jumps.assign (std::size_t (columns + 1) * kSide, 0);
+  for (int row = 0; row < std::min (kSide, stripe.rows - band * kSide); row++) {
+    const std::uint8_t *grey =
+        stripe.left.ptr<std::uint8_t> (stripe.y0 + band * kSide + row) + stripe.x0;
+    for (int x = 1; x < columns; x++)
+      m.jumps[std::size_t (x * kSide + row)] =
+          kJumps[std::size_t (std::abs (grey[x] - grey[x - 1]))];
+  }
+  const std::size_t first = tiles[0].at, n = end_of (tiles[stripe.across - 1]) - first;
+  m.costs.resize (std::max (m.costs.size (), n));
+  m.sums.resize (std::max (m.sums.size (), n));
+  for (const int way : {1, -1}) {
+    std::array<std::uint8_t, kSide> lowest{};
+    const int begin = way > 0 ? 0 : stripe.across - 1;
+    for (int i = begin; i >= 0 && i < stripe.across; i += way) {
+      const Tile &tile = tiles[i];
+      const std::ptrdiff_t each = std::ptrdiff_t (tile.count) * kSide;
+      std::uint8_t *costs = m.costs.data () + (tile.at - first),
+                   *sums = m.sums.data () + (tile.at - first);
+      if (i == begin)
+        begin_paths (m.path, tile.count);
+      else
+        realign (tiles[i - way], tile, m);
+      if (way > 0)
+        for (int d = 0; d < tile.count; d++)
+          transpose<Lanes> (&costs_[tile.at] + d * kSide, each, costs + d * kSide, each);
+      const int last = std::min (kSide, columns - i * kSide);
+      for (int k = 0; k < last; k++) {
+        const int x = way > 0 ? k : last - 1 - k;
+        const std::uint8_t *jumps =
+            m.jumps.data () + std::ptrdiff_t (i * kSide + x + (way > 0 ? 0 : 1)) * kSide;
+        std::uint8_t *sum = sums + x * each;
+        for (int part = 0; part < kSide; part += int (sizeof (B))) {
+          const auto walk = [&] (const auto &use) {
+            step<Lanes> (costs + x * each + part, m.path.data () + kSide + part,
+                lowest.data () + part, jumps + part, tile.count, use);
+          };
+          if (way > 0)
+            walk ([&] (int d, const B &now) { Lanes::at (sum + d * kSide + part) = now; });
+          else
+            walk ([&] (int d, const B &now) {
+              B &to = Lanes::at (sum + d * kSide + part);
+              to = add_up_to_255<Lanes> (to, now);
+            });
+        }
+      }
+      if (way < 0)
+        for (int d = 0; d < tile.count; d++)
+          transpose<Lanes> (sums + d * kSide, each, &sums_[tile.at] + d * kSide, each);
+    }
+  }
+}
+
+/* Makes costs along paths continue with the disparities of another tile. */
+void
+SemiGlobalMatcher::realign (const Tile &from, const Tile &to, Memory &m)
+{
+  if (from.low == to.low && from.count == to.count)
+    return;
+  const std::size_t n = std::size_t (to.count + 2) * kSide;
+  m.realigned.resize (std::max (m.realigned.size (), n));
+  std::fill_n (m.realigned.begin (), n, kNever);
+  const int low = std::max (from.low, to.low),
+            count = std::min (from.low + from.count, to.low + to.count) - low;
+  if (count > 0)
+    std::copy_n (m.path.begin () + std::ptrdiff_t (low - from.low + 1) * kSide, count * kSide,
+        m.realigned.begin () + std::ptrdiff_t (low - to.low + 1) * kSide);
+  std::swap (m.path, m.realigned);
+}
+
+/* The disparities of a row of a tile with the lowest cost, with subpixel precision by a parabola
+ * through it and its neighbours; none if another one is nearly as good.
+ * @param x, y   position in the stripe; @param least  the lowest costs */
+template <typename Lanes>
+void
+SemiGlobalMatcher::choose (
+    const Stripe &stripe, const Tile &tile, int x, int y, const std::uint8_t *least, Memory &m)
+{
+  using B = typename Lanes::B;
+  constexpr int kAtOnce = 256; /* disparities that a byte tells apart */
+  const std::uint8_t *totals = m.totals.data () + kSide;
+  const int n = tile.count;
+  std::int16_t best[kSide], bend[kSide], slope[kSide];
+  std::uint8_t place[kSide], found[kSide], farther[kSide] = {}, nearer[kSide] = {};
+  std::fill_n (best, kSide, std::int16_t{0});
+  for (int begin = (n - 1) / kAtOnce * kAtOnce; begin >= 0; begin -= kAtOnce) {
+    for (int part = 0; part < kSide; part += int (sizeof (B))) {
+      const B lowest = Lanes::at (least + part);
+      B at{}, any{}, before = Lanes::at (farther + part), after = Lanes::at (nearer + part);
+      for (int d = std::min (n, begin + kAtOnce) - 1; d >= begin; d--) {
+        const std::uint8_t *total = totals + d * kSide + part;
+        const B is_best = (B)(Lanes::at (total) == lowest);
+        at = is_best ? B{} + std::uint8_t (d - begin) : at;
+        before = is_best ? Lanes::at (total - kSide) : before;
+        after = is_best ? Lanes::at (total + kSide) : after;
+        any |= is_best;
+      }
+      Lanes::at (place + part) = at;
+      Lanes::at (found + part) = any;
+      Lanes::at (farther + part) = before;
+      Lanes::at (nearer + part) = after;
+    }
+    for (int i = 0; i < kSide; i++)
+      best[i] = std::int16_t (found[i] ? begin + place[i] : best[i]);
+  }
+  const std::size_t at = std::size_t (y) * std::size_t (stripe.across * kSide) + std::size_t (x);
+  std::int16_t *whole = &matches_.whole[at], *disparity = &matches_.disparity[at];
+  for (int i = 0; i < kSide; i++) {
+    const bool inside = best[i] > 0 && best[i] < n - 1;
+    bend[i] = std::int16_t (greater (nearer[i] + farther[i] - 2 * least[i], 1));
+    slope[i] = std::int16_t (inside ? farther[i] - nearer[i] : 0);
+    whole[i] = std::int16_t (best[i] + tile.low);
+  }
+  /* Rounded half up; floats are exact and so is their quotient's integer part. */
+  for (int i = 0; i < kSide; i++)
+    disparity[i] =
+        std::int16_t (16 * whole[i] + int (float (slope[i] * 16 + bend[i]) / float (2 * bend[i])));
+  std::copy_n (least, kSide, &matches_.sum[at]);
+  if (settings_.uniqueness_ratio > 0)
+    clear_rivalled (totals, n, best, least, disparity);
+}
+
+/* Clears matches of a row of a tile if any cost but those next to the best one is nearly as good.
+ */
+void
+SemiGlobalMatcher::clear_rivalled (const std::uint8_t *totals, int disparities,
+    const std::int16_t *best, const std::uint8_t *least, std::int16_t *disparity) const
+{
+  const int share = 100 - settings_.uniqueness_ratio;
+  std::int16_t like[kSide], rivals[kSide] = {};
+  for (int i = 0; i < kSide; i++)
+    like[i] = std::int16_t (share > 0 ? std::min ((100 * least[i] + share - 1) / share, 256) : 256);
+  for (int d = 0; d < disparities; d++)
+    for (int i = 0; i < kSide; i++)
+      rivals[i] = std::int16_t (rivals[i] + (totals[d * kSide + i] < like[i] ? 1 : 0));
+  for (int i = 0; i < kSide; i++) {
+    for (int d = std::max (best[i] - 1, 0); d <= std::min (best[i] + 1, disparities - 1); d++)
+      rivals[i] = std::int16_t (rivals[i] - (totals[d * kSide + i] < like[i] ? 1 : 0));
+    if (rivals[i] > 0)
+      disparity[i] = kAmbiguous;
+  }
+}
+
+/* Both paths along the columns of a column of tiles: down, then up with the choice of disparities.
+ */
+template <typename Lanes>
+void
+SemiGlobalMatcher::walk_columns (const Stripe &stripe, int column, Memory &m)
+{
+  using B = typename Lanes::B;
+  const int x0 = stripe.x0 + column * kSide;
+  const auto tile_of = [&] (int band) -> const Tile & {
+    return tiles_[std::size_t (band * stripe.across + column)];
+  };
+  const auto grey_of = [&] (int row) {
+    return padded_[0].ptr<std::uint8_t> (stripe.y0 + row + kRadiusY) + kRadiusX + x0;
+  };
+  for (const int way : {1, -1}) {
+    std::array<std::uint8_t, kSide> lowest{}, jumps{};
+    const int begin = way > 0 ? 0 : stripe.rows - 1;
+    for (int row = begin; row >= 0 && row < stripe.rows; row += way) {
+      const int band = row / kSide;
+      const Tile &tile = tile_of (band);
+      if (row == begin)
+        begin_paths (m.path, tile.count);
+      else {
+        if (const int last = (row - way) / kSide; last != band)
+          realign (tile_of (last), tile, m);
+        const std::uint8_t *grey = grey_of (row), *before = grey_of (row - way);
+        for (int i = 0; i < kSide; i++)
+          jumps[std::size_t (i)] = kJumps[std::size_t (std::abs (grey[i] - before[i]))];
+      }
+      const std::size_t at =
+          tile.at + std::size_t (row - band * kSide) * std::size_t (tile.count) * kSide;
+      std::uint8_t *sums = &sums_[at];
+      m.totals.resize (std::max (m.totals.size (), std::size_t (tile.count + 2) * kSide));
+      std::uint8_t *totals = m.totals.data () + kSide;
+      std::array<std::uint8_t, kSide> least;
+      for (int part = 0; part < kSide; part += int (sizeof (B))) {
+        const auto walk = [&] (const auto &use) {
+          step<Lanes> (&costs_[at] + part, m.path.data () + kSide + part, lowest.data () + part,
+              jumps.data () + part, tile.count, use);
+        };
+        if (way > 0)
+          walk ([&] (int d, const B &now) {
+            B &to = Lanes::at (sums + d * kSide + part);
+            to = add_up_to_255<Lanes> (to, now);
+          });
+        else {
+          B least_of_all = B{} + std::uint8_t{255};
+          walk ([&] (int d, const B &now) {
+            const B total = add_up_to_255<Lanes> (Lanes::at (sums + d * kSide + part), now);
+            Lanes::at (totals + d * kSide + part) = total;
+            least_of_all = min_of<Lanes> (least_of_all, total);
+          });
+          Lanes::at (least.data () + part) = least_of_all;
+        }
+      }
+      if (way < 0)
+        choose<Lanes> (stripe, tile, column * kSide, row, least.data (), m);
     }
   }
 }
@@ -302,60 +573,134 @@ SemiGlobalMatcher::walk_columns (const Stripe &stripe, int x, int end, Memory &m
 void
 SemiGlobalMatcher::check_row (const Stripe &stripe, int y, Memory &m, cv::Mat &disparity) const
 {
-  const int width = stripe.left.cols;
-  const auto none = static_cast<std::int16_t> (16 * stripe.min_disparity - 16);
-  const Match *matches = &matches_[at (stripe, 0, y) / std::size_t (disparities_)];
+  const int width = stripe.left.cols, most = settings_.left_right_max_difference;
+  const auto none = static_cast<std::int16_t> (16 * min_disparity_ - 16);
+  const std::size_t at = std::size_t (y - stripe.y0) * std::size_t (stripe.across * kSide);
+  const std::int16_t *whole = &matches_.whole[at], *exact = &matches_.disparity[at];
+  const std::uint8_t *sums = &matches_.sum[at];
   auto out = disparity.ptr<std::int16_t> (y);
   std::fill_n (out, width, none);
-  m.right.resize (std::size_t (width));
-  m.right_sums.assign (std::size_t (width), UINT16_MAX);
-  const auto partner_of = [&] (int x) { return std::size_t (stripe.x0 + x - matches[x].whole); };
-  for (int x = 0; x < stripe.columns; x++) {
-    const std::size_t there = partner_of (x);
-    if (matches[x].sum >= m.right_sums[there])
-      continue;
-    m.right_sums[there] = matches[x].sum;
-    m.right[there] = matches[x].whole;
+  out += stripe.x0;
+  if (most < 0) {
+    for (int x = 0; x < stripe.columns; x++)
+      out[x] = exact[x] != kAmbiguous ? exact[x] : none;
+    return;
   }
-  const int max_difference = settings_.left_right_max_difference;
-  for (int x = 0; x < stripe.columns; x++)
-    if (matches[x].disparity != kAmbiguous &&
-        (max_difference < 0 ||
-            std::abs (m.right[partner_of (x)] - matches[x].whole) <= max_difference))
-      out[stripe.x0 + x] = matches[x].disparity;
+  /* The best match of each right pixel: its cost, then its disparity in 16 bits. */
+  m.right.assign (std::size_t (width), UINT32_MAX);
+  std::uint32_t *right = m.right.data () + stripe.x0;
+  for (int x = 0; x < stripe.columns; x++) {
+    std::uint32_t &best = right[x - whole[x]];
+    best = lesser (best, std::uint32_t (sums[x]) << 16 | std::uint32_t (whole[x] - INT16_MIN));
+  }
+  for (int x = 0; x < stripe.columns; x++) {
+    const int there = int (right[x - whole[x]] & 0xffff) + INT16_MIN;
+    const bool keep = (exact[x] != kAmbiguous) & (std::abs (there - whole[x]) <= most);
+    out[x] = keep ? exact[x] : none;
+  }
 }
 
 /* @param y, end  rows of the stripe to write */
-template <int kCount>
 void
 SemiGlobalMatcher::match_stripe (
     const Stripe &stripe, int y, int end, int n_threads, cv::Mat &disparity)
 {
-  /* Calls work (first, last, memory) for parts of n rows or columns in parallel. */
-  const auto in_parts = [&] (int n, int each, const auto &work) {
-    in_parallel (
-        std::size_t ((n + each - 1) / each), n_threads, [&] (std::size_t i, std::size_t worker) {
-          const int first = int (i) * each;
-          for_this_cpu ([&] { work (first, std::min (first + each, n), memory_.of (worker)); });
-        });
-  };
-  in_parts (stripe.rows, kRows, [&] (int first, int last, Memory &memory) {
-    for (int row = first; row < last; row++)
-      walk_row<kCount> (stripe, stripe.y0 + row, memory);
+  const auto n = std::size_t (stripe.bands * kSide) * std::size_t (stripe.across * kSide);
+  for (Costs *costs : {&costs_, &sums_})
+    costs->resize (std::max (costs->size (), end_of (tiles_.back ())));
+  matches_.disparity.resize (std::max (matches_.disparity.size (), n));
+  matches_.whole.resize (matches_.disparity.size ());
+  matches_.sum.resize (matches_.disparity.size ());
+  memory_.reserve (workers_for (std::size_t (std::max (stripe.bands, stripe.across)), n_threads));
+  in_parallel (std::size_t (stripe.bands), n_threads, [&] (std::size_t i, std::size_t worker) {
+    for_this_cpu ([&]<typename Lanes> (
+                      const Lanes &) { walk_band<Lanes> (stripe, int (i), memory_.of (worker)); });
   });
-  in_parts (stripe.columns, kColumns, [&] (int first, int last, Memory &memory) {
-    walk_columns<kCount> (stripe, first, last, memory);
+  in_parallel (std::size_t (stripe.across), n_threads, [&] (std::size_t i, std::size_t worker) {
+    for_this_cpu ([&]<typename Lanes> (const Lanes &) {
+      walk_columns<Lanes> (stripe, int (i), memory_.of (worker));
+    });
   });
-  in_parts (end - y, kRows, [&] (int first, int last, Memory &memory) {
-    for (int row = first; row < last; row++)
-      check_row (stripe, y + row, memory, disparity);
-  });
+  in_parallel (std::size_t ((end - y + kSide - 1) / kSide), n_threads,
+      [&] (std::size_t i, std::size_t worker) {
+        const int first = y + int (i) * kSide;
+        for (int row = first; row < std::min (first + kSide, end); row++)
+          check_row (stripe, row, memory_.of (worker), disparity);
+      });
+}
+
+/* Disparities at half the size. Those without a counterpart in the right image count, too: searched
+ * only at disparities of its surroundings, an occluded pixel would more often seem to match. */
+void
+SemiGlobalMatcher::find_coarse (const cv::Mat &left, const cv::Mat &right, int n_threads)
+{
+  if (!coarse_)
+    coarse_ = std::make_unique<SemiGlobalMatcher> ();
+  for (int i = 0; i < 2; i++)
+    cv::resize (i ? right : left, half_[i], {left.cols / 2, left.rows / 2}, 0, 0, cv::INTER_AREA);
+  const int low = (min_disparity_ - 1) / 2, high = (min_disparity_ + disparities_) / 2;
+  coarse_->set ({.left_right_max_difference = -1});
+  coarse_->match (half_[0], half_[1], low, high - low + 1, n_threads, coarse_disparity_);
+  coarse_min_ = low;
+}
+
+/* @param x, y  position of the tile in the image */
+void
+SemiGlobalMatcher::choose_disparities (int x, int y, Tile &tile) const
+{
+  tile.low = min_disparity_;
+  tile.count = disparities_;
+  if (coarse_disparity_.empty ())
+    return;
+  const cv::Rect around (
+      x / 2 - kAround, y / 2 - kAround, kSide / 2 + 2 * kAround, kSide / 2 + 2 * kAround);
+  const cv::Rect part = around & cv::Rect ({}, coarse_disparity_.size ());
+  std::int16_t low = INT16_MAX, high = INT16_MIN;
+  const auto least = std::int16_t (16 * coarse_min_);
+  for (int row = part.y; row < part.br ().y; row++) {
+    const auto d = coarse_disparity_.ptr<std::int16_t> (row) + part.x;
+    for (int i = 0; i < part.width; i++) {
+      low = lesser (low, d[i] < least ? std::int16_t (INT16_MAX) : d[i]);
+      high = greater (high, d[i]);
+    }
+  }
+  if (high < least)
+    return;
+  const int first = std::max (min_disparity_, (low >> 3) - kMargin),
+            last = std::min (min_disparity_ + disparities_ - 1, (high >> 3) + 1 + kMargin);
+  if (first > last)
+    return;
+  tile.low = first;
+  tile.count = last - first + 1;
+}
+
+/* Adds bands of tiles to a stripe until it reaches the end of the image or memory is full. */
+void
+SemiGlobalMatcher::add_bands (Stripe &stripe)
+{
+  constexpr int kMinBands = 4;
+  static_assert (kTileArea == kSide * kSide);
+  std::size_t at = 0;
+  tiles_.clear ();
+  stripe.bands = stripe.rows = 0;
+  while (
+      stripe.y0 + stripe.rows < stripe.left.rows && (at < kMaxCells || stripe.bands < kMinBands)) {
+    for (int i = 0; i < stripe.across; i++) {
+      Tile &tile = tiles_.emplace_back ();
+      choose_disparities (stripe.x0 + i * kSide, stripe.y0 + stripe.rows, tile);
+      tile.at = at;
+      at = end_of (tile);
+    }
+    stripe.bands++;
+    stripe.rows = std::min (stripe.rows + kSide, stripe.left.rows - stripe.y0);
+  }
 }
 
 void
 SemiGlobalMatcher::match (const cv::Mat &left, const cv::Mat &right, int min_disparity,
     int disparities, int n_threads, cv::Mat &disparity)
 {
+  min_disparity_ = min_disparity;
   disparities_ = disparities;
   disparity.create (left.size (), CV_16S);
   const int x0 = std::max (min_disparity + disparities, 0),
@@ -364,31 +709,22 @@ SemiGlobalMatcher::match (const cv::Mat &left, const cv::Mat &right, int min_dis
     disparity.setTo (16 * min_disparity - 16);
     return;
   }
+  coarse_disparity_.release ();
+  if (disparities >= kMany && left.rows > 1)
+    find_coarse (left, right, n_threads);
+  /* Room for columns of tiles beyond the image. */
+  const int more = kSide + (kSide - left.cols % kSide) % kSide;
   for (int i = 0; i < 2; i++)
-    cv::copyMakeBorder (
-        i ? right : left, padded_[i], kRadiusY, kRadiusY, kRadiusX, kRadiusX, cv::BORDER_REPLICATE);
-  cv::flip (padded_[1], padded_[1], 1);
-  const std::size_t cells = std::size_t (columns) * std::size_t (disparities);
-  const int rows = std::clamp (int (kMaxCells / cells), 4 * kOverlap, left.rows + 4 * kOverlap);
-  memory_.reserve (workers_for (std::size_t (std::max (left.rows, columns)), n_threads));
-  for (int y = 0; y < left.rows; y += rows) {
-    const int end = std::min (y + rows, left.rows), top = std::max (0, y - kOverlap),
-              bottom = std::min (end + kOverlap, left.rows);
-    const Stripe stripe = {left, min_disparity, x0, columns, top, bottom - top};
-    const std::size_t needed = cells * std::size_t (stripe.rows);
-    for (auto *memory : {&costs_, &across_, &down_})
-      memory->resize (std::max (memory->size (), needed));
-    matches_.resize (std::max (matches_.size (), needed / std::size_t (disparities)));
-    /* With a compile-time number of disparities, unless it is too large. */
-    const bool known = [&]<int... kTimes> (std::integer_sequence<int, kTimes...>)
-    {
-      return ((disparities == 16 * (kTimes + 1) &&
-                  (match_stripe<16 * (kTimes + 1)> (stripe, y, end, n_threads, disparity), true)) ||
-              ...);
-    }
-    (std::make_integer_sequence<int, kMaxKnown / 16>{});
-    if (!known)
-      match_stripe<0> (stripe, y, end, n_threads, disparity);
+    cv::copyMakeBorder (i ? right : left, padded_[i], kRadiusY, kRadiusY, kRadiusX, kRadiusX + more,
+        cv::BORDER_REPLICATE);
+  Stripe stripe = {left, x0, columns, 0, 0, (columns + kSide - 1) / kSide, 0};
+  for (int y = 0; y < left.rows;) {
+    stripe.y0 = std::max (0, y - kOverlap);
+    add_bands (stripe);
+    const int bottom = stripe.y0 + stripe.rows,
+              end = bottom < left.rows ? bottom - kOverlap : bottom;
+    match_stripe (stripe, y, end, n_threads, disparity);
+    y = end;
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -16,8 +17,10 @@ namespace rangecast {
  * correspondence", ECCV 1994) with 15 levels instead of two, so that noise costs less than texture,
  * and strong texture no more than that of hair or skin. The grey level itself has a small weight
  * (S. Birchfield, C. Tomasi, "A pixel dissimilarity measure that is insensitive to image sampling",
- * PAMI 20, 1998). Results depend neither on the number of threads nor on the processor. Reuses its
- * memory between images. */
+ * PAMI 20, 1998). Many disparities are searched at half the size first, then around what was found
+ * there in and near each tile (M. Rothermel et al., "SURE: photogrammetric surface reconstruction
+ * from imagery", LC3D workshop 2012). Results depend neither on the number of threads nor on the
+ * processor. Reuses its memory between images. */
 class SemiGlobalMatcher {
 public:
   struct Settings {
@@ -28,7 +31,7 @@ public:
 
   /** @param left, right    CV_8U, the same size, rows agree
    *  @param min_disparity  pixels; left x minus right x
-   *  @param disparities    number of disparities, a multiple of 16
+   *  @param disparities    number of disparities, > 0
    *  @param n_threads      0 = one per core
    *  @param[out] disparity CV_16S, 1/16 pixel; 16 * min_disparity - 16 = no match, as in columns
    * whose disparities are not all inside the right image */
@@ -36,47 +39,64 @@ public:
       int n_threads, cv::Mat &disparity);
 
 private:
+  using Costs = std::vector<std::uint8_t>;
   /* Scratch memory of one thread. */
   struct Memory {
-    std::vector<std::uint8_t> transformed[2]; /* of a row: by neighbour and column */
-    std::vector<std::uint8_t> low, high;      /* of grey around a right pixel */
-    std::vector<std::uint8_t> paths, lowest;
-    std::vector<std::uint16_t> sums;
-    std::vector<std::int16_t> right;
-    std::vector<std::uint16_t> right_sums;
+    Costs transformed[2], low, high;  /* of a row: see transform_row(), range_of_row() */
+    Costs jumps;                      /* of a band, by column and row */
+    Costs costs, sums;                /* of a band, by column, disparity and row */
+    Costs path, realigned;            /* by disparity: costs of the last pixels of paths */
+    Costs totals;                     /* of a row of a tile, by disparity */
+    std::vector<std::uint32_t> right; /* of a row: see check_row() */
   };
-  /* The part to match: columns x0 to x0 + columns, rows y0 to y0 + rows. */
+  /* The disparities to search in a tile of kSide x kSide pixels. */
+  struct Tile {
+    int low, count;
+    std::size_t at; /* of its first cost: they lie by row, disparity and column */
+  };
+  /* The part to match: `columns` from x0 on, `rows` from y0 on. */
   struct Stripe {
-    const cv::Mat &left;
-    int min_disparity, x0, columns, y0, rows;
+    cv::Mat left;
+    int x0, columns, y0, rows;
+    int across, bands; /* number of tiles */
   };
-  /* The best disparity of a pixel. */
-  struct Match {
-    std::int16_t disparity; /* 1/16 pixel, or kAmbiguous */
-    std::int16_t whole;     /* pixels */
-    std::uint16_t sum;      /* its cost */
+  /* The best disparities of all pixels, by row and column of tiles. */
+  struct Matches {
+    std::vector<std::int16_t> disparity; /* 1/16 pixel, or kAmbiguous */
+    std::vector<std::int16_t> whole;     /* pixels */
+    std::vector<std::uint8_t> sum;       /* cost */
   };
-  template <int kCount> void compare_row (const Stripe &stripe, int y, Memory &memory);
-  template <int kCount> void walk_row (const Stripe &stripe, int y, Memory &memory);
-  template <int kCount> void walk_columns (const Stripe &stripe, int x, int end, Memory &memory);
-  template <int kCount>
-  [[nodiscard]] bool is_unique (const std::uint16_t *sums, int best, int disparities) const;
-  template <int kCount>
-  [[nodiscard]] Match choose (
-      const Stripe &stripe, std::size_t cell, const std::uint8_t *up, Memory &memory) const;
-  void check_row (const Stripe &stripe, int y, Memory &memory, cv::Mat &disparity) const;
-  template <int kCount>
+  void find_coarse (const cv::Mat &left, const cv::Mat &right, int n_threads);
+  void choose_disparities (int x, int y, Tile &tile) const;
+  void add_bands (Stripe &stripe);
   void match_stripe (const Stripe &stripe, int y, int end, int n_threads, cv::Mat &disparity);
-  [[nodiscard]] std::size_t at (const Stripe &stripe, int x, int y) const;
+  static void realign (const Tile &from, const Tile &to, Memory &memory);
+  void clear_rivalled (const std::uint8_t *totals, int disparities, const std::int16_t *best,
+      const std::uint8_t *least, std::int16_t *disparity) const;
+  template <typename Lanes> void compare_band (const Stripe &stripe, int band, Memory &memory);
+  template <typename Lanes> void walk_band (const Stripe &stripe, int band, Memory &memory);
+  template <typename Lanes> void walk_columns (const Stripe &stripe, int column, Memory &memory);
+  template <typename Lanes>
+  void choose (const Stripe &stripe, const Tile &tile, int x, int y, const std::uint8_t *least,
+      Memory &memory);
+  void check_row (const Stripe &stripe, int y, Memory &memory, cv::Mat &disparity) const;
+
+  static constexpr std::size_t kTileArea = 32 * 32;
+  /* End of its costs. */
+  static std::size_t end_of (const Tile &tile)
+  {
+    return tile.at + std::size_t (tile.count) * kTileArea;
+  }
 
   Settings settings_;
-  int disparities_ = 0;
-  cv::Mat padded_[2]; /* CV_8U: left, and right mirrored, padded */
-  /* By row, column and disparity of a stripe: cost; sum along the paths of a row; cost along the
-   * path down. */
-  std::vector<std::uint8_t> costs_, across_, down_;
-  std::vector<Match> matches_; /* by row and column of a stripe */
+  int min_disparity_ = 0, disparities_ = 0, coarse_min_ = 0;
+  cv::Mat padded_[2]; /* CV_8U: left and right */
+  std::vector<Tile> tiles_;
+  Costs costs_, sums_; /* of the tiles: matching costs; costs along paths */
+  Matches matches_;
   WorkerMemory<Memory> memory_;
+  std::unique_ptr<SemiGlobalMatcher> coarse_; /* for half the size */
+  cv::Mat half_[2], coarse_disparity_;
 };
 
 } // namespace rangecast

@@ -124,11 +124,23 @@ TEST (SemiGlobalMatcher, any_number_of_disparities_gives_the_same_ones)
   }
 }
 
+TEST (SemiGlobalMatcher, both_surfaces_are_found_at_half_the_size_first)
+{
+  const Pair pair (20);
+  SemiGlobalMatcher matcher;
+  for (int n : {64, 73, 80}) {
+    cv::Mat disparity;
+    matcher.match (pair.left, pair.right, 0, n, 1, disparity);
+    EXPECT_GT (share_right (disparity, kInSquare, kNear), 0.97) << n;
+    EXPECT_GT (share_right (disparity, kBeside, kFar), 0.97) << n;
+  }
+}
+
 TEST (SemiGlobalMatcher, rungs_agree_at_any_number_of_disparities)
 {
   const Pair pair (8);
   SemiGlobalMatcher matcher;
-  for (int n : {16, 48, 80, 128, 144}) {
+  for (int n : {1, 16, 37, 48, 80, 128, 144}) {
     cv::Mat fast, scalar;
     matcher.match (pair.left, pair.right, 0, n, 1, fast);
     limit_cpu (CpuLevel::kScalar);
@@ -164,13 +176,13 @@ TEST (SemiGlobalMatcher, what_repeats_is_not_unique)
 
 TEST (SemiGlobalMatcher, large_pictures_are_matched_in_stripes_without_a_seam)
 {
-  cv::Mat left (900, 600, CV_8U), right;
+  cv::Mat left (1000, 700, CV_8U), right;
   cv::RNG (3).fill (left, cv::RNG::UNIFORM, 0, 255);
   cv::copyMakeBorder (left.colRange (9, left.cols), right, 0, 0, 0, 9, cv::BORDER_REPLICATE);
   SemiGlobalMatcher matcher;
   cv::Mat disparity;
-  matcher.match (left, right, 0, 64, 1, disparity);
-  EXPECT_EQ (share_right (disparity, {64, 0, 536, 900}, 9), 1);
+  matcher.match (left, right, 0, 63, 1, disparity); /* not at half the size first */
+  EXPECT_EQ (share_right (disparity, {63, 0, 637, 1000}, 9), 1);
 }
 
 TEST (SemiGlobalMatcher, nearest_disparity_may_be_negative)
