@@ -32,34 +32,47 @@ public:
   void apply (const Job &job, const Tiles &tiles, cv::Mat &disparity);
 
 private:
-  /* Scratch memory of one thread: rows. */
+  /* Scratch memory of one thread. */
   struct Memory {
-    std::vector<float> columns[4], sums[4], shifts;
-    std::vector<std::uint8_t> steps[2];
+    std::vector<float> columns[4], sums[4], shifts; /* of rows */
+    std::vector<std::uint8_t> counts[2];
     std::vector<std::int32_t> at;
     std::vector<std::uint32_t> greys;
+    /* Of a part and kPatch pixels around: gradient times difference of grey levels, gradient
+     * squared, gradient, difference; 0 without disparity. */
+    std::vector<float> planes[4];
+    int stride = 0;
   };
-  void begin (const Job &job, const cv::Size &size, const Tiles &tiles);
+  /* A pixel near a step: the neighbours that belong to its surface (see members_of()), and their
+   * weights (see fit_plane()). */
+  struct Edge {
+    int x, y; /* in the padded planes */
+    std::uint64_t members;
+    float at, across, down;
+  };
+  struct Part {
+    cv::Rect at; /* columns with disparities of a tile */
+    std::vector<Edge> edges;
+  };
+  void begin (const cv::Size &size, const Tiles &tiles);
   void load (const Job &job, const cv::Mat &disparity, cv::Rect &part);
   void mark_steps (const cv::Rect &part);
-  void smooth (const cv::Rect &part, Memory &memory);
-  void compare (const Job &job, const cv::Rect &part, Memory &memory);
-  void move (const cv::Rect &part, Memory &memory);
+  void find_edges (Part &part, Memory &memory);
+  void smooth (const Part &part, Memory &memory);
+  void compare (const Job &job, const cv::Rect &at, Memory &memory) const;
+  void move (const Job &job, const Part &part, Memory &memory);
   void put_back (const Job &job, const cv::Rect &part, cv::Mat &disparity) const;
-  void choose_members (const cv::Rect &part, Memory &memory);
   [[nodiscard]] std::uint64_t members_of (int x, int y) const;
-  [[nodiscard]] float on_plane (int x, int y, std::uint64_t members) const;
-  [[nodiscard]] float shift_of_members (int x, int y, std::uint64_t members) const;
+  static void fit_plane (Edge &edge);
+  [[nodiscard]] float on_plane (const Edge &edge) const;
+  static float shift_of (const Edge &edge, const cv::Rect &at, const Memory &memory);
 
   /* All are padded, so that windows stay inside. */
-  cv::Mat first_, now_, next_;         /* CV_32F, pixels more than the farthest; 0 = none */
-  cv::Mat steps_;                      /* CV_8U: 1 = no disparity, or next to a step */
-  cv::Mat slopes_, differences_;       /* CV_32F, of grey levels; 0 without disparity */
-  cv::Mat products_, squares_;         /* CV_32F: gradient times difference, gradient squared */
-  cv::Mat colours_[3];                 /* CV_8U: R, G, B */
-  std::vector<std::uint64_t> members_; /* 0 = all neighbours, see members_of() */
-  cv::Mat valid_;                      /* CV_8U: 1 = there is a disparity */
-  std::vector<cv::Rect> parts_;        /* of tiles: the columns with disparities */
+  cv::Mat first_, now_, next_; /* CV_32F, pixels more than the farthest; 0 = none */
+  cv::Mat steps_;              /* CV_8U: 1 = no disparity, or next to a step */
+  cv::Mat valid_;              /* CV_8U: 1 = there is a disparity */
+  cv::Mat colours_[3];         /* CV_8U: R, G, B */
+  std::vector<Part> parts_;
   WorkerMemory<Memory> memory_;
 };
 
