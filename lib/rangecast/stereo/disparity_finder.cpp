@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 
+#include "../base/simd.hpp"
+
 namespace rangecast {
 namespace {
 
@@ -48,8 +50,8 @@ DisparityFinder::set (
   return some_.set (settings.match, min_disparity_, max_disparity_);
 }
 
-/* Configures the matcher for a range of depths. Its number of disparities is a multiple of 16; the
- * excess is on the near side. */
+/* Configures the matcher for a range of depths. OpenCV's numbers of disparities are multiples of
+ * 16; the excess is on the near side. */
 Status
 DisparityFinder::choose_range (double near_m, double far_m)
 {
@@ -81,6 +83,17 @@ DisparityFinder::place_window (const Roi &roi)
   window_at_ = cv::Rect (left, top, right - left, bottom - top);
   missing_[0] = reach - (x0 - left);
   missing_[1] = reach_right - (right - x1);
+}
+
+cv::Rect
+DisparityFinder::needed (const Roi &roi, int camera) const
+{
+  constexpr int kAround = 2 * kMargin; /* blocks and descriptors of pixels in the margin */
+  const int left = kAround + (camera > 0 ? all_.reach () : 0),
+            right = kAround + (camera > 0 ? all_.reach_right () : 0);
+  return cv::Rect (
+             roi.x - left, roi.y - kAround, roi.width + left + right, roi.height + 2 * kAround) &
+         cv::Rect (0, 0, pair_.width, pair_.height);
 }
 
 void
@@ -194,17 +207,20 @@ DisparityFinder::write_disparity (const Roi &roi)
   const int x0 = roi.x - core_at_.x, y0 = roi.y - core_at_.y;
   const int min = 16 * min_disparity_;
   const int offset = static_cast<int> (std::lround (16 * pair_.offset));
+  const int border = 16 * (pair_.width - 1);
   disparity_.create (roi.height, roi.width, CV_16U);
-  for (int y = 0; y < roi.height; y++) {
-    const auto from = core_.ptr<std::int16_t> (y0 + y) + x0;
-    auto to = disparity_.ptr<std::uint16_t> (y);
-    for (int x = 0; x < roi.width; x++) {
-      const int d = from[x] + offset;
-      const int there = 16 * (roi.x + x) - from[x]; /* must not be in the border */
-      const bool seen = there >= 0 && there <= 16 * (pair_.width - 1);
-      to[x] = from[x] > min && d > 0 && seen ? static_cast<std::uint16_t> (d) : 0;
+  for_this_cpu ([&] {
+    for (int y = 0; y < roi.height; y++) {
+      const std::int16_t *__restrict from = core_.ptr<std::int16_t> (y0 + y) + x0;
+      std::uint16_t *__restrict to = disparity_.ptr<std::uint16_t> (y);
+      for (int x = 0; x < roi.width; x++) {
+        const int d = from[x] + offset;
+        const int there = 16 * (roi.x + x) - from[x]; /* must not be in the border */
+        const bool seen = (there >= 0) & (there <= border) & (from[x] > min) & (d > 0);
+        to[x] = static_cast<std::uint16_t> (seen ? d : 0);
+      }
     }
-  }
+  });
 }
 
 Status

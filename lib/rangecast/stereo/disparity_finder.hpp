@@ -55,6 +55,9 @@ public:
   Status find (const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m,
       double far_m, const std::vector<cv::Rect> *parts = nullptr);
 
+  /** The part of the left (0) or right (1) image that find() may need for a ROI. */
+  [[nodiscard]] cv::Rect needed (const Roi &roi, int camera) const;
+
   /** CV_16U of the ROI, 1/16 pixel with equal principal points, 0 = none. */
   [[nodiscard]] const cv::Mat &disparity () const { return disparity_; }
   [[nodiscard]] cv::Mat &disparity () { return disparity_; }

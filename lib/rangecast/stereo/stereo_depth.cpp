@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "../base/simd.hpp"
 #include "../roi/opencv_image.hpp"
 #include "histogram_range.hpp"
 
@@ -64,7 +65,6 @@ StereoDepth::rectify (
         rectifier_.rectify (i, raw_[i], rectified_[i]);
         pictures_[i] = rectified_[i];
       }
-      matched_[i] = settings_.average > 1 ? still_[i].add (pictures_[i]) : pictures_[i];
     }
     if (has_third_)
       third_.rectify (raw_[0], opencv_image (third));
@@ -114,16 +114,18 @@ bool
 StereoDepth::is_suspect (const RangeImage &image) const
 {
   const cv::Mat &disparity = finder_.disparity ();
-  const double nearest = finder_.disparity_at (near_now_m_) - 24;
+  const int nearest = static_cast<int> (finder_.disparity_at (near_now_m_)) - 24;
   int seen = 0, crowd = 0;
-  for (int y = 0; y < disparity.rows; y++) {
-    const auto d = disparity.ptr<std::uint16_t> (y);
-    const std::uint16_t *depth = image.depth.row (y);
-    for (int x = 0; x < disparity.cols; x++) {
-      seen += depth[x] != 0;
-      crowd += depth[x] && d[x] > nearest;
+  for_this_cpu ([&] {
+    for (int y = 0; y < disparity.rows; y++) {
+      const auto d = disparity.ptr<std::uint16_t> (y);
+      const std::uint16_t *depth = image.depth.row (y);
+      for (int x = 0; x < disparity.cols; x++) {
+        seen += depth[x] != 0;
+        crowd += (depth[x] != 0) & (d[x] > nearest);
+      }
     }
-  }
+  });
   return seen < 0.95 * seen_share_ * disparity.rows * disparity.cols || crowd > 0.01 * seen;
 }
 
@@ -203,6 +205,9 @@ StereoDepth::match (const RangeImage &image)
       static_cast<std::size_t> (image.colour.stride));
   try {
     pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)).copyTo (to);
+    for (int i = 0; i < 2; i++)
+      matched_[i] = settings_.average > 1 ? still_[i].add (pictures_[i], finder_.needed (roi, i))
+                                          : pictures_[i];
   } catch (const cv::Exception &) {
     return {StatusCode::kNoSpace, "stereo: OpenCV failed to crop the images"};
   }

@@ -2,10 +2,14 @@
 #include "still_average.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 
 #include "../base/simd.hpp"
+
+/* luma_of() is always inlined. */
+#pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace rangecast {
 namespace {
@@ -14,6 +18,38 @@ constexpr int kBlock = 8;
 constexpr int kScale = 128; /* of sums to levels */
 /* Maximum noise, grey levels; more is motion. */
 constexpr float kMaxNoise = 6;
+
+using Pixels = Lanes<kBlock>;
+
+/* R + 2 G + B of pixels in memory order. */
+inline Pixels::I
+luma_of (const Pixels::I &pixels)
+{
+  constexpr bool kLittle = std::endian::native == std::endian::little;
+  constexpr int kRed = kLittle ? 0 : 24, kGreen = kLittle ? 8 : 16, kBlue = kLittle ? 16 : 8;
+  return (pixels >> kRed & 255) + 2 * (pixels >> kGreen & 255) + (pixels >> kBlue & 255);
+}
+
+/* In 16 bits, which vectors hold twice as many of.
+ * @param frames  number of them in the mean with this one */
+inline void
+add_to_mean (const std::uint8_t *__restrict picture, int n, int frames,
+    std::int16_t *__restrict sums, std::uint8_t *__restrict means)
+{
+  if (frames == 1) {
+    for (int i = 0; i < n; i++) {
+      sums[i] = std::int16_t (kScale * picture[i]);
+      means[i] = picture[i];
+    }
+    return;
+  }
+  const auto share = std::int16_t (std::min (65536 / frames, 32767));
+  for (int i = 0; i < n; i++) {
+    const auto step = std::int16_t (kScale * picture[i] - sums[i]);
+    sums[i] = std::int16_t (sums[i] + std::int16_t (step * share >> 16));
+    means[i] = std::uint8_t (std::uint16_t (sums[i] + kScale / 2) / kScale);
+  }
+}
 
 } // namespace
 
@@ -24,35 +60,43 @@ StillAverage::set (int frames)
   reset ();
 }
 
-/* Differences of a row of blocks from the mean. */
+/* Differences from the mean. */
 void
-StillAverage::compare (const cv::Mat &picture, int by)
+StillAverage::compare (const cv::Mat &picture, const cv::Rect &part)
 {
-  const int bottom = std::min (picture.rows, (by + 1) * kBlock);
-  Block *row = &blocks_[std::size_t (by) * std::size_t (columns_)];
-  for (int bx = 0; bx < columns_; bx++) {
+  for (int i = 0; i < part.area (); i++) {
+    const int bx = part.x + i % part.width, by = part.y + i / part.width;
+    const int bottom = std::min (picture.rows, (by + 1) * kBlock);
     const int x0 = bx * kBlock, n = std::min (kBlock, picture.cols - x0);
-    int sum = 0, size = 0;
+    Pixels::I sums = {}, sizes = {}; /* by column */
     for (int y = by * kBlock; y < bottom; y++) {
-      const std::uint8_t *p = picture.ptr<std::uint8_t> (y) + 4 * x0,
-                         *m = mean_.ptr<std::uint8_t> (y) + 4 * x0;
-      for (int x = 0; x < n; x++) {
-        const int d =
-            p[4 * x] - m[4 * x] + 2 * (p[4 * x + 1] - m[4 * x + 1]) + p[4 * x + 2] - m[4 * x + 2];
-        sum += d;
-        size += std::abs (d);
+      std::int32_t last[2][kBlock] = {}; /* of a part of a block */
+      const std::int32_t *now = picture.ptr<std::int32_t> (y) + x0,
+                         *mean = mean_.ptr<std::int32_t> (y) + x0;
+      if (n < kBlock) {
+        now = std::copy_n (now, n, last[0]) - n;
+        mean = std::copy_n (mean, n, last[1]) - n;
       }
+      const Pixels::I d = luma_of (Pixels::at (now)) - luma_of (Pixels::at (mean));
+      sums += d;
+      sizes += d > 0 ? d : -d;
+    }
+    int sum = 0, size = 0;
+    for (int x = 0; x < kBlock; x++) {
+      sum += sums[x];
+      size += sizes[x];
     }
     const float scale = 1.f / float (4 * n * (bottom - by * kBlock));
-    row[bx].drift = std::abs (float (sum)) * scale;
-    row[bx].change = float (size) * scale;
+    Block &block = blocks_[std::size_t (by * columns_ + bx)];
+    block.drift = std::abs (float (sum)) * scale;
+    block.change = float (size) * scale;
   }
 }
 
 /* Noise is estimated from the quarter of all blocks that change least. The mean of 64 pixels has an
  * eighth of their standard deviation, which is 1.25 times their mean deviation. */
 void
-StillAverage::find_motion ()
+StillAverage::find_motion (const cv::Rect &part)
 {
   changes_.clear ();
   for (const Block &block : blocks_)
@@ -70,36 +114,33 @@ StillAverage::find_motion ()
           return true;
     return false;
   };
-  for (int by = 0; by < rows_; by++)
-    for (int bx = 0; bx < columns_; bx++) {
+  for (int by = part.y; by < part.br ().y; by++)
+    for (int bx = part.x; bx < part.br ().x; bx++) {
       Block &block = blocks_[std::size_t (by * columns_ + bx)];
       block.frames = moves (bx, by) ? 1 : std::min (block.frames + 1, frames_);
     }
 }
 
 void
-StillAverage::average (const cv::Mat &picture, int by)
+StillAverage::average (const cv::Mat &picture, const cv::Rect &part)
 {
-  const int bottom = std::min (picture.rows, (by + 1) * kBlock);
-  const Block *row = &blocks_[std::size_t (by) * std::size_t (columns_)];
-  for (int y = by * kBlock; y < bottom; y++) {
-    const auto p = picture.ptr<std::uint8_t> (y);
-    auto sum = sum_.ptr<std::uint16_t> (y);
-    auto mean = mean_.ptr<std::uint8_t> (y);
-    for (int bx = 0; bx < columns_; bx++) {
-      const int begin = 4 * bx * kBlock, end = std::min (begin + 4 * kBlock, 4 * picture.cols);
-      const int share = 65536 / row[bx].frames;
-      for (int i = begin; i < end; i++) {
-        const int step = (kScale * p[i] - sum[i]) * (share >> 2) >> 14;
-        sum[i] = std::uint16_t (sum[i] + step);
-        mean[i] = std::uint8_t ((sum[i] + kScale / 2) / kScale);
-      }
+  const int bottom = std::min (picture.rows, part.br ().y * kBlock);
+  for (int y = part.y * kBlock; y < bottom; y++)
+    for (int bx = part.x; bx < part.br ().x; bx++) {
+      const int begin = 4 * bx * kBlock, n = std::min (4 * kBlock, 4 * picture.cols - begin);
+      const std::uint8_t *p = picture.ptr<std::uint8_t> (y) + begin;
+      std::int16_t *sum = sum_.ptr<std::int16_t> (y) + begin;
+      std::uint8_t *mean = mean_.ptr<std::uint8_t> (y) + begin;
+      const int frames = blocks_[std::size_t (y / kBlock * columns_ + bx)].frames;
+      if (n < 4 * kBlock)
+        add_to_mean (p, n, frames, sum, mean);
+      else
+        add_to_mean (p, 4 * kBlock, frames, sum, mean);
     }
-  }
 }
 
 const cv::Mat &
-StillAverage::add (const cv::Mat &picture)
+StillAverage::add (const cv::Mat &picture, const cv::Rect &part)
 {
   const bool anew = blocks_.empty () || picture.size () != mean_.size ();
   if (anew) {
@@ -107,18 +148,22 @@ StillAverage::add (const cv::Mat &picture)
     rows_ = (picture.rows + kBlock - 1) / kBlock;
     blocks_.assign (std::size_t (columns_) * std::size_t (rows_), {});
     mean_.create (picture.size (), CV_8UC4);
-    sum_ = cv::Mat::zeros (picture.size (), CV_16UC4); /* average() reads it */
+    sum_.create (picture.size (), CV_16SC4);
     for (Block &block : blocks_)
       block.frames = 1;
   }
+  const int x = part.x / kBlock, y = part.y / kBlock;
+  const cv::Rect all (0, 0, columns_, rows_),
+      blocks = anew ? all
+                    : cv::Rect (x, y, (part.br ().x + kBlock - 1) / kBlock - x,
+                          (part.br ().y + kBlock - 1) / kBlock - y) &
+                          all;
   for_this_cpu ([&] {
     if (!anew) {
-      for (int by = 0; by < rows_; by++)
-        compare (picture, by);
-      find_motion ();
+      compare (picture, blocks);
+      find_motion (blocks);
     }
-    for (int by = 0; by < rows_; by++)
-      average (picture, by);
+    average (picture, blocks);
   });
   return mean_;
 }

@@ -17,8 +17,13 @@ public:
   void reset () { blocks_.clear (); }
 
   /** @param image  CV_8UC4; a change of size restarts
+   *  @param part   where the mean is needed; elsewhere it may be that of earlier images
    *  @return the mean, of the same type; valid until the next call */
-  const cv::Mat &add (const cv::Mat &picture);
+  const cv::Mat &add (const cv::Mat &picture, const cv::Rect &part);
+  const cv::Mat &add (const cv::Mat &picture)
+  {
+    return add (picture, cv::Rect ({}, picture.size ()));
+  }
 
 private:
   struct Block {
@@ -26,12 +31,13 @@ private:
     int frames = 0;              /* averaged */
     bool moves = false;
   };
-  void compare (const cv::Mat &picture, int by);
-  void average (const cv::Mat &picture, int by);
-  void find_motion ();
+  /* Rectangles of blocks. */
+  void compare (const cv::Mat &picture, const cv::Rect &part);
+  void find_motion (const cv::Rect &part);
+  void average (const cv::Mat &picture, const cv::Rect &part);
 
   int frames_ = 2, columns_ = 0, rows_ = 0;
-  cv::Mat sum_, mean_; /* CV_16UC4, levels times 128; CV_8UC4 */
+  cv::Mat sum_, mean_; /* CV_16SC4, levels times 128; CV_8UC4 */
   std::vector<Block> blocks_;
   std::vector<float> changes_;
 };
