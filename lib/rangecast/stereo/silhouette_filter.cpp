@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <opencv2/core/hal/intrin.hpp>
 
+#include "../base/simd.hpp"
+
 namespace rangecast {
 namespace {
 
@@ -13,8 +15,8 @@ namespace {
 constexpr int kLike = 60;
 /* Required sum of weights, each at most kLike: four pixels of nearly the same colour. */
 constexpr int kEnough = 160;
-/* Samples that are processed together. */
-constexpr int kLanes = 16;
+/* Samples of a row that are processed together. */
+constexpr int kLanes = 8;
 
 /* Minimum or maximum of each window of `side` x `side` pixels.
  * @param[out] to  smaller by side - 1; @param memory  scratch */
@@ -95,42 +97,47 @@ SilhouetteFilter::sample (
           const auto from = colour.ptr<cv::Vec4b> (y);
           const auto d = disparity.ptr<std::int16_t> (y);
           std::fill_n (to[3] + pad_, cols, std::uint8_t{0});
-          for (int x = 0; x < cols; x++) {
+          for_this_cpu ([&] {
             for (int c = 0; c < 3; c++)
-              to[c][pad_ + x] = from[2 * x][c];
-            depth[pad_ + x] = d[2 * x];
-          }
+              for (int x = 0; x < cols; x++)
+                to[c][pad_ + x] = from[2 * x][c];
+            for (int x = 0; x < cols; x++)
+              depth[pad_ + x] = d[2 * x];
+          });
         }
       });
 }
 
-/* Calls `count (weight, disparity)` for eight samples of a window at a time. */
+/* Calls `count (weight, disparity)` for eight samples of a window at a time, of two rows together.
+ */
 template <typename Count>
 void
 SilhouetteFilter::for_window (
     const cv::Vec4b &own, int x, int y, int radius, const Count &count) const
 {
-  static constexpr std::uint8_t kInside[2 * kLanes] = {
-      255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255};
+  static constexpr std::uint8_t kInside[2 * kLanes] = {255, 255, 255, 255, 255, 255, 255, 255};
   const cv::v_uint8x16 r = cv::v_setall_u8 (own[0]), g = cv::v_setall_u8 (own[1]),
                        b = cv::v_setall_u8 (own[2]), max = cv::v_setall_u8 (kLike);
   const int x0 = x / 2 - radius / 2 + pad_, y0 = y / 2 - radius / 2 + pad_;
+  const std::ptrdiff_t width = samples_.width ();
   for (int u = 0; u < radius; u += kLanes) {
-    const cv::v_uint8x16 inside = cv::v_load (kInside + kLanes - std::min (kLanes, radius - u));
-    for (int v = y0; v < y0 + radius; v++) {
-      const std::size_t at =
-          std::size_t (v) * std::size_t (samples_.width ()) + std::size_t (x0 + u);
+    const std::uint8_t *inside = kInside + kLanes - std::min (kLanes, radius - u);
+    for (int v = 0; v < radius; v += 2) {
+      const std::ptrdiff_t at = (y0 + v) * width + x0 + u;
+      const auto load = [&] (int c) {
+        const std::uint8_t *from = colours_[c].data () + at;
+        return cv::v_load_halves (from, from + width);
+      };
       /* Saturates at 255, which exceeds kLike. */
-      const cv::v_uint8x16 unlike = cv::v_absdiff (cv::v_load (&colours_[0][at]), r) +
-                                    cv::v_absdiff (cv::v_load (&colours_[1][at]), g) +
-                                    cv::v_absdiff (cv::v_load (&colours_[2][at]), b) +
-                                    cv::v_load (&colours_[3][at]);
-      cv::v_uint16x8 low, high;
-      cv::v_expand ((max - unlike) & inside, low, high);
-      const std::int16_t *depth = samples_.row (v) + x0 + u;
-      count (cv::v_reinterpret_as_s16 (low), cv::v_load (depth));
-      if (radius - u > kLanes / 2)
-        count (cv::v_reinterpret_as_s16 (high), cv::v_load (depth + 8));
+      const cv::v_uint8x16 unlike = cv::v_absdiff (load (0), r) + cv::v_absdiff (load (1), g) +
+                                    cv::v_absdiff (load (2), b) + load (3);
+      const cv::v_uint8x16 mask =
+          cv::v_load_halves (inside, v + 1 < radius ? inside : kInside + kLanes);
+      cv::v_uint16x8 upper, lower;
+      cv::v_expand ((max - unlike) & mask, upper, lower);
+      const std::int16_t *depth = samples_.row (y0 + v) + x0 + u;
+      count (cv::v_reinterpret_as_s16 (upper), cv::v_load (depth));
+      count (cv::v_reinterpret_as_s16 (lower), cv::v_load (depth + width));
     }
   }
 }
