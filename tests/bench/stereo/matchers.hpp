@@ -27,7 +27,7 @@ struct Row {
   double bad1 = 0;      ///< further off than 1 pixel
   double bad2 = 0;      ///< further off than 2 pixels
   double median_px = 0; ///< of the absolute error
-  double ms = 0;        ///< median time of a pair
+  double ms = 0;        ///< least processor time of a pair, of all threads together
 };
 
 /** The disparity range, focal length and grey pictures of a pair; view, left and right are set.

@@ -17,7 +17,7 @@ struct SceneRow {
   double median_mm = 0; ///< of the absolute error, person's pixels
   double rms_px = 0;    ///< of the disparity, person's pixels less than 2 pixels off
   double ms = 0;        ///< median time of a pair
-  double cpu_ms = 0;    ///< mean processor time of a pair, of all threads together
+  double cpu_ms = 0;    ///< least processor time of a pair, of all threads together
 };
 
 struct SceneJob {
