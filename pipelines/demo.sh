@@ -95,7 +95,10 @@ case "$input" in
 esac
 mkdir -p "$out/log" 2>/dev/null || die "--out: cannot make '$out'"
 
-./setup.sh --demo
+case "$input" in
+  cameras) ./setup.sh ;; # Aravis and the simulated cameras
+  *) ./setup.sh --demo ;;
+esac
 source pipelines/env.sh
 
 pids=()
@@ -125,9 +128,7 @@ start_fake_cameras () {
 # The rig: written by the test source or the fake cameras, or recorded with the pictures.
 rig=$out/rig.yaml
 case "$input" in
-  cameras)
-    command -v fake-cameras >/dev/null || die "--input cameras: fake-cameras is not built: run ./setup.sh, which builds more than the demo needs"
-    start_fake_cameras ;;
+  cameras) start_fake_cameras ;;
   avatar | avatar=* | range)
     model=()
     [[ "$input" != avatar=* ]] || model=("location=${input#avatar=}")

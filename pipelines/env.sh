@@ -8,9 +8,8 @@ source "$root/pipelines/options.sh"
 # Whether build/ holds what setup.sh --demo builds.
 build_is_complete () {
   local file
-  for file in gst/{codec/libgstneighbourcode,convert/libgstrangeconvert,depth/libgstrangedepth,mux/libgstrangemux}.so \
-    gst/{render/libgstrangerender,rtp/libgstrtpneighbourcode,testsrc/libgstrangetestsrc}.so pipelines/rangecast-run; do
-    [ -f "$root/build/$file" ] || return 1
+  for file in gst/{codec,convert,depth,mux,render,rtp,testsrc}/lib*.so pipelines/rangecast-run; do
+    compgen -G "$root/build/$file" >/dev/null || return 1
   done
 }
 
@@ -22,7 +21,10 @@ if [ -d "$root/build/gst" ]; then
 elif ! gst-inspect-1.0 --exists neighbourcodeenc 2>/dev/null; then
   echo "env.sh: gst-rangecast is neither built nor installed: run $root/setup.sh" >&2
 fi
-if [ -z "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
+# usage: has_display -> false where a window would show nothing to anybody
+has_display () { [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; }
+
+if ! has_display; then
   export GST_GL_PLATFORM="${GST_GL_PLATFORM:-egl}" GST_GL_WINDOW="${GST_GL_WINDOW:-egl-device}"
 fi
 

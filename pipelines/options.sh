@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Sourced by the scripts here, most of them through env.sh: checks of their options. Needs nothing that is built.
+# Checks of command-line options, sourced by the scripts here, most of them through env.sh; needs no build.
 
 # usage: need_place FILE: that it can be written, as far as folders go
 need_place () {
@@ -34,9 +34,6 @@ split_addresses () {
   IFS=, read -ra addresses <<<"$1"
   for one in "${addresses[@]}"; do split_address "$one" "$2"; done
 }
-
-# usage: has_display -> false where a window would show nothing to anybody
-has_display () { [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; }
 
 # usage: need_number VALUE option minimum maximum
 need_number () {
