@@ -5,7 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "../roi/opencv_image.hpp"
+#include "../opencv/image.hpp"
 #include "histogram_range.hpp"
 
 namespace rangecast {
