@@ -215,9 +215,9 @@ test_udp_relay_names_what_is_missing () {
   expect_error "--between lo,lo: expected two interfaces" udp-relay --between lo,lo
   expect_error "--between lo: expected two interfaces" udp-relay --between lo
   expect_error "--listen 20400: expected --to HOST:PORT" udp-relay --listen 20400
-  expect_error "--to 127.0.0.1:5: expected after a --listen" udp-relay --to 127.0.0.1:5
+  expect_error "--to 127.0.0.1:5: expected after its --listen PORT" udp-relay --to 127.0.0.1:5
   expect_error "--listen and --between" udp-relay --listen 20400 --to 127.0.0.1:5 --between a,b
-  [ "$(id -u)" != 0 ] || expect_error "lo: is no cable" udp-relay --between lo,eth0
+  [ "$(id -u)" != 0 ] || expect_error "lo: is the loopback interface" udp-relay --between lo,eth0
 }
 
 test_recordings_that_there_are_are_kept () {
