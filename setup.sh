@@ -3,15 +3,18 @@
 # Installs what the project needs (Debian 12 packages), configures and builds build/.
 # Quick when nothing changed. What the compiler prints goes to build/setup.log.
 # usage: setup.sh [--demo | --tests]
-#   --demo   what demo.sh, the viewer and README's launch lines need: no calibration, cameras, RTSP server, other programs, language
-#            bindings, tests and benchmarks, even where their libraries are installed
+#   --demo   what demo.sh, the viewer and README's launch lines need: no calibration, cameras, RTSP server, other programs,
+#            language bindings, tests and benchmarks, even where their libraries are installed
 #   --tests  everything, as without an option
 set -euo pipefail
 cd "$(dirname "$0")"
 
 targets=(all)
 case "${1:-}" in
-  --demo) targets=(demo) ;;
+  --demo)
+    targets=(demo)
+    # What was built before is kept up to date, because env.sh makes all plugins known.
+    ! compgen -G "build/gst/camera/*.so" >/dev/null || targets+=(plugins programs) ;;
   --tests | "") ;;
   *)
     echo "setup.sh: unknown option '$1'; expected --demo or --tests" >&2
@@ -27,7 +30,7 @@ packages=(
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-base-apps gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
   gstreamer1.0-libav glib-networking gstreamer1.0-gl libgl1-mesa-dri libegl1 libegl-mesa0 libgles2 libgl1
 )
-[ "${targets[0]}" != all ] || packages+=(
+[ "${targets[0]}" = demo ] || packages+=(
   # calibration, cameras, RTSP server
   libopencv-contrib-dev libceres-dev libaravis-dev libusb-1.0-0-dev libgstrtspserver-1.0-dev
   # language bindings of libgstrange
@@ -71,11 +74,12 @@ logged () {
 }
 
 show_failure () {
-  tail -n 60 "$log" >&2
+  # ninja lets other jobs finish after the first failure, whose message may be long.
+  { grep -q '^FAILED: ' "$log" && sed -n '/^FAILED: /,$p' "$log" | head -n 80 || tail -n 60 "$log"; } >&2
   echo "setup.sh: failed; the whole log is $PWD/$log" >&2
 }
 
-# Reads ninja's output. Says that something is built as soon as it is, and in a terminal how much of it.
+# Reads ninja's output: prints one line when the first job ends, and in a terminal the progress.
 show_progress () {
   local line begun=
   while IFS= read -r line; do
@@ -100,7 +104,7 @@ build () {
     # ccache does not cache files that use a precompiled header.
     logged meson setup build -Ddebug=false -Dc_args=-g1 -Dcpp_args=-g1 -Db_pch="$(command -v ccache >/dev/null && echo false || echo true)"
   fi
-  ninja -C build "${targets[@]}" 2>&1 | tee "$log" | show_progress || { show_failure; return 1; }
+  NINJA_STATUS='[%f/%t] ' ninja -C build "${targets[@]}" 2>&1 | tee "$log" | show_progress || { show_failure; return 1; }
 }
 
 install_packages

@@ -7,35 +7,35 @@ source "$(dirname "$0")/env.sh"
 usage () {
   cat <<'END'
 usage: calibrate.sh --left WHAT [--right WHAT] [--third WHAT] [--left WHAT ...] --out RIG [options]
-  --left WHAT     the camera of a view, or the left one of its stereo pair. Each --left begins a view: 0, 1, ...
-  --right WHAT    the right camera of that view's stereo pair
-  --third WHAT    its third camera
+  --left WHAT     the camera of a view, or the left camera of its stereo pair; each --left begins a view: 0, 1, ...
+  --right WHAT    the right camera of that stereo pair
+  --third WHAT    the third camera of that view
   --out FILE      rig file to write: .yaml or .json
 WHAT is one of
-  'left%02d.jpg'  pictures (.jpg, .png, .bmp) by number; those that all cameras have are used
-  'left*.png'     pictures in order; all cameras must have as many
-  left.mp4        a film
-  'v4l2src device=/dev/video0 ! image/jpeg ! jpegdec'   a live camera, as gst-launch-1.0 takes it
+  'left%02d.jpg'  numbered pictures (.jpg, .png, .bmp); only numbers that all cameras have are used
+  'left*.png'     pictures in order; all cameras must have the same number of them
+  left.mp4        a video
+  'v4l2src device=/dev/video0 ! image/jpeg ! jpegdec'   a live camera, in gst-launch-1.0 syntax
 the board
   --board KIND    chessboard (default) or charuco
-  --columns N     inner corners across, one less than squares (default 9)
-  --rows N        inner corners down (default 6)
-  --square M      side of a square, metres (default 0.025)
-  --marker M      charuco: side of a marker, metres (default: 3/4 of a square)
-  --dictionary D  charuco: the markers' dictionary (default 4x4-50)
+  --columns N     inner corners in a row, one less than squares (default 9)
+  --rows N        inner corners in a column (default 6)
+  --square M      side length of a square, metres (default 0.025)
+  --marker M      charuco: side length of a marker, metres (default: 3/4 of a square)
+  --dictionary D  charuco: marker dictionary (default 4x4-50)
 the result
-  --distortion D  none, four, five (default) or eight coefficients
+  --distortion D  coefficients: none, four, five (default) or eight
   --world W       centre (default), first-view or board: see docs/elements/rigcalibrate.md
   --near M --far M  depths of interest, metres (default 0.3 and 3)
-  --min-frames N  frames in which each camera must have seen the board (default 8)
-  --stills DIR    also leave a PNG of each moment looked at there: all cameras side by side with the corners found, framed
-                  green if it was kept
-  --window        also show them
-  --auto-finish   end by itself when the board was everywhere (live; Ctrl-C ends, too, and calibrates)
+  --min-frames N  minimum number of frames in which each camera sees the board (default 8)
+  --stills DIR    write a PNG of each frame that was searched: all cameras side by side with the corners found, with a
+                  green border if it is used
+  --window        show these frames in a window
+  --auto-finish   finish when the board has been seen in all parts of the pictures (live; Ctrl-C also finishes and calibrates)
 END
 }
 
-# What gst-inspect-1.0 says of a property is asked once, so that limits are written down in one place.
+# Limits come from gst-inspect-1.0, which runs once, so that they are written down in one place.
 inspected=
 property_of () { # property
   [ -n "$inspected" ] || inspected=$(LC_ALL=C gst-inspect-1.0 --no-colors rigcalibrate) || die "no element rigcalibrate"
@@ -61,8 +61,8 @@ set_property () {
   fi
   properties+=("$2=$value")
 }
-is_within () { # value, "LEAST to MOST"
-  awk -v value="$1" -v least="${2% to *}" -v most="${2#* to }" 'BEGIN { exit !(value + 0 >= least + 0 && value + 0 <= most + 0) }'
+is_within () { # value, "MIN to MAX"
+  awk -v value="$1" -v min="${2% to *}" -v max="${2#* to }" 'BEGIN { exit !(value + 0 >= min + 0 && value + 0 <= max + 0) }'
 }
 
 roles=() views=() whats=() out= properties=() stills= window=
@@ -71,12 +71,12 @@ while [ $# -gt 0 ]; do
   case "$1" in
     --left | --right | --third | --out | --board | --columns | --rows | --dictionary | --distortion | --world | --near | --far | \
       --min-frames | --square | --marker | --stills)
-      [ $# -ge 2 ] && [[ -n "$2" && "$2" != --* ]] || die "$1: expected a value after it" ;;
+      [ $# -ge 2 ] && [[ -n "$2" && "$2" != --* ]] || die "option $1 needs a value" ;;
   esac
   case "$1" in
     --left | --right | --third)
       [ "$1" != --left ] || view=$((view + 1))
-      [ $view -ge 0 ] || die "$1: expected a --left before it, which begins the view"
+      [ $view -ge 0 ] || die "$1: expected after the --left of its view"
       roles+=("${1#--}") views+=("$view") whats+=("$2"); shift ;;
     --out) out=$2; shift ;;
     --board | --columns | --rows | --dictionary | --distortion | --world | --near | --far | --min-frames)
@@ -115,7 +115,7 @@ list_pictures () {
   fi
 }
 
-# A file that is there is a film, whatever its name looks like.
+# An existing file is a video, whatever its name looks like.
 is_source () { # a launch string: has a link, or begins with an element's name
   [ ! -e "$1" ] && { [[ "$1" == *!* ]] || gst-inspect-1.0 --exists "${1%% *}" 2>/dev/null; }
 }
@@ -133,14 +133,14 @@ for what in "${whats[@]}"; do
     cp "$folder/keys" "$common"
   else
     if [[ "$what" != *%* ]] && ! cmp -s "$common" "$folder/keys"; then
-      die "'$what': $(wc -l <"$folder/keys") pictures; expected as many as of the other cameras, $(wc -l <"$common")"
+      die "'$what': $(wc -l <"$folder/keys") pictures; expected $(wc -l <"$common"), as for the other cameras"
     fi
     comm -12 "$common" "$folder/keys" >"$folder/both"
     mv "$folder/both" "$common"
   fi
 done
 if [ -n "$common" ]; then
-  [ -s "$common" ] || die "no number is in the pictures of all cameras"
+  [ -s "$common" ] || die "the cameras have no picture number in common"
   sort -n -o "$common" "$common"
 fi
 

@@ -127,7 +127,7 @@ def main():
         signal.signal(child.ended_by, signal.SIG_DFL)
         os.kill(os.getpid(), child.ended_by)
     if not result and not error:
-        print("calibrate.sh: there was no result", file=sys.stderr)
+        print("calibrate.sh: no result", file=sys.stderr)
     sys.exit(0 if result and not error else 1)
 
 

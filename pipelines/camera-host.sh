@@ -14,38 +14,39 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --input WHAT    avatar (default): the built-in figure; avatar=MODEL: a glTF or OBJ model;
                   DIR: recorded pairs DIR/viewN-left.* and DIR/viewN-right.* (video files, or image
                   sequences viewN-left-%05d.png from 0), which begin with the empty scene;
-                  range: range images of the built-in figure, as perfect cameras would see it: no
-                  cameras and no stereo, to try what comes after them;
-                  cameras: those that the rig names; cameras=LEFT,RIGHT[,THIRD]: these, by name,
-                  serial number or address
-  --views N       number of views in the rig, for avatar (default 4)
+                  range: exact range images of the built-in figure, without cameras and stereo
+                  matching, to test everything downstream of them;
+                  cameras: the cameras that the rig names; cameras=LEFT,RIGHT[,THIRD]: cameras by
+                  name, serial number or address
+  --views N       number of simulated views, for avatar and range: as many as the rig has (the default)
   --size WxH      picture size, for avatar and cameras (default 320x240)
   --fps N         frames per second, for avatar, cameras and image sequences (default 15)
-  --loop N        avatar's first N pictures are drawn and repeated forwards and backwards, so that the
-                  cameras then cost next to no CPU, as real ones (default 0: each is drawn)
-  --format WHAT   rgb (default), bayer or grey: pictures that the cameras send
+  --loop N        draw the first N pictures of avatar and repeat them forwards and backwards, so that the
+                  simulated cameras take hardly any CPU time, like real ones (default 0: draw all)
+  --format WHAT   pixel format of the cameras: rgb (default), bayer or grey
   --trigger HOW   free-run, software (default), hardware or action, for cameras
-  --clock-server HOST:PORT  cameras fire by the clock that parent-host.sh --clock-port publishes
-                  there (default: this machine's)
-  --action-send yes|no  with --trigger action, whether this host sends the commands, which reach the
-                  cameras of all hosts of the network: one does (default: the host of view 0)
-  --reconnect     wait for cameras that are gone or not there yet, instead of ending
-  --threads N     cores that this host's pictures may be worked on by at a time (default: all); where
-                  several hosts share one machine, fewer take less of it
-  --learn N       frames from which the background is learnt (default 20)
-  --depth WHAT    properties of stereodepth, e.g. "algorithm=bm refine=0", which takes less time
+  --clock-server HOST:PORT  trigger the cameras by the clock that parent-host.sh --clock-port publishes
+                  there (default: by this machine's clock)
+  --action-send yes|no  with --trigger action: whether this host sends the action commands, which reach the
+                  cameras of all hosts; exactly one host must (default: the host of view 0)
+  --reconnect     wait for missing or lost cameras instead of ending
+  --threads N     maximum number of CPU cores to use (default: all); lower it where several hosts share a
+                  machine
+  --learn N       number of frames from which the background is learnt (default 20)
+  --depth WHAT    properties of stereodepth, e.g. "algorithm=bm refine=0", which is faster
   --encoder WHAT  properties of neighbourcodeenc, e.g. "profile=entropy temporal=true" (default:
                   profile=packed)
 END
   rtp_usage_sender
 }
 
-view= to= rig= input=avatar views=4 size=320x240 fps=15 learn=20
+view= to= rig= input=avatar views= size=320x240 fps=15 learn=20
 format=rgb trigger=software clock_server= action_send= reconnect=false depth= encoder=profile=packed loop=0 threads=
 while [ $# -gt 0 ]; do
+  option=$1
   rtp_option sender "$1" "${2:-}"
   if [ $taken -gt 0 ]; then
-    shift $taken || die "the last option lacks its value"
+    shift $taken || die "option $1 needs a value"
     continue
   fi
   case "$1" in
@@ -69,10 +70,13 @@ while [ $# -gt 0 ]; do
     -h | --help) usage; exit 0 ;;
     *) usage >&2; die "unknown option '$1'" ;;
   esac
-  shift || { echo "camera-host.sh: the last option lacks its value" >&2; exit 2; }
+  shift || die "option $option needs a value"
 done
+need_option "$view" --view
+need_option "$to" --to
+need_option "$rig" --rig
 need_number "$view" --view 0 63
-need_number "$views" --views 1 64
+[ -z "$views" ] || need_number "$views" --views 1 64
 need_number "$fps" --fps 1 1000
 need_number "$learn" --learn 1 100000
 need_number "$loop" --loop 0 100000
@@ -93,17 +97,25 @@ case "$action_send" in
 esac
 if [ -n "$clock_server" ]; then
   split_address "$clock_server" --clock-server
-  [[ "$input" == cameras* ]] || die "--clock-server: expected with --input cameras; other inputs fire by this machine's clock"
+  [[ "$input" == cameras* ]] || die "--clock-server: expected with --input cameras; other inputs use this machine's clock"
 fi
 [ "$loop" = 0 ] || [[ "$input" == avatar* ]] || die "--loop: expected with --input avatar"
 [ -z "$depth" ] || [ "$input" != range ] || die "--depth: expected with cameras; --input range has no stereodepth"
 rtp_check sender
-# What GStreamer takes for true.
+# Spellings that GStreamer accepts for true.
 [[ ! "${encoder,,}" =~ adaptive-bitrate\ *=\ *[\"\']?(true|t|yes|1)([^a-z0-9]|$) ]] || rtp_adaptive=yes
 [ -z "$rtp_adaptive" ] || [ -n "$rtp_feedback" ] ||
-  echo "camera-host.sh: --encoder: adaptive-bitrate adapts to nothing without --feedback, by which receivers report" >&2
+  echo "camera-host.sh: --encoder: adaptive-bitrate has no effect without --feedback, because no receiver reports arrive" >&2
 send_rtp "$to"
 [ -f "$rig" ] || die "--rig: no file '$rig'"
+case "$input" in
+  avatar | avatar=* | range) # views and rig must describe the same cameras
+    need_picture "$size" --size 4096
+    rig_views=$(count_views "$rig")
+    [ "$rig_views" -gt 0 ] || rig_views=${views:-4} # not a rig: stereodepth says why
+    views=${views:-$rig_views}
+    [ "$views" = "$rig_views" ] || die "--views is $views, but the rig '$rig' has $rig_views views" ;;
+esac
 
 # Sets `side` to the elements that play one side of a recorded pair at its own speed.
 read_side () { # left|right
@@ -121,7 +133,7 @@ read_side () { # left|right
     ! decodebin ! videoconvert ! clocksync)
 }
 
-# Sets `cameras` to stereocamsrc and what leads from it.
+# Sets `cameras` to stereocamsrc and the elements that link it to stereodepth.
 read_cameras () {
   local name names side
   cameras=(stereocamsrc name=cameras "trigger=$trigger" "reconnect=$reconnect" "action-send=$action_send")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Unites what the demo's hosts measured (OUT/log/*.json) to OUT/report.json and prints it.
+"""Combines the measurements of the demo's hosts (OUT/log/*.json) into OUT/report.json and prints it.
 
 usage: demo-report.py OUT
 
@@ -34,7 +34,7 @@ def main():
     cpu = ", ".join(f"{name} {host['cpu_seconds']:.1f}" for name, host in hosts.items())
     whole = report["whole_frame_sets"]
     rows = (
-        ("frame sets", f"{report['frames']}, {whole} of them of all {report['views']} views", ""),
+        ("frame sets", f"{report['frames']}, {whole} with all {report['views']} views", ""),
         ("frame sets/s", f"{report['fps']:.1f}", "9 to 12 on six PCs"),
         ("points", f"{points:.0f} a frame set", ""),
         ("removed by the cylinder", f"{100 * (1 - kept / points) if points else 0:.0f} %", "25 %"),
@@ -50,7 +50,7 @@ def main():
     print(f"CPU seconds by host: {cpu}")
     if whole < 0.9 * report["frames"]:
         slower = max(1, int(report["fps"] / 2))
-        print(f"warning: this machine is too slow for that size and rate: views came late and were left out of frame sets; try --fps {slower}")
+        print(f"warning: this machine is too slow for this size and rate: late views were left out of frame sets; try --fps {slower}")
     names = (os.path.join(out, name) for name in ("avatar.png", "avatar.webm", "report.json"))
     print("  ".join(name for name in names if os.path.exists(name)))
 

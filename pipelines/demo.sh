@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The main job on one machine: N camera hosts, a parent and a viewer as separate processes, joined
-# by RTP over UDP on loopback. Measures it and leaves picture, film and report in the output folder.
+# The whole system on one machine: N camera hosts, a parent and a viewer as separate processes, connected
+# by RTP over UDP on loopback. Measures it and leaves picture, video and report in the output folder.
 set -euo pipefail
 called_from=$PWD
 cd "$(dirname "$0")/.."
@@ -14,33 +14,33 @@ usage () {
   cat <<'END'
 usage: demo.sh [options]
   --input WHAT  avatar (default), avatar=MODEL.glb, range, a folder of recorded pairs with its rig.yaml
-                (see camera-host.sh --help), or cameras: GigE Vision cameras that see what avatar
-                shows, made on this machine's loopback network by fake-cameras
-  --loop N      the first N pictures of avatar's cameras are drawn and repeated forwards and backwards, so
-                that cameras then cost next to no CPU, as real ones (default: each is drawn)
-  --views N     number of stereo cameras round the person (default 4; of a folder: its rig's)
+                (see camera-host.sh --help), or cameras: the same scene from GigE Vision cameras that
+                fake-cameras simulates on this machine's loopback network
+  --loop N      draw the first N pictures of avatar and repeat them forwards and backwards, so that the
+                simulated cameras take hardly any CPU time, like real ones (default: draw all)
+  --views N     number of stereo cameras round the person (default 4; for a folder: as in its rig)
   --size WxH    size of the camera pictures (default 320x240)
-  --frames N    frame sets to render (default 150)
+  --frames N    number of frame sets to render (default 150)
   --fps N       frame sets per second (default 15)
   --out DIR     where avatar.png, avatar.webm and report.json go (default out)
   --port N      first of views + 1 UDP ports (default 18400)
   --window      also show it in a window
-  --no-film     no avatar.webm, whose coding takes CPU time that a viewer does not need
-  --trace       also write when each buffer passed each pad to DIR/log/HOST.trace, for
+  --no-film     do not write avatar.webm, whose encoding takes CPU time
+  --trace       write the time at which each buffer passed each pad to DIR/log/HOST.trace, for
                 tests/bench/latency-budget.py
-  --jitter MS   jitter buffers of the parent and the viewer (default: theirs)
-  --mtu BYTES   largest packet (default 1400); on loopback, as in a network with jumbo frames, it may
-                be larger, which costs less CPU time
-  --threads N   cores that each camera host may use at a time (default: this machine's, divided by the
-                number of views, at least 1: all of them work on the same moment's pictures)
+  --jitter MS   jitter buffers of the parent and the viewer (default: see parent-host.sh, viewer-host.sh)
+  --mtu BYTES   maximum packet size (default 1400); larger packets take less CPU time
+  --threads N   maximum number of CPU cores for each camera host (default: the machine's cores divided by
+                the number of views, at least 1)
   --depth WHAT  properties of stereodepth, e.g. "algorithm=bm refine=0"
-  --latency MS  how long the parent waits for a late view (default: its own)
-With RANGECAST_STATS=udp://HOST:PORT (or a file) the hosts' statistics go there, for top.sh.
+  --latency MS  how long the parent waits for a late view (default: see parent-host.sh)
+With RANGECAST_STATS=udp://HOST:PORT (or a file) the hosts send their statistics there, for top.sh.
 END
 }
 
 input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 window= film=yes trace= jitter= latency= loop= threads= mtu= depth=
 while [ $# -gt 0 ]; do
+  option=$1
   case "$1" in
     --input) input=${2:-}; shift ;;
     --threads) threads=${2:-}; shift ;;
@@ -59,14 +59,12 @@ while [ $# -gt 0 ]; do
     --jitter) jitter=${2:-}; shift ;;
     --latency) latency=${2:-}; shift ;;
     -h | --help) usage; exit 0 ;;
-    *) usage >&2; echo "demo.sh: unknown option '$1'" >&2; exit 2 ;;
+    *) usage >&2; die "unknown option '$1'" ;;
   esac
-  shift || { echo "demo.sh: the last option lacks its value" >&2; exit 2; }
+  shift || die "option $option needs a value"
 done
 
-need_size "$size" --size
-[ "${size%x*}" -ge 16 ] && [ "${size#*x}" -ge 16 ] && [ "${size%x*}" -le 4096 ] && [ "${size#*x}" -le 4096 ] ||
-  die "--size: expected 16x16 to 4096x4096, got '$size'"
+need_picture "$size" --size 4096
 need_number "$frames" --frames 1 1000000
 need_number "$fps" --fps 1 120
 need_number "$port" --port 1024 65000
@@ -89,13 +87,16 @@ case "$input" in
   *)
     input=$(absolute "$input")
     [ -f "$input/rig.yaml" ] || die "--input: '$input' is not avatar, avatar=MODEL, range, cameras, or a folder with a rig.yaml"
-    recorded_views=$(grep -c '^ *id:' "$input/rig.yaml" || true)
+    recorded_views=$(count_views "$input/rig.yaml")
     views=${views:-$recorded_views}
     need_number "$views" --views 1 "$recorded_views" ;;
 esac
-mkdir -p "$out/log" 2>/dev/null || die "--out: cannot make '$out'"
+mkdir -p "$out/log" 2>/dev/null || die "--out: cannot create '$out'"
 
-./setup.sh --demo
+case "$input" in
+  cameras) ./setup.sh ;; # Aravis and the simulated cameras
+  *) ./setup.sh --demo ;;
+esac
 source pipelines/env.sh
 
 pids=()
@@ -105,8 +106,8 @@ stop_hosts () {
 trap stop_hosts EXIT
 declare -A names=()
 
-# Starts the cameras and waits until they are there; they write the rig. Two demos at a time have
-# ports of their own, and so do their cameras have addresses.
+# Starts the cameras, which write the rig, and waits until they are ready. Their addresses derive from the port, so that
+# several demos can run at a time.
 start_fake_cameras () {
   local i log=$out/log/fake-cameras.log
   fake-cameras --views "$views" --size "$size" --fps "$fps" --rig-export "$rig" \
@@ -125,9 +126,7 @@ start_fake_cameras () {
 # The rig: written by the test source or the fake cameras, or recorded with the pictures.
 rig=$out/rig.yaml
 case "$input" in
-  cameras)
-    command -v fake-cameras >/dev/null || die "--input cameras: fake-cameras is not built: run ./setup.sh, which builds more than the demo needs"
-    start_fake_cameras ;;
+  cameras) start_fake_cameras ;;
   avatar | avatar=* | range)
     model=()
     [[ "$input" != avatar=* ]] || model=("location=${input#avatar=}")

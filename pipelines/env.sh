@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Sourced by the scripts here: makes the elements of the build tree known (an installed plugin is
-# found without it) and selects OpenGL without a display where there is none. Says if the build is missing or incomplete.
+# Sourced by the scripts here: adds the build tree to the plugin path (installed plugins are found without it) and selects
+# OpenGL without a display where there is none. Reports a missing or incomplete build.
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 source "$root/pipelines/options.sh"
@@ -8,9 +8,8 @@ source "$root/pipelines/options.sh"
 # Whether build/ holds what setup.sh --demo builds.
 build_is_complete () {
   local file
-  for file in gst/{codec/libgstneighbourcode,convert/libgstrangeconvert,depth/libgstrangedepth,mux/libgstrangemux}.so \
-    gst/{render/libgstrangerender,rtp/libgstrtpneighbourcode,testsrc/libgstrangetestsrc}.so pipelines/rangecast-run; do
-    [ -f "$root/build/$file" ] || return 1
+  for file in gst/{codec,convert,depth,mux,render,rtp,testsrc}/lib*.so pipelines/rangecast-run; do
+    compgen -G "$root/build/$file" >/dev/null || return 1
   done
 }
 
@@ -22,31 +21,34 @@ if [ -d "$root/build/gst" ]; then
 elif ! gst-inspect-1.0 --exists neighbourcodeenc 2>/dev/null; then
   echo "env.sh: gst-rangecast is neither built nor installed: run $root/setup.sh" >&2
 fi
-if [ -z "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
+# usage: has_display -> whether a window can be shown
+has_display () { [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; }
+
+if ! has_display; then
   export GST_GL_PLATFORM="${GST_GL_PLATFORM:-egl}" GST_GL_WINDOW="${GST_GL_WINDOW:-egl-device}"
 fi
 
-# What runs the launch strings: rangecast-run, where it is built or installed, and demo.sh has it measure. gst-launch-1.0 of
-# GStreamer 1.22 takes the same strings, but sends no statistics, and with -e may wait forever after an error that comes
-# before the first picture. With -q it would say nothing of warnings, and without it says them among much else on stdout.
+# Runs a launch string: with RANGECAST_LAUNCH if set (demo.sh measures that way), else with rangecast-run, else with
+# gst-launch-1.0, which sends no statistics and in GStreamer 1.22 with -e may wait forever after an error before preroll.
+# With -q gst-launch-1.0 hides warnings; without it, they are among other output on stdout.
 launch () {
   local runner
   if [ -n "${RANGECAST_LAUNCH:-}" ]; then
-    eval "runner=($RANGECAST_LAUNCH)" # a command line, quoted where it must be
+    eval "runner=($RANGECAST_LAUNCH)" # a command line in shell syntax
     exec "${runner[@]}" "$@"
   fi
   ! command -v rangecast-run >/dev/null || exec rangecast-run "$@"
   LANGUAGE=en exec gst-launch-1.0 -e --no-position "$@" > >(
-    trap '' INT TERM # it ends with what it reads
+    trap '' INT TERM # ends at the end of its input
     exec grep --line-buffered '^WARNING: ' >&2
   )
 }
 
-# usage: pass_messages FILE TEXT <messages of a launch: hands them on; at their end a FILE without a byte goes. Unless TEXT
-# is empty, that is said then if no error was, and not that there is no access unit in what came.
+# usage: pass_messages FILE TEXT <messages of a launch: copies them to stderr and at their end removes FILE if it is empty.
+# A TEXT is then printed unless there was an error, and replaces the error that no access unit was found.
 pass_messages () {
   local errors
-  trap '' INT TERM # it ends with what it reads
+  trap '' INT TERM # ends at the end of its input
   errors=$(sed -u -n "${2:+/No access unit found: /,/GstNeighbourCodeParse:/d;}w /dev/stderr
     /^ERROR: /p")
   if [ ! -s "$1" ] && { [ -f "$1" ] || [ ! -e "$1" ]; }; then
@@ -55,8 +57,8 @@ pass_messages () {
   fi
 }
 
-# usage: drop_empty FILE TEXT before `launch`, which takes this process: pass_messages ends a moment after it. So rangecast-run
-# takes the file away itself, and pass_messages where that was killed or is not there.
+# usage: drop_empty FILE TEXT before `launch`, which replaces this process, so that pass_messages ends a moment after it.
+# Therefore rangecast-run removes the file itself; pass_messages does where rangecast-run was killed or is missing.
 drop_empty () {
   exec 2> >(pass_messages "$1" "$2")
   [ -n "${RANGECAST_LAUNCH:-}" ] || ! command -v rangecast-run >/dev/null || RANGECAST_LAUNCH=rangecast-run

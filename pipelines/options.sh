@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Sourced by the scripts here, most of them through env.sh: checks of their options. Needs nothing that is built.
+# Checks of command-line options. Sourced by the scripts here, most of them through env.sh; works without a build.
 
-# usage: need_place FILE: that it can be written, as far as folders go
+# usage: need_place FILE: its directory must exist, and it must not be a directory itself
 need_place () {
   local folder
   folder=$(dirname -- "$1")
-  [ -d "$folder" ] || die "$1: there is no folder '$folder'; expected one that there is"
-  [ ! -d "$1" ] || die "$1: is a folder; expected a file to write"
+  [ -d "$folder" ] || die "$1: directory '$folder' does not exist"
+  [ ! -d "$1" ] || die "$1: is a directory; expected a file to write"
 }
 
 die () { echo "$(basename "$0"): $*" >&2; exit 2; }
+
+# usage: need_option VALUE option: an option without a default
+need_option () { [ -n "$1" ] || die "$2 is required"; }
 
 is_ipv4 () { # 192.0.2.1
   [[ "$1" =~ ^([0-9]{1,3})\.([0-9]{1,3})\.([0-9]{1,3})\.([0-9]{1,3})$ ]] &&
@@ -20,23 +23,20 @@ is_ipv4 () { # 192.0.2.1
 # usage: split_address HOST:PORT option -> sets $host and $port
 split_address () {
   host=${1%:*} port=${1##*:}
-  [[ "$1" == *:* && -n "$host" && "$port" =~ ^[0-9]+$ ]] && [ "$port" -ge 1 ] && [ "$port" -le 65535 ] ||
-    die "$2: expected HOST:PORT, got '$1'"
+  [[ "$1" == *:* && -n "$host" && "$port" =~ ^[0-9]+$ ]] || die "$2: expected HOST:PORT, got '$1'"
+  [[ "$port" =~ ^0*[0-9]{1,5}$ ]] && ((10#$port >= 1 && 10#$port <= 65535)) || die "$2: expected a port from 1 to 65535, got '$1'"
   ! [[ "$host" =~ ^[0-9.]+$ ]] || is_ipv4 "$host" || die "$2: expected four numbers up to 255, got '$host'"
   [[ "$host" =~ ^[0-9.]+$ || "$host" == *:* ]] || getent ahosts "$host" >/dev/null || # udpsink would say nothing
-    die "$2: no host is called '$host'"
+    die "$2: no host named '$host'"
 }
 
 # usage: split_addresses HOST:PORT[,HOST:PORT...] option -> checks all; sets the array `addresses`
 split_addresses () {
   local one
-  [[ ",$1," != *,,* ]] || die "$2: expected HOST:PORT[,HOST:PORT...] and no comma more, got '$1'"
+  [[ ",$1," != *,,* ]] || die "$2: expected HOST:PORT[,HOST:PORT...] without empty entries, got '$1'"
   IFS=, read -ra addresses <<<"$1"
   for one in "${addresses[@]}"; do split_address "$one" "$2"; done
 }
-
-# usage: has_display -> false where a window would show nothing to anybody
-has_display () { [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; }
 
 # usage: need_number VALUE option minimum maximum
 need_number () {
@@ -50,13 +50,20 @@ need_degrees () {
     die "$2: expected degrees per second, less than 3600, e.g. 30 or -7.5, got '$1'"
 }
 
-# usage: need_picture VALUE option: a size that OpenGL draws
+# usage: need_picture VALUE option [maximum]: a size that OpenGL draws; with 4096, one that avatartestsrc and fake-cameras draw
 need_picture () {
+  local max=${3:-8192}
   need_size "$1" "$2"
-  [ "${1%x*}" -ge 16 ] && [ "${1#*x}" -ge 16 ] && [ "${1%x*}" -le 8192 ] && [ "${1#*x}" -le 8192 ] ||
-    die "$2: expected 16x16 to 8192x8192, got '$1'"
+  [ "${1%x*}" -ge 16 ] && [ "${1#*x}" -ge 16 ] && [ "${1%x*}" -le "$max" ] && [ "${1#*x}" -le "$max" ] ||
+    die "$2: expected 16x16 to ${max}x$max, got '$1'"
 }
 
 need_size () {
   [[ "$1" =~ ^[1-9][0-9]{0,5}x[1-9][0-9]{0,5}$ ]] || die "$2: expected WIDTHxHEIGHT, e.g. 320x240, got '$1'"
 }
+
+# usage: is_numbered NAME: whether multifilesink writes a file for each frame set, as for out-%05d.ply, and not one again and again
+is_numbered () { [[ "$1" =~ %[0-9]*[diu] ]]; }
+
+# usage: count_views RIG: prints how many views a rig file (YAML or JSON) has
+count_views () { grep -cE '^[[:space:]{-]*"?id"? *:' "$1" || true; }

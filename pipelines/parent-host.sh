@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The parent host: the coded views of all camera hosts, matched by capture time, on to the viewer.
+# The parent host: combines the coded views of all camera hosts by capture time and sends them to the viewers.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 source "$(dirname "$0")/rtp.sh"
@@ -8,30 +8,31 @@ source "$(dirname "$0")/rtp.sh"
 usage () {
   cat <<'END'
 usage: parent-host.sh --views N --listen PORT --to HOST:PORT[,HOST:PORT...] [options]
-  --views N       how many camera hosts there are
-  --listen PORT   camera host of view i sends to UDP port PORT + i
+  --views N       number of camera hosts
+  --listen PORT   first UDP port: the camera host of view i sends to PORT + i
   --to ADDRESSES  where viewers listen; a multicast group (e.g. 239.255.7.1:7000) reaches any number
   --interface IF  network interface to the multicast group (default: the system's choice)
-  --ttl N         how many routers the multicast may pass, plus one (default 1: this network)
+  --ttl N         multicast TTL: the number of routers to pass, plus one (default 1: this network)
   --jitter MS     jitter buffer of each camera stream (default 30)
   --latency MS    how long to wait for a late view (default 60)
-  --clock-port N  publish the clock on UDP port N, for camera-host.sh --clock-server (default: no)
-  --rig FILE      leave out camera hosts whose cameras are not those of this rig (default: none is)
+  --clock-port N  publish the clock on UDP port N, for camera-host.sh --clock-server (default: not published)
+  --rig FILE      reject camera hosts whose cameras are not in this rig (default: accept all)
 To the viewers:
 END
   rtp_usage_sender
   cat <<'END'
 From the cameras:
-  --cameras HOST:PORT[,HOST:PORT...]  camera-host.sh --feedback of each, in the order of views
-  --camera-fec, --camera-rtx  the camera hosts have --fec, --rtx; --key is one for all
+  --cameras HOST:PORT[,HOST:PORT...]  host and --feedback port of each camera-host.sh, in the order of views
+  --camera-fec, --camera-rtx  the camera hosts run with --fec, --rtx; --key is the same for all
 END
 }
 
 views= listen= to= jitter=30 latency=60 clock_port= rig= cameras_feedback= camera_fec= camera_rtx=
 while [ $# -gt 0 ]; do
+  option=$1
   rtp_option sender "$1" "${2:-}"
   if [ $taken -gt 0 ]; then
-    shift $taken || die "the last option lacks its value"
+    shift $taken || die "option $1 needs a value"
     continue
   fi
   case "$1" in
@@ -50,18 +51,21 @@ while [ $# -gt 0 ]; do
     -h | --help) usage; exit 0 ;;
     *) usage >&2; die "unknown option '$1'" ;;
   esac
-  shift || { echo "parent-host.sh: the last option lacks its value" >&2; exit 2; }
+  shift || die "option $option needs a value"
 done
+need_option "$views" --views
+need_option "$listen" --listen
+need_option "$to" --to
 need_number "$views" --views 1 64
-need_number "$listen" --listen 1 $((65535 - views))
+need_number "$listen" --listen 1 $((65536 - views))
 need_number "$rtp_ttl" --ttl 0 255
 need_number "$jitter" --jitter 0 10000
 need_number "$latency" --latency 0 10000
 [ -z "$clock_port" ] || need_number "$clock_port" --clock-port 1 65535
 [ -z "$rtp_interface" ] || [[ "$to" =~ (^|,)(22[4-9]|23[0-9])\. ]] || die "--interface: expected with a multicast group in --to"
-# usage: need_own_port PORT option: none that cameras send to
+# usage: need_own_port PORT option: must differ from the ports that cameras send to
 need_own_port () {
-  [ "$1" -lt "$listen" ] || [ "$1" -ge $((listen + views)) ] || die "$2: port $1 is that of view $(($1 - listen)) (--listen $listen)"
+  [ "$1" -lt "$listen" ] || [ "$1" -ge $((listen + views)) ] || die "$2: port $1 is used by view $(($1 - listen)) (--listen $listen)"
 }
 [ -z "$clock_port" ] || need_own_port "$clock_port" --clock-port
 feedbacks=()
@@ -70,12 +74,12 @@ if [ -n "$cameras_feedback" ]; then
   feedbacks=("${addresses[@]}")
   [ ${#feedbacks[@]} = "$views" ] || die "--cameras: expected $views addresses, got '$cameras_feedback'"
 fi
-[ -z "$camera_rtx" ] || [ -n "$cameras_feedback" ] || die "--camera-rtx: expected --cameras, too"
+[ -z "$camera_rtx" ] || [ -n "$cameras_feedback" ] || die "--camera-rtx: needs --cameras"
 [ -z "$rig" ] || [ -f "$rig" ] || die "--rig: no file '$rig'"
 rtp_check sender
 if [ -n "$rtp_feedback" ]; then
   need_own_port "$rtp_feedback" --feedback
-  [ "$rtp_feedback" != "$clock_port" ] || die "--feedback: port $rtp_feedback is that of --clock-port"
+  [ "$rtp_feedback" != "$clock_port" ] || die "--feedback: port $rtp_feedback is used by --clock-port"
 fi
 send_rtp "$to"
 viewers=("${rtp[@]}")

@@ -1,20 +1,21 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Plays a recording of coded frame sets: in a window, or to a film.
+# Plays a recording of coded frame sets, in a window or to a video file.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 
 usage () {
   cat <<'END'
 usage: play.sh FILE [options]
-  --film WEBM    write a film instead of showing a window
-  --orbit DEG    degrees per second by which the view turns (default 30)
+  --film WEBM    write a video instead of showing a window
+  --orbit DEG    orbit, degrees per second (default 30)
   --size WxH     picture size (default 640x480)
 END
 }
 
 file= film= orbit=30 size=640x480
 while [ $# -gt 0 ]; do
+  option=$1
   case "$1" in
     --film) film=${2:-}; shift ;;
     --orbit) orbit=${2:-}; shift ;;
@@ -23,7 +24,7 @@ while [ $# -gt 0 ]; do
     -*) usage >&2; die "unknown option '$1'" ;;
     *) [ -z "$file" ] || die "expected one file, got '$file' and '$1'"; file=$1 ;;
   esac
-  shift || { echo "play.sh: the last option lacks its value" >&2; exit 2; }
+  shift || die "option $option needs a value"
 done
 [ -n "$file" ] || { usage >&2; die "expected a file to play"; }
 [ -f "$file" ] || die "no file '$file'"
@@ -35,9 +36,9 @@ if [ -n "$film" ]; then
 fi
 if [ -n "$film" ] || ! has_display; then
   ! command -v rangecast-run >/dev/null || rangecast-run filesrc "location=$file" ! neighbourcodeparse ! fakesink num-buffers=1 ||
-    die "'$file' is no recording"
+    die "'$file' is not a recording"
   [ -n "$film" ] ||
-    die "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); expected one, or --film"
+    die "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --film without one"
 fi
 
 picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"

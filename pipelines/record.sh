@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Records coded frame sets to a file: what a parent sends, or the built-in figure.
+# Records coded frame sets to a file: the stream of a parent, or the built-in figure.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 source "$(dirname "$0")/rtp.sh"
@@ -8,25 +8,26 @@ source "$(dirname "$0")/rtp.sh"
 usage () {
   cat <<'END'
 usage: record.sh FILE [options]
-What was in FILE is FILE~ afterwards.
-  --listen PORT  record the stream that arrives at this UDP port, until Ctrl-C; without it, the
-                 built-in figure with exact depth:
-  --views N      views round the figure (default 4)
+An existing FILE is renamed to FILE~.
+  --listen PORT  record the stream that arrives at this UDP port, until Ctrl-C
+Without --listen, it records the built-in figure with exact depth:
+  --views N      number of views round the figure (default 4)
   --size WxH     picture size (default 320x240)
-  --frames N     frame sets (default 60)
+  --frames N     number of frame sets (default 60)
 With --listen:
   --jitter MS    jitter buffer (default 50)
-  --multicast GROUP  the parent sends to this multicast group
-  --interface IF  network interface to the group (default: the system's choice)
+  --multicast GROUP  receive from this multicast group
+  --interface IF  network interface for the group (default: the system's choice)
 END
   rtp_usage_receiver
 }
 
 file= listen= views=4 size=320x240 frames=60 group= jitter=50
 while [ $# -gt 0 ]; do
+  option=$1
   rtp_option receiver "$1" "${2:-}"
   if [ $taken -gt 0 ]; then
-    shift $taken || die "the last option lacks its value"
+    shift $taken || die "option $1 needs a value"
     continue
   fi
   case "$1" in
@@ -41,13 +42,13 @@ while [ $# -gt 0 ]; do
     -*) usage >&2; die "unknown option '$1'" ;;
     *) [ -z "$file" ] || die "expected one file, got '$file' and '$1'"; file=$1 ;;
   esac
-  shift || { echo "record.sh: the last option lacks its value" >&2; exit 2; }
+  shift || die "option $option needs a value"
 done
 [ -n "$file" ] || { usage >&2; die "expected a file to write"; }
 need_place "$file"
 need_number "$views" --views 1 64
 need_number "$frames" --frames 1 1000000
-need_size "$size" --size
+need_picture "$size" --size 4096
 
 [ -z "$rtp_interface" ] || [ -n "$group" ] || die "--interface: expected with --multicast"
 [ -z "$group" ] || [ -n "$listen" ] || die "--multicast: expected with --listen"
@@ -63,8 +64,8 @@ else
   source=(avatartestsrc "views=$views" "num-buffers=$frames" range-person-only=true
     ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc)
 fi
-# What there is already must not go for a stream that does not come.
+# If nothing arrives, an existing recording must not be lost.
 [ ! -s "$file" ] || mv -f -- "$file" "$file~"
-drop_empty "$file" "${listen:+nothing came to port $listen (no coded frame set): $file is not written}"
+drop_empty "$file" "${listen:+nothing came to port $listen (no coded frame set); $file was not written}"
 launch "${source[@]}" ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream \
   ! filesink "location=$file"

@@ -8,17 +8,18 @@ usage () {
   cat <<'END'
 usage: rgbd-to-ply.sh COLOUR DEPTH OUT [options]
   COLOUR, DEPTH      image files, or sequences such as colour/%05d.jpg and depth/%05d.png; depth is
-                     a 16-bit grey PNG
-  OUT                a PLY file (with %05d for sequences), or a .png: rendered instead
-  --focal-length PX  default: 0.82 of the picture's width (an ordinary RGB-D camera)
+                     a 16-bit greyscale PNG
+  OUT                PLY file (with %05d for sequences), or a .png: a rendered picture instead
+  --focal-length PX  default: 0.82 times the picture's width, typical of RGB-D cameras
   --depth-scale M    metres per unit of the depth picture (default 0.001)
-  --near M --far M   depths that count (default 0.3 and 6)
-  --turn DEG         of the rendered picture (default 20)
+  --near M --far M   depth range, metres (default 0.3 and 6)
+  --turn DEG         azimuth of the rendered view from the camera's (default 20)
 END
 }
 
 files=() focal=() scale=0.001 near=0.3 far=6 turn=20
 while [ $# -gt 0 ]; do
+  option=$1
   case "$1" in
     --focal-length) focal=("focal-length=${2:-}"); shift ;;
     --depth-scale) scale=${2:-}; shift ;;
@@ -29,7 +30,7 @@ while [ $# -gt 0 ]; do
     -*) usage >&2; die "unknown option '$1'" ;;
     *) files+=("$1") ;;
   esac
-  shift || { echo "rgbd-to-ply.sh: the last option lacks its value" >&2; exit 2; }
+  shift || die "option $option needs a value"
 done
 [ ${#files[@]} = 3 ] || { usage >&2; die "expected COLOUR DEPTH OUT"; }
 
@@ -45,7 +46,7 @@ read_pictures () {
       reader=(filesrc "location=$1") ;;
   esac
 }
-# A depth picture has 16 bits of grey; what is not one would become nothing, without a word.
+# Other pictures than 16-bit greyscale PNG would give empty point clouds without an error.
 is_depth () {
   local kind
   kind=$(head -c 26 "$1" 2>/dev/null | tail -c 2 | od -An -tu1 | tr -s ' ') # PNG: bit depth, colour type
@@ -53,13 +54,15 @@ is_depth () {
 }
 case "${files[1]}" in
   *%*) ;;
-  *) is_depth "${files[1]}" || die "'${files[1]}': expected a PNG of 16 bits of grey as depth" ;;
+  *) is_depth "${files[1]}" || die "'${files[1]}': expected a 16-bit greyscale PNG" ;;
 esac
 read_pictures "${files[0]}"
 colour=("${reader[@]}")
 read_pictures "${files[1]}"
 depth=("${reader[@]}")
 
+[[ "${files[0]}" != *%* || "${files[2]}" == *.png ]] || is_numbered "${files[2]}" ||
+  die "'${files[2]}': expected a name with a number for sequences, e.g. out-%05d.ply"
 case "${files[2]}" in
   *.png) output=(striprender "azimuth=$turn" ! "video/x-raw(memory:GLMemory),width=960,height=720" ! gldownload
     ! videoconvert ! pngenc snapshot=true ! filesink "location=${files[2]}") ;;

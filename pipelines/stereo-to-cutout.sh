@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Two recorded videos of one stereo camera to pictures of who walks through them, cut out.
+# Cuts the person out of two recorded videos of one stereo camera: a PNG with the background removed for each frame.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 
@@ -8,11 +8,11 @@ usage () {
   cat <<'END'
 usage: stereo-to-cutout.sh LEFT RIGHT OUT-DIR --rig FILE [options]
   --rig FILE       rig file with the stereo pair, calibrated at the size given by --size
-  --view N         its view-id (default 0)
-  --size WxH       the videos are scaled to this before matching (default: left alone)
-  --fps N          and only so many frames a second taken (default: all)
-  --settle N       frames at the start that teach nothing, while exposure settles (default 0)
-  --learn N        frames after that from which the background is learnt (default 30)
+  --view N         view-id of the pair in the rig (default 0)
+  --size WxH       scale the videos to this size before matching (default: not scaled)
+  --fps N          maximum frame rate; other frames are dropped (default: all frames)
+  --settle N       number of frames to skip at the start, while exposure settles (default 0)
+  --learn N        number of frames after that from which the background is learnt (default 30)
   --stereo "P=V"   more properties of stereodepth
   --roi "P=V"      more properties of roiextract
 END
@@ -20,6 +20,7 @@ END
 
 files=() rig= view=0 size= fps= settle=0 learn=30 stereo=() roi=()
 while [ $# -gt 0 ]; do
+  option=$1
   case "$1" in
     --rig) rig=${2:-}; shift ;;
     --view) view=${2:-}; shift ;;
@@ -33,7 +34,7 @@ while [ $# -gt 0 ]; do
     -*) usage >&2; die "unknown option '$1'" ;;
     *) files+=("$1") ;;
   esac
-  shift || { echo "stereo-to-cutout.sh: the last option lacks its value" >&2; exit 2; }
+  shift || die "option $option needs a value"
 done
 [ ${#files[@]} = 3 ] && [ -n "$rig" ] || { usage >&2; die "expected LEFT RIGHT OUT-DIR and --rig"; }
 [ -f "${files[0]}" ] || die "no file '${files[0]}'"

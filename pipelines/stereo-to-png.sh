@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# One rectified stereo pair of image files to a rendered picture, turned a little.
+# Renders one rectified stereo pair of image files from a slightly different viewpoint.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 
 usage () {
   cat <<'END'
 usage: stereo-to-png.sh LEFT RIGHT PNG --focal-length PX --baseline M --near M --far M [options]
-  --focal-length PX  of both (rectified) pictures
+  --focal-length PX  focal length of both (rectified) pictures
   --baseline M       distance of the cameras, metres
-  --near M --far M   depths to look for, metres
-  --turn DEG         how far the view is turned from the camera's own (default 20)
+  --near M --far M   depth range, metres
+  --turn DEG         azimuth of the rendered view from the camera's (default 20)
   --size WxH         size of the rendered picture (default 960x720)
   --algorithm NAME   bm, sgbm, sgbm-3way, sgm (default: stereodepth's)
 END
@@ -18,6 +18,7 @@ END
 
 files=() focal= baseline= near= far= turn=20 size=960x720 algorithm=()
 while [ $# -gt 0 ]; do
+  option=$1
   case "$1" in
     --focal-length) focal=${2:-}; shift ;;
     --baseline) baseline=${2:-}; shift ;;
@@ -30,7 +31,7 @@ while [ $# -gt 0 ]; do
     -*) usage >&2; die "unknown option '$1'" ;;
     *) files+=("$1") ;;
   esac
-  shift || { echo "stereo-to-png.sh: the last option lacks its value" >&2; exit 2; }
+  shift || die "option $option needs a value"
 done
 [ ${#files[@]} = 3 ] && [ -n "$focal" ] && [ -n "$baseline" ] && [ -n "$near" ] && [ -n "$far" ] ||
   { usage >&2; die "expected LEFT RIGHT PNG, --focal-length, --baseline, --near and --far"; }

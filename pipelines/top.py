@@ -3,21 +3,21 @@
 """Shows the statistics of all hosts, live in a terminal: top.sh runs it.
 
 usage: top.sh [options] [SOURCE]
-  SOURCE          udp://ADDRESS:PORT to listen there (default udp://0.0.0.0:5990), a file of JSON
-                  lines, or - for stdin: JSON lines, or what `gst-launch-1.0 -m ...` prints
-  --once          print the table once, plainly: at the end of a file or of stdin, else when
-                  --seconds have passed; status 1 if a file or stdin has no statistics in it
-  --seconds N     with --once: listen for so long (0 to 86400, default 3)
-  --plain         print the table again and again, one below the other: for pipes
+  SOURCE          udp://ADDRESS:PORT to listen on (default udp://0.0.0.0:5990), a file of JSON
+                  lines, or - for stdin: JSON lines, or the output of `gst-launch-1.0 -m ...`
+  --once          print the table once and exit, at the end of a file or stdin, else after --seconds;
+                  status 1 if a file or stdin contains no statistics
+  --seconds N     with --once: time to listen, seconds (0 to 86400, default 3)
+  --plain         print tables one below the other instead of redrawing the screen, for pipes
   --interval N    seconds between tables (0.1 to 3600, default 1)
-  --host NAME     what to call the host of `gst-launch-1.0 -m` lines (default: this machine's name)
-  --forward udp://HOST:PORT  show nothing: send what comes there, for another top.sh
+  --host NAME     host name for `gst-launch-1.0 -m` lines (default: this machine's name)
+  --forward udp://HOST:PORT  forward all messages to another top.sh instead of showing them
 
-Hosts send there when RANGECAST_STATS=udp://HOST:PORT is set for camera-host.sh, parent-host.sh,
+Hosts send statistics when RANGECAST_STATS=udp://HOST:PORT is set for camera-host.sh, parent-host.sh,
 viewer-host.sh, demo.sh or rangecast-run. Fields and units: docs/guide/statistics.md.
 
-Lost and late count from the host's start; +N is what came with the last message. A row whose
-messages stay away says for how long."""
+Lost and late count from the host's start; +N is the increase since the previous message. A row
+without recent messages shows for how long it has been silent."""
 import argparse
 import json
 import os
@@ -28,7 +28,7 @@ import sys
 import time
 
 DEFAULT = "udp://0.0.0.0:5990"
-MOST_ROWS = 1000  # of a table: more is no rig's
+MOST_ROWS = 1000  # of a table; no rig needs more
 MOST_LINE = 65536
 SILENT_S = 3.5  # a row without a message for so long is marked
 FORGET_S = 600
@@ -66,7 +66,7 @@ def from_launch(line, host):
 
 
 def parse(line, host):
-    """One message, or None for what is none: anybody may send to a UDP port."""
+    """One message, or None for any other data: anybody may send to a UDP port."""
     line = line[:MOST_LINE].strip()
     if not line.startswith("{"):
         return from_launch(line, host)
@@ -110,7 +110,7 @@ class Source:
         self.is_plain_file = name != "-"
 
     def lines(self, seconds):
-        """What comes within that time, as soon as something comes."""
+        """Returns lines as soon as some arrive, or nothing after that time."""
         if self.socket:
             if not select.select([self.socket], [], [], seconds)[0]:
                 return []
@@ -129,7 +129,7 @@ class Source:
 # ---- the table ----
 
 def text_of(value, most):
-    """Without control characters: what comes from a network must not steer the terminal."""
+    """Without control characters: data from the network must not control the terminal."""
     return "".join(c for c in str(value) if c.isprintable())[:most]
 
 
@@ -182,7 +182,7 @@ class Table:
         return "" if value is None else format(value * factor, form)
 
     def cells(self, key, now):
-        """@return the row's texts, and whether it needs somebody's eye"""
+        """@return the row's texts, and whether to highlight it"""
         message, before, came = self.rows[key]
         silent = now - came
         name = key[1] + ("." + key[2] if key[2] else "")
@@ -269,7 +269,7 @@ def run(options):
         if source.ended and not source.is_plain_file:
             break
     if options.once and source.ended and not table.rows and not forward:
-        sys.exit(f"top.sh: {options.source}: no statistics in it; expected lines of rangecast-run --stats, or of gst-launch-1.0 -m")
+        sys.exit(f"top.sh: {options.source}: no statistics found; expected output of rangecast-run --stats or gst-launch-1.0 -m")
     if not forward:
         show(table, clear)
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The viewer: frame sets of all views to a picture that turns round the person.
+# The viewer: renders frame sets of all views, in a window or to a video file.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 source "$(dirname "$0")/rtp.sh"
@@ -9,22 +9,23 @@ usage () {
   cat <<'END'
 usage: viewer-host.sh --listen PORT [options]
   --listen PORT   UDP port of the parent's stream
-  --out DIR       film the view into DIR/avatar.webm (default: nothing is written)
-  --window        show it in a window: drag turns, wheel zooms
-  --orbit DEG     degrees per second by which the view turns by itself (default 0)
+  --out DIR       write a video to DIR/avatar.webm (default: no video)
+  --window        show it in a window: drag to orbit, wheel to zoom
+  --orbit DEG     orbit by itself, degrees per second (default 0)
   --size WxH      picture size (default 640x480)
   --jitter MS     jitter buffer (default 30)
-  --multicast GROUP  the parent sends to this multicast group, e.g. 239.255.7.1
-  --interface IF  network interface to the group (default: the system's choice)
+  --multicast GROUP  receive from this multicast group, e.g. 239.255.7.1
+  --interface IF  network interface for the group (default: the system's choice)
 END
   rtp_usage_receiver
 }
 
 listen= out= window= orbit=0 size=640x480 jitter=30 group=
 while [ $# -gt 0 ]; do
+  option=$1
   rtp_option receiver "$1" "${2:-}"
   if [ $taken -gt 0 ]; then
-    shift $taken || die "the last option lacks its value"
+    shift $taken || die "option $1 needs a value"
     continue
   fi
   case "$1" in
@@ -39,8 +40,9 @@ while [ $# -gt 0 ]; do
     -h | --help) usage; exit 0 ;;
     *) usage >&2; die "unknown option '$1'" ;;
   esac
-  shift || { echo "viewer-host.sh: the last option lacks its value" >&2; exit 2; }
+  shift || die "option $option needs a value"
 done
+need_option "$listen" --listen
 need_number "$listen" --listen 1 65535
 need_number "$jitter" --jitter 0 10000
 need_picture "$size" --size
@@ -52,11 +54,11 @@ receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
 
 sinks=(picture. ! queue max-size-buffers=2 leaky=downstream ! fakesink name=snapshot sync=false async=false)
 if [ -n "$window" ]; then
-  has_display || echo "viewer-host.sh: --window: neither DISPLAY nor WAYLAND_DISPLAY is set; only a sink that needs none will show anything" >&2
+  has_display || echo "viewer-host.sh: --window: neither DISPLAY nor WAYLAND_DISPLAY is set; there may be no window" >&2
   sinks+=(picture. ! queue max-size-buffers=2 leaky=downstream ! videoconvert ! autovideosink sync=false)
 fi
 if [ -n "$out" ]; then
-  mkdir -p "$out" 2>/dev/null || die "--out: cannot make '$out'"
+  mkdir -p "$out" 2>/dev/null || die "--out: cannot create '$out'"
   sinks+=(picture. ! queue max-size-buffers=8 leaky=downstream ! videoconvert ! vp8enc deadline=1 cpu-used=8 target-bitrate=2000000
     keyframe-max-dist=60 ! webmmux ! filesink "location=$out/avatar.webm")
 fi

@@ -35,6 +35,7 @@
 #include <span>
 
 #include "bitrate.hpp"
+#include "common/capserrors.hpp"
 #include "common/controlledvalues.hpp"
 #include "common/recycledmemories.hpp"
 #include "common/statsreporter.hpp"
@@ -72,6 +73,7 @@ struct GstNeighbourCodeEncPrivate {
 
   /* streaming thread only */
   gstrange::RangeInfo info;
+  CapsErrors caps_errors;
   NeighbourCodeRate rate; /* but for its member `receivers`: any thread */
   rangecast::AccessUnitEncoder encoder;
   EncoderSettings configured; /* of encoder */
@@ -122,7 +124,7 @@ gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
   gst_clear_buffer (&priv->input);
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
-  return gst_range_flow_return (GST_ELEMENT (base), status) == GST_FLOW_OK;
+  return priv->caps_errors.accept (GST_ELEMENT (base), status);
 }
 
 /* ---- a frame set: rate, key frame sets, encoding ---- */
@@ -438,6 +440,7 @@ gst_neighbour_code_enc_start (GstBaseTransform *base)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
   priv->rate.reset ();
+  priv->caps_errors.reset ();
   priv->last_key = GST_CLOCK_TIME_NONE;
   priv->encoder.request_key ();
   priv->key_requests.reset ();

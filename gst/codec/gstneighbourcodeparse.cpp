@@ -552,22 +552,20 @@ finish_access_unit (
   return gst_base_parse_finish_frame (base, frame, gint (length));
 }
 
-/* Of a recording that was cut off, the whole units of the last access unit are still output.
- * @param what  what ends early, `got` bytes after the beginning of the frame */
+/* Of a truncated recording, the whole units of the last access unit are still output. */
 static void
-warn_if_cut_off (
-    GstBaseParse *base, const GstBaseParseFrame *frame, const char *what, gsize expected, gsize got)
+warn_if_truncated (GstBaseParse *base, const GstBaseParseFrame *frame, const StreamPart &part)
 {
   const Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
-  const bool at_end = NeighbourCodeSeek::reads_file (base) || stream.ending;
-  if (!at_end || !GST_BASE_PARSE_DRAINING (base) || got >= expected ||
-      got < gst_buffer_get_size (frame->buffer))
+  if (!part.expected || !(NeighbourCodeSeek::reads_file (base) || stream.ending))
     return;
   const auto offset = guint64 (frame->offset);
+  const gsize got = part.length + part.rubbish;
   GST_ELEMENT_WARNING (base, STREAM, DECODE,
-      ("The stream ends at byte %" G_GUINT64_FORMAT ", within the %s at byte %" G_GUINT64_FORMAT
-       ": expected %" G_GSIZE_FORMAT " bytes, got %" G_GSIZE_FORMAT,
-          offset + got, what, offset, expected, got),
+      ("The stream ends at byte %" G_GUINT64_FORMAT
+       ", within the access unit%s at byte %" G_GUINT64_FORMAT ": expected %" G_GSIZE_FORMAT
+       " bytes, got %" G_GSIZE_FORMAT,
+          offset + got, part.rubbish ? " header" : "", offset, part.expected, got),
       (nullptr));
 }
 
@@ -582,7 +580,7 @@ handle_access_unit_of_stream (GstBaseParse *base, GstBaseParseFrame *frame, cons
   priv->seen = std::max (priv->seen.load (), stream.src_caps_set ? Seen::kRig : Seen::kAccessUnit);
   const bool passes = stream.src_caps_set && !stream.output.empty ();
   if (passes || priv->seen == Seen::kSlices) /* else the end of the stream is an error */
-    warn_if_cut_off (base, frame, "access unit", kStreamPrefixSize + part.header.size, part.length);
+    warn_if_truncated (base, frame, part);
   return passes ? finish_access_unit (base, frame, part.header, part.length)
                 : drop (base, frame, part.length);
 }
@@ -595,17 +593,14 @@ handle_stream (GstBaseParse *base, GstBaseParseFrame *frame)
     return refuse_unreadable_buffer (base);
   const Bytes bytes (map.data, map.size);
   const StreamPart part = rangecast::next_part (bytes, GST_BASE_PARSE_DRAINING (base));
-  const gsize compared = std::min (bytes.size (), kStartCode.size ());
-  const bool begins_like_access_unit =
-      std::equal (bytes.begin (), bytes.begin () + std::ptrdiff_t (compared), kStartCode.begin ());
   if (part.length) {
     use_rig_of_seek (base, guint64 (frame->offset));
     handle_units (base, bytes.subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
   }
   gst_buffer_unmap (frame->buffer, &map);
   if (part.rubbish) {
-    if (begins_like_access_unit && GST_NEIGHBOUR_CODE_PARSE (base)->priv->seen == Seen::kSlices)
-      warn_if_cut_off (base, frame, "access unit header", kStreamPrefixSize, part.rubbish);
+    if (GST_NEIGHBOUR_CODE_PARSE (base)->priv->seen == Seen::kSlices)
+      warn_if_truncated (base, frame, part);
     return drop_rubbish (base, frame, part.rubbish);
   }
   if (part.length)

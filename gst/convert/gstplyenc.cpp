@@ -15,6 +15,7 @@
  */
 #include "gstplyenc.h"
 
+#include "common/capserrors.hpp"
 #include "common/elementproperties.hpp"
 #include "common/streamlock.hpp"
 
@@ -38,7 +39,9 @@ struct GstPlyEncPrivate {
   PointCloudFormat::Kind kind = PointCloudFormat::kPly; /* of the stream: settings.kind at start */
   bool started = false;
 
-  gstrange::RangeInfo info; /* streaming thread */
+  /* streaming thread */
+  gstrange::RangeInfo info;
+  CapsErrors caps_errors;
 };
 
 struct _GstPlyEnc {
@@ -87,7 +90,7 @@ gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
   GST_INFO_OBJECT (self, "caps %" GST_PTR_FORMAT, in);
   const rangecast::Status status =
       rangecast::guarded ("plyenc", [&] { return gstrange::parse_caps (in, self->priv->info); });
-  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+  return self->priv->caps_errors.accept (GST_ELEMENT (self), status);
 }
 
 /* Writes the file into a new buffer. */
@@ -147,6 +150,7 @@ static gboolean
 gst_ply_enc_start (GstBaseTransform *base)
 {
   GstPlyEncPrivate *priv = GST_PLY_ENC (base)->priv;
+  priv->caps_errors.reset ();
   std::lock_guard guard (priv->lock);
   priv->kind = priv->settings.kind;
   priv->started = true;

@@ -18,6 +18,7 @@
 #include "gstrangesplit.h"
 
 #include "common/bufferpools.hpp"
+#include "common/capserrors.hpp"
 #include "common/elementproperties.hpp"
 
 #include <gst/base/gstflowcombiner.h>
@@ -84,6 +85,7 @@ struct GstRangeSplitPrivate {
 
   /* streaming thread */
   gstrange::RangeInfo info;
+  CapsErrors caps_errors;
   GstSegment segment;
   guint group_id = GST_GROUP_ID_INVALID;
 
@@ -287,7 +289,7 @@ handle_caps (GstRangeSplit *self, GstEvent *event)
   gst_event_parse_caps (event, &caps);
   const rangecast::Status status = gstrange::parse_caps (caps, self->priv->info);
   gst_event_unref (event);
-  if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
+  if (!self->priv->caps_errors.accept (GST_ELEMENT (self), status))
     return FALSE;
   GST_INFO_OBJECT (self, "caps: %d views, %dx%d", self->priv->info.views (), self->priv->info.width,
       self->priv->info.height);
@@ -396,6 +398,7 @@ gst_range_split_change_state (GstElement *element, GstStateChange transition)
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) { /* pads are inactive: nobody streams */
     std::lock_guard guard (self->priv->lock);
     self->priv->info = {};
+    self->priv->caps_errors.reset ();
     self->priv->group_id = GST_GROUP_ID_INVALID;
     gst_segment_init (&self->priv->segment, GST_FORMAT_TIME);
     gst_flow_combiner_reset (self->priv->combiner);

@@ -81,7 +81,7 @@ GstFlowReturn pop_companion (GstAggregatorPad *pad, GstDebugCategory *category,
  *  aggregate() is not called without a frame on every pad, unless live. */
 void log_waiting (GstDebugCategory *category, GstAggregatorPad *pad);
 
-/** Reads and logs a pad's caps event. @return nothing if they are no valid video caps */
+/** Reads and logs a pad's caps event. @return std::nullopt if the caps are not valid video caps */
 std::optional<GstVideoInfo> parse_caps_event (
     GstDebugCategory *category, GstAggregatorPad *pad, GstEvent *event);
 

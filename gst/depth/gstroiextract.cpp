@@ -17,6 +17,7 @@
  */
 #include "gstroiextract.h"
 
+#include "common/capserrors.hpp"
 #include "common/controlledvalues.hpp"
 #include "common/elementproperties.hpp"
 #include "common/streamlock.hpp"
@@ -32,9 +33,9 @@
 #include <rangecast/base/output_path.hpp>
 #include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/geometry/size_text.hpp>
+#include <rangecast/opencv/threads.hpp>
 #include <rangecast/roi/background.hpp>
 #include <rangecast/roi/bounding_box.hpp>
-#include <rangecast/roi/opencv_threads.hpp>
 #include <rangecast/roi/segmentation.hpp>
 #include <string>
 
@@ -94,8 +95,8 @@ struct GstRoiExtractPrivate {
   std::atomic<bool> relearn{false}; /* set by capture-background */
 
   /* streaming thread */
-  std::string caps_error; /* already posted; refused caps come again with each buffer */
-  std::string unsaved;    /* file that could not be written; reported once */
+  CapsErrors caps_errors;
+  std::string unsaved; /* file that could not be written; reported once */
   gstrange::RangeInfo info;
   std::array<std::unique_ptr<ViewState>, rangecast::kMaxViews> views;
 };
@@ -200,9 +201,7 @@ gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
     GST_DEBUG_OBJECT (
         self, "%s", all_learnt (priv) ? "background is known" : "learning background");
   }
-  const bool posted = !status.ok () && status.message () == priv->caps_error;
-  priv->caps_error = status.message ();
-  return !posted && gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+  return priv->caps_errors.accept (GST_ELEMENT (self), status);
 }
 
 /* ---- segmentation ---- */
@@ -463,7 +462,7 @@ gst_roi_extract_start (GstBaseTransform *base)
   const Status status = check_save_path (copy_settings (priv).save_background);
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
     return FALSE;
-  priv->caps_error.clear ();
+  priv->caps_errors.reset ();
   priv->unsaved.clear ();
   priv->reporter.start (GST_ELEMENT (base), collect_stats);
   std::lock_guard guard (priv->lock);

@@ -33,9 +33,9 @@ is_gles (GstGLContext *context)
 void define_texture (const GstGLFuncs *gl, guint internal, int width, int height, guint format,
     guint type, const void *data = nullptr);
 
-/** Writes `size` bytes into the buffer that is bound to GL_ARRAY_BUFFER. Its storage is replaced
- * only where it is too small, with half as much to spare.
- *  @param[in,out] capacity  bytes of the buffer's storage; 0 before the first call */
+/** Writes `size` bytes into the buffer bound to GL_ARRAY_BUFFER. Reallocates its storage only if it
+ *  is too small, with 50 % headroom.
+ *  @param[in,out] capacity  bytes of the storage; 0 before the first call */
 void upload_vertices (
     const GstGLFuncs *gl, std::size_t &capacity, const void *data, std::size_t size);
 

@@ -27,6 +27,7 @@
 #include <optional>
 #include <rangecast/base/guarded.hpp>
 
+#include "common/capserrors.hpp"
 #include "common/controlledvalues.hpp"
 #include "common/elementproperties.hpp"
 #include "common/streamlock.hpp"
@@ -64,6 +65,7 @@ struct GstCylinderFilterPrivate {
   rangecast::ViewAgreement agreement;
   rangecast::ColourMatch colours;
   rangecast::CylinderFilter core;
+  CapsErrors caps_errors;
   bool has_rig = false;     /* set_caps gave agreement, core and colours one */
   bool rig_pending = false; /* the source pad's caps may have another rig than agreement */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
@@ -291,7 +293,7 @@ gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
     priv->has_rig = result.ok ();
     return result;
   });
-  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+  return priv->caps_errors.accept (GST_ELEMENT (self), status);
 }
 
 static gboolean
@@ -404,6 +406,7 @@ gst_cylinder_filter_start (GstBaseTransform *base)
 {
   auto priv = GST_CYLINDER_FILTER (base)->priv;
   reset_stream (priv);
+  priv->caps_errors.reset ();
   priv->last_pts = GST_CLOCK_TIME_NONE;
   priv->was_off = false;
   priv->left_out = 0;

@@ -413,8 +413,8 @@ warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet, 
 {
   if (verdict == Verdict::kInvalid)
     GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-        ("%" G_GUINT64_FORMAT " packets arrived and none is valid: expected coded frame sets of "
-         "version %d; they belong to another codec, or are encrypted (--key)",
+        ("%" G_GUINT64_FORMAT " invalid packets and no valid one: expected coded frame sets of "
+         "version %d; the stream is of another codec, or encrypted (--key)",
             invalid, rangecast::kBitstreamVersion),
         (nullptr));
   if (verdict == Verdict::kRival)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Draws a calibration board to print: an SVG in its true size.
+/* Draws a calibration board for printing: an SVG at true scale.
  * usage: draw-board FILE.svg [board=chessboard|charuco] [columns=9] [rows=6] [square-size=0.025]
- *        [marker-size=M] [dictionary=4x4-50]; names and units as rigcalibrate's properties have
- * them */
+ *        [marker-size=M] [dictionary=4x4-50]; names and units are those of rigcalibrate's
+ *        properties */
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -20,7 +20,7 @@ using rangecast::BoardSpec;
 
 constexpr int kSquarePx = 256;
 
-/* All of the text is a number. */
+/* @return whether the whole text is a number */
 bool
 read_number (const std::string &text, double &value)
 {
@@ -57,9 +57,9 @@ set (BoardSpec &board, const std::string &name, const std::string &value)
     const auto dictionary = std::ranges::find (dictionaries, value);
     board.dictionary = int (dictionary - dictionaries.begin ());
     return dictionary != dictionaries.end () ? nullptr
-                                             : "expected a dictionary of rigcalibrate's, as 4x4-50";
+                                             : "expected a dictionary of rigcalibrate, e.g. 4x4-50";
   }
-  return "expected a property of rigcalibrate's board; see --help";
+  return "unknown property; see --help";
 }
 
 /* Reads the words after the file name. @return false after printing an error for a wrong one */
@@ -82,7 +82,7 @@ read_properties (const std::vector<std::string> &words, BoardSpec &board)
   return true;
 }
 
-/* The black pixels as rectangles: runs of a row, as high as the rows that are like it. */
+/* The black pixels as rectangles: runs of a row, extended over equal rows below it. */
 bool
 write_svg (const char *path, const BoardSpec &board, const std::vector<std::uint8_t> &pixels)
 {
@@ -149,7 +149,7 @@ main (int argc, char **argv)
     return 2;
   }
   if (!write_svg (argv[1], board, pixels)) {
-    std::fprintf (stderr, "draw-board: cannot write %s\n", argv[1]);
+    std::fprintf (stderr, "draw-board: %s: cannot be written\n", argv[1]);
     return 1;
   }
   return 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Says what a rig file amounts to: where its cameras stand and look, what they see, and how well
- * they tell depths apart; and draws it (striprender's show-cameras). */
+/* Prints the geometry of a rig file: poses, fields of view, stereo baselines and depth resolution;
+ * and draws it (striprender's show-cameras). */
 #include <gst/app/gstappsrc.h>
 #include <gst/gst.h>
 
@@ -31,13 +31,13 @@ struct Options {
   gchar **paths = nullptr;
 };
 
-/* One camera of the rig as something to draw, and what it is called. */
+/* One camera of the rig, for drawing. */
 struct Camera {
   std::string name;
   View view; /* plain, with an id of its own */
 };
 
-/* ---- what there is ---- */
+/* ---- cameras ---- */
 
 std::string
 name_of (const View &view)
@@ -56,7 +56,7 @@ plain_view (View view, int id)
   return view;
 }
 
-/* Partners are drawn small: their view's frustum says what the pair sees. */
+/* Partners are drawn small: the frustum of their view shows what the pair sees. */
 void
 add_partner (const View &view, const std::optional<PartnerCamera> &partner, const char *which,
     std::vector<Camera> &cameras)
@@ -109,7 +109,7 @@ void
 print_cameras (const std::vector<Camera> &cameras, Vec3 target)
 {
   std::printf ("%-24s %-7s %-10s %-15s %-24s %s\n", "camera", "colour", "size", "field of view",
-      "stands at, metres", "axis passes the centre at");
+      "position, metres", "distance of axis and camera from the centre");
   for (std::size_t i = 0; i < cameras.size (); i++) {
     const View &v = cameras[i].view;
     const Vec3 at = v.world_from_view.translation, off = cross (target - at, axis_of (v));
@@ -117,7 +117,7 @@ print_cameras (const std::vector<Camera> &cameras, Vec3 target)
       return 2 * degrees (std::atan (size / 2 / f));
     };
     const std::string size = std::to_string (v.width) + "x" + std::to_string (v.height);
-    std::printf ("%-24s %-7.*s %-10s %5.1f x %-4.1f deg %7.3f %7.3f %7.3f  %.0f mm, %.2f m away\n",
+    std::printf ("%-24s %-7.*s %-10s %5.1f x %-4.1f deg %7.3f %7.3f %7.3f  %.0f mm, %.2f m\n",
         cameras[i].name.c_str (), int (rangecast::camera_colour (i).name.size ()),
         rangecast::camera_colour (i).name.data (), size.c_str (), field (v.width, v.intrinsics.fx),
         field (v.height, v.intrinsics.fy), at.x, at.y, at.z, norm (off) * 1000, norm (target - at));
@@ -145,7 +145,7 @@ print_pairs (const Rig &rig)
   for (const View &view : rig.views) {
     if (!any && (view.right || view.third))
       std::printf ("\n%-24s %-6s %9s %11s %22s %s\n", "stereo pair", "with", "baseline",
-          "axes differ", "disparity, far to near", "  a pixel of disparity is");
+          "axes differ", "disparity, far to near", "  depth of a pixel of disparity");
     any = any || view.right || view.third;
     if (view.right)
       print_pair (view, *view.right, "right");
@@ -174,7 +174,7 @@ print_views (const Rig &rig)
   }
 }
 
-/* What stereodepth would refuse. @return how many views */
+/* Reports views that stereodepth would refuse. @return their number */
 int
 print_problems (const Rig &rig)
 {
@@ -205,8 +205,8 @@ struct Outlook {
 
 constexpr double kFieldDeg = 45;
 
-/* Elements make room for all pixels of a rig, and with partners there may be more than a rig can
- * have. What is drawn does not depend on how many there are. */
+/* Elements allocate memory for all pixels of a rig, and with partners there may be more than a rig
+ * may have. The drawing does not depend on their number. */
 View
 with_few_pixels (View view)
 {
@@ -219,7 +219,7 @@ with_few_pixels (View view)
   return view;
 }
 
-/* The corners of all frustums, and where they begin. */
+/* The corners and apexes of all frustums. */
 std::vector<Vec3>
 corners_of (const Rig &drawn)
 {
@@ -232,11 +232,10 @@ corners_of (const Rig &drawn)
   return points;
 }
 
-/* The part of the picture that the points take, -1 to 1 from left to right and from the bottom up.
- */
+/* Bounding box of the points in the picture, -1 to 1 from left to right and from bottom to top. */
 struct Frame {
   double left = 1e9, right = -1e9, bottom = 1e9, top = -1e9;
-  bool behind = false; /* some of them are behind who looks */
+  bool behind = false; /* some points are behind the camera */
 
   [[nodiscard]] double half_size () const { return std::max (right - left, top - bottom) / 2; }
 };
@@ -262,8 +261,8 @@ frame_of (const std::vector<Vec3> &points, const rangecast::Mat4 &m)
   return frame;
 }
 
-/* All frustums fill the picture. striprender turns about where the axes meet, which for a single
- * pair is nowhere in particular, so what it looks at is moved. Perspective makes this a search:
+/* All frustums fill the picture. striprender orbits about the point where the axes meet, which for
+ * a single pair is arbitrary, so its target is moved. Perspective makes this a search:
  * each step centres what is seen and corrects the distance. */
 Outlook
 look_at_all (const Rig &drawn, const Options &options)
@@ -310,7 +309,7 @@ set_up (GstElement *pipeline, const Options &options, const Rig &drawn)
   gst_caps_unref (caps);
   gst_caps_unref (picture);
 
-  /* A frame set of which nothing is left. */
+  /* A frame set without points. */
   GstBuffer *empty = gst_range_buffer_new (1, 1, 1);
   gst_range_buffer_add_view (empty, guint (drawn.views[0].id), 0, 0, 0, 0, 0);
   GST_BUFFER_PTS (empty) = 0;
@@ -342,7 +341,7 @@ draw (const Options &options, const Rig &drawn)
     g_printerr ("rig-check: %s\n", error->message);
     g_clear_error (&error);
   } else if (!message) {
-    g_printerr ("rig-check: %s: not drawn within a minute\n", options.png);
+    g_printerr ("rig-check: %s: drawing timed out after a minute\n", options.png);
   }
   gst_clear_message (&message);
   gst_element_set_state (pipeline, GST_STATE_NULL);
@@ -367,8 +366,8 @@ check_rig (const Options &options)
   Rig drawn;
   for (const Camera &camera : cameras)
     drawn.views.push_back (with_few_pixels (camera.view));
-  std::printf ("views: %zu, which look at about %.3f %.3f %.3f m\n\n", rig.views.size (),
-      scene.target.x, scene.target.y, scene.target.z);
+  std::printf ("views: %zu; centre (where the optical axes meet): %.3f %.3f %.3f m\n\n",
+      rig.views.size (), scene.target.x, scene.target.y, scene.target.z);
   print_cameras (cameras, scene.target);
   print_pairs (rig);
   print_views (rig);
@@ -379,13 +378,12 @@ check_rig (const Options &options)
   return good;
 }
 
-/* What is wrong with the options, or nullptr. Angles and distances are those that striprender
- * takes. */
+/* The error in the options, or nullptr. Ranges of angles and distances are striprender's. */
 const char *
 complaint_of (const Options &o)
 {
-  const auto is_within = [] (double x, double least, double most) {
-    return x >= least && x <= most; /* NaN is not */
+  const auto is_within = [] (double x, double min, double max) {
+    return x >= min && x <= max; /* NaN is not */
   };
   if (!o.paths || o.paths[1])
     return "expected one rig file";
@@ -403,17 +401,18 @@ parse_arguments (int *argc, char ***argv, Options &options)
 {
   const GOptionEntry entries[] = {
       {"png", 0, 0, G_OPTION_ARG_FILENAME, &options.png, "Draw the rig", "FILE"},
-      {"width", 0, 0, G_OPTION_ARG_INT, &options.width, "Of the picture (default 960)", "PX"},
-      {"height", 0, 0, G_OPTION_ARG_INT, &options.height, "Of the picture (default 720)", "PX"},
+      {"width", 0, 0, G_OPTION_ARG_INT, &options.width, "Picture width (default 960)", "PX"},
+      {"height", 0, 0, G_OPTION_ARG_INT, &options.height, "Picture height (default 720)", "PX"},
       {"azimuth", 0, 0, G_OPTION_ARG_DOUBLE, &options.azimuth_deg,
-          "Round the scene from the first view (default 30)", "DEG"},
+          "Azimuth of the viewpoint from the first view (default 30)", "DEG"},
       {"elevation", 0, 0, G_OPTION_ARG_DOUBLE, &options.elevation_deg,
-          "Above the first view (default 35)", "DEG"},
+          "Elevation of the viewpoint (default 35)", "DEG"},
       {"distance", 0, 0, G_OPTION_ARG_DOUBLE, &options.distance_m,
-          "From the middle of the cameras (default: so that all are seen)", "M"},
+          "Distance of the viewpoint from the centre (default: all cameras are visible)", "M"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &options.paths, nullptr, nullptr},
       {}};
-  GOptionContext *context = g_option_context_new ("RIG - say and draw what a rig file is");
+  GOptionContext *context =
+      g_option_context_new ("RIG - print and draw the geometry of a rig file");
   g_option_context_add_main_entries (context, entries, nullptr);
   g_option_context_add_group (context, gst_init_get_option_group ());
   GError *error = nullptr;

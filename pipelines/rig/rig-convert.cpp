@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Makes a rig file of a stereo pair's calibration in another format: what OpenCV's samples write, a
+/* Makes a rig file of a stereo pair's calibration in another format: that of OpenCV's samples, a
  * Luxonis (OAK-D) factory calibration, or a Middlebury calib.txt. */
 #include <glib.h>
 
@@ -35,7 +35,7 @@ struct Options {
   gchar **paths = nullptr;
 };
 
-/* Thrown and caught in this file only: what is wrong, for the user. */
+/* An error for the user; thrown and caught in this file only. */
 struct BadInput {
   std::string what;
   int exit_status = 1;
@@ -80,7 +80,7 @@ struct OpencvFiles : std::vector<cv::FileStorage> {
   std::string names; /* for messages */
 };
 
-/* A matrix that goes by one of several names in one of the files. */
+/* A matrix with one of several names in one of the files. */
 cv::Mat
 find_matrix (const OpencvFiles &files, std::initializer_list<const char *> names, const char *what)
 {
@@ -136,11 +136,10 @@ read_size (const OpencvFiles &files, const Options &options, View &view)
         kWrongUsage};
   if (view.width < 1 || view.height < 1)
     throw BadInput{files.names +
-                   ": the pictures' size is not there (image_width, image_height): expected "
-                   "--size WIDTHxHEIGHT"};
+                   ": no picture size (image_width, image_height): expected --size WIDTHxHEIGHT"};
 }
 
-/* What samples/cpp/stereo_calib.cpp writes: M1, D1, M2, D2 in one file, R, T in the other. */
+/* Files of samples/cpp/stereo_calib.cpp: M1, D1, M2, D2 in one file, R, T in the other. */
 View
 read_opencv (const std::vector<std::string> &paths, const Options &options)
 {
@@ -187,7 +186,7 @@ luxonis_camera (const cv::FileNode &cameras, int socket)
   for (const cv::FileNode &entry : cameras)
     if (entry.isSeq () && entry.size () == 2 && entry[0].isInt () && int (entry[0]) == socket)
       return entry[1];
-  throw BadInput{"no camera of socket " + std::to_string (socket)};
+  throw BadInput{"no camera for socket " + std::to_string (socket)};
 }
 
 Intrinsics
@@ -213,7 +212,7 @@ read_luxonis (const std::vector<std::string> &paths, const Options &)
   const cv::FileNode right = luxonis_camera (cameras, right_socket);
   const cv::FileNode extrinsics = left["extrinsics"];
   if (int (extrinsics["toCameraSocket"]) != right_socket)
-    throw BadInput{"the left camera's extrinsics do not lead to the right one"};
+    throw BadInput{"the left camera's extrinsics do not refer to the right one"};
   View view;
   view.width = int (left["width"]);
   view.height = int (left["height"]);
@@ -268,7 +267,7 @@ value_of (const Values &values, const char *name, std::size_t count)
   const auto found = values.find (name);
   if (found == values.end () || found->second.size () != count)
     throw BadInput{std::string (name) + ": expected " + std::to_string (count) +
-                   " numbers, as Middlebury's calib.txt has"};
+                   " numbers, as in Middlebury's calib.txt"};
   return found->second;
 }
 
@@ -327,7 +326,7 @@ check (const Status &status, const std::string &about = "")
     throw BadInput{about + status.message ()};
 }
 
-/* Whatever is wrong, the message begins with the file or the option. */
+/* All messages begin with the file or the option. */
 View
 read_named (const Format &format, const std::vector<std::string> &paths, const Options &options)
 {
@@ -340,19 +339,19 @@ read_named (const Format &format, const std::vector<std::string> &paths, const O
     throw BadInput{paths[0] + ": " + bad.what};
   } catch (
       const std::exception &) { /* cv::Exception's own text is many lines of source positions */
-    throw BadInput{paths[0] + ": is not what the format has; see docs/formats/rig.md"};
+    throw BadInput{paths[0] + ": does not match the format; see docs/formats/rig.md"};
   }
 }
 
-/* Lengths in board squares, centimetres or millimetres that were taken for metres. */
+/* T may be in board squares, centimetres or millimetres instead of metres. */
 void
 warn_if_wide (const View &view)
 {
   constexpr double kWideM = 1;
   const double baseline_m = norm (view.right->partner_from_left.translation);
   if (baseline_m > kWideM)
-    g_printerr ("rig-convert: warning: the cameras stand %.3g m apart; is a T of 1 really a metre? "
-                "See --unit\n",
+    g_printerr ("rig-convert: warning: the baseline is %.3g m; is the unit of T really metres? See "
+                "--unit\n",
         baseline_m);
 }
 
@@ -367,8 +366,8 @@ convert (const Options &options)
   if (format == std::end (kFormats))
     throw BadInput{"expected a format: opencv, luxonis or middlebury; see --help", kWrongUsage};
   if (words.size () < format->min_inputs + 2 || words.size () > format->max_inputs + 2)
-    throw BadInput{
-        std::string (format->name) + ": expected its calibration and RIG; see --help", kWrongUsage};
+    throw BadInput{std::string (format->name) + ": expected calibration files and RIG; see --help",
+        kWrongUsage};
   if (!(options.scale > 0 && options.scale <= 1000) || !(options.unit_m > 0))
     throw BadInput{
         "--scale and --unit: expected numbers above 0, and --scale at most 1000", kWrongUsage};
@@ -402,25 +401,25 @@ bool
 parse_arguments (int *argc, char ***argv, Options &options)
 {
   const GOptionEntry entries[] = {
-      {"view-id", 0, 0, G_OPTION_ARG_INT, &options.view_id, "0 to 63 (default 0)", "N"},
-      {"name", 0, 0, G_OPTION_ARG_STRING, &options.name, "Of the view (default none)", "TEXT"},
+      {"view-id", 0, 0, G_OPTION_ARG_INT, &options.view_id, "View-id, 0 to 63 (default 0)", "N"},
+      {"name", 0, 0, G_OPTION_ARG_STRING, &options.name, "Name of the view (default: none)",
+          "TEXT"},
       {"near", 0, 0, G_OPTION_ARG_DOUBLE, &options.near_m,
           "Nearest depth of interest, metres (default: the format's, or 0.3; luxonis 1)", "M"},
       {"far", 0, 0, G_OPTION_ARG_DOUBLE, &options.far_m,
-          "Farthest (default: the format's, or 3; luxonis 6)", "M"},
+          "Farthest depth of interest, metres (default: the format's, or 3; luxonis 6)", "M"},
       {"scale", 0, 0, G_OPTION_ARG_DOUBLE, &options.scale,
-          "By which pictures are scaled before stereodepth (default 1)", "S"},
+          "Factor by which pictures are scaled before stereodepth (default 1)", "S"},
       {"size", 0, 0, G_OPTION_ARG_STRING, &options.size,
-          "opencv: of the pictures that were calibrated, if the files do not say", "WxH"},
+          "opencv: size of the calibration pictures, if it is not in the files", "WxH"},
       {"unit", 0, 0, G_OPTION_ARG_DOUBLE, &options.unit_m,
-          "opencv: metres that a T of 1 is: the unit of the board's squares (default 1)", "M"},
+          "opencv: unit of T in metres, which is that of the board's squares (default 1)", "M"},
       {"append", 0, 0, G_OPTION_ARG_NONE, &options.append, "Add the view to the rig file", nullptr},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &options.paths, nullptr, nullptr},
       {}};
   GOptionContext *context = g_option_context_new ("FORMAT CALIBRATION... RIG");
   g_option_context_set_summary (context,
-      "Makes a rig file of a calibrated stereo pair. The left camera is put at the world's "
-      "origin,\n"
+      "Makes a rig file of a calibrated stereo pair. The left camera is at the world's origin,\n"
       "level, looking along -z with y up.\n"
       "  rig-convert opencv INTRINSICS.yml EXTRINSICS.yml RIG  M1, D1, M2, D2, R, T "
       "(stereo_calib)\n"
@@ -455,7 +454,7 @@ main (int argc, char **argv)
   } catch (
       const std::exception &) { /* cv::Exception's own text is many lines of source positions */
     g_printerr (
-        "rig-convert: the calibration is not what its format has; see docs/formats/rig.md\n");
+        "rig-convert: the calibration does not match its format; see docs/formats/rig.md\n");
     status = 1;
   }
   g_free (options.name);

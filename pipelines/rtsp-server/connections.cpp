@@ -46,8 +46,9 @@ max_connections (int max_viewers)
   }
   const rlim_t most = files.rlim_cur - std::min (files.rlim_cur, kMinSpare + kMinOwnFiles);
   if (viewers > most) {
-    g_printerr ("rtsp-server: --max-viewers: expected %d at most, since a process may have %d open "
-                "files here (ulimit -n), got '%d'\n",
+    g_printerr (
+        "rtsp-server: --max-viewers: expected at most %d, because a process may have %d open "
+        "files here (ulimit -n), got '%d'\n",
         int (most), int (files.rlim_cur), max_viewers);
     return std::nullopt;
   }

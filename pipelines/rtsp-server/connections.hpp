@@ -39,7 +39,7 @@ public:
   /** The connection is the viewer of that session from now on. */
   void record_viewer (GstRTSPClient *client, GstRTSPSession *session);
 
-  /** Main loop. Closes connections that are no viewers and were idle for so long. */
+  /** Main loop. Closes connections of no viewer that have been idle for this time. */
   void close_idle (gint64 max_idle_us);
   /** Main loop. Closes connections that asked for that media last; nullptr: all. */
   void close_all (const GstRTSPMedia *media);

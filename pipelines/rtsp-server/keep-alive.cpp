@@ -38,8 +38,9 @@ make_sinks (GstRTSPStream *stream, GstRTSPLowerTrans lower)
   if (has_sockets)
     gst_rtsp_stream_complete_stream (stream, transport);
   else
-    g_printerr ("rtsp-server: warning: no sockets for %s; a viewer that joins by it may stop the "
-                "stream\n",
+    g_printerr (
+        "rtsp-server: warning: no sockets for %s; a viewer that joins that way may interrupt the "
+        "stream\n",
         lower == GST_RTSP_LOWER_TRANS_UDP ? "UDP" : "multicast");
   gst_rtsp_transport_free (transport);
 }

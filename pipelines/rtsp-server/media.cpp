@@ -13,7 +13,7 @@ namespace {
 const char kCodedType[] = "application/x-neighbour-code";
 /* Object data of a media: it has its first frame set; it is live. */
 const char kPreparedKey[] = "rangecast-prepared", kLiveKey[] = "rangecast-live";
-/* EOS waits so long for the time of the last frame set, and then for its packets to be sent. */
+/* Maximum time for which EOS waits for the time of the last frame set and for its packets. */
 constexpr gint64 kMaxEosWait_us = 2 * G_USEC_PER_SEC;
 constexpr GstClockTime kSendTime = 100 * GST_MSECOND;
 
@@ -50,7 +50,8 @@ add_payloader (GstBin *bin, GError **error)
 {
   GstPad *end = gst_bin_find_unlinked_pad (bin, GST_PAD_SRC);
   if (!end) {
-    set_error (error, "expected a payloader named pay0, or coded frame sets that lead nowhere yet");
+    set_error (
+        error, "expected a payloader named pay0, or an unlinked source pad with coded frame sets");
     return false;
   }
   bool added = false;
@@ -64,7 +65,7 @@ add_payloader (GstBin *bin, GError **error)
     gst_object_unref (owner);
     g_free (name);
   } else if (!(payloader = gst_element_factory_make ("rtpneighbourcodepay", "pay0"))) {
-    set_error (error, "there is no element rtpneighbourcodepay: expected GST_PLUGIN_PATH to lead "
+    set_error (error, "no element rtpneighbourcodepay: expected GST_PLUGIN_PATH to lead "
                       "to the plugins of gst-rangecast, as pipelines/env.sh does");
   } else {
     gst_bin_add (bin, payloader);
@@ -429,7 +430,8 @@ void
 post_error (GstRTSPMedia *media)
 {
   if (GstElement *pipeline = pipeline_of (media)) {
-    GError *error = g_error_new_literal (GST_CORE_ERROR, GST_CORE_ERROR_FAILED, "the server ends");
+    GError *error =
+        g_error_new_literal (GST_CORE_ERROR, GST_CORE_ERROR_FAILED, "the server is shutting down");
     gst_element_post_message (
         pipeline, gst_message_new_error (GST_OBJECT (pipeline), error, nullptr));
     g_error_free (error);

@@ -167,9 +167,9 @@ parse_transports (const char *text, RtspOptions &options)
   }
   g_strfreev (names);
   if (!good)
-    return bad_option ("--transports", "udp, tcp, multicast, or several with commas", text);
+    return bad_option ("--transports", "a comma-separated list of udp, tcp, multicast", text);
   return !multicast || !options.multicast.first.empty () ||
-         bad_option ("--transports", "--multicast ADDRESS:PORT-PORT with multicast", text);
+         bad_option ("--transports", "--multicast ADDRESS:PORT-PORT for multicast", text);
 }
 
 /* ---- all of them ---- */
@@ -194,7 +194,7 @@ check_numbers (const RtspOptions &options)
 {
   struct {
     const char *option;
-    int value, least, most;
+    int value, min, max;
   } const numbers[] = {{"--port", options.port, 0, 65535},
       {"--retransmission", options.retransmission_ms, 0, 10000},
       {"--max-viewers", options.max_viewers, 1, 100000},
@@ -202,9 +202,9 @@ check_numbers (const RtspOptions &options)
       {"--timeout", options.timeout_s, 5, 86400}, {"--linger", options.linger_s, 0, 86400},
       {"--stats", options.stats_s, 0, 3600}};
   for (const auto &number : numbers)
-    if (number.value < number.least || number.value > number.most) {
-      const std::string expected = "a whole number from " + std::to_string (number.least) + " to " +
-                                   std::to_string (number.most);
+    if (number.value < number.min || number.value > number.max) {
+      const std::string expected = "a whole number from " + std::to_string (number.min) + " to " +
+                                   std::to_string (number.max);
       return bad_option (number.option, expected.c_str (), std::to_string (number.value));
     }
   return true;
@@ -247,7 +247,7 @@ assign_strings (const Strings &strings, RtspOptions &options)
   if (!strings.transports && !options.certificate_file.empty ())
     options.udp = false; /* with TLS all that need not be SRTP */
   if (!strings.launch) {
-    g_printerr ("rtsp-server: expected a launch string behind --, see --help\n");
+    g_printerr ("rtsp-server: expected a launch string after --; see --help\n");
     return false;
   }
   gchar *launch = g_strjoinv (" ", strings.launch);
@@ -268,41 +268,41 @@ parse_arguments (int argc, char **argv, RtspOptions &options)
       {"mount", 0, 0, G_OPTION_ARG_STRING, &strings.mount, "Path of the URL (default /live)",
           "/PATH"},
       {"user", 0, 0, G_OPTION_ARG_STRING_ARRAY, &strings.user,
-          "Who may watch; several times if need be (default: everybody)", "NAME:PASSWORD"},
+          "Allow this user; may be repeated (default: everybody)", "NAME:PASSWORD"},
       {"users", 0, 0, G_OPTION_ARG_FILENAME, &strings.users,
-          "The same from a file, a line NAME:PASSWORD each", "FILE"},
+          "File of allowed users, one NAME:PASSWORD per line", "FILE"},
       {"realm", 0, 0, G_OPTION_ARG_STRING, &strings.realm,
-          "What players say when they ask for the password (default rangecast)", "TEXT"},
+          "Realm that players show when they ask for the password (default rangecast)", "TEXT"},
       {"cert", 0, 0, G_OPTION_ARG_FILENAME, &strings.certificate,
-          "TLS certificate (PEM): the URL is rtsps://, and frame sets come inside TLS, too",
+          "TLS certificate (PEM): serves rtsps://, with frame sets inside the TLS connection",
           "FILE"},
       {"key", 0, 0, G_OPTION_ARG_FILENAME, &strings.key,
-          "Its private key (PEM; default: in the file of --cert)", "FILE"},
+          "Private key of the certificate (PEM; default: the file of --cert)", "FILE"},
       {"transports", 0, 0, G_OPTION_ARG_STRING, &strings.transports,
-          "udp, tcp, multicast, with commas (default: all; with --cert: tcp)", "LIST"},
+          "Comma-separated list of udp, tcp, multicast (default: all; with --cert: tcp)", "LIST"},
       {"multicast", 0, 0, G_OPTION_ARG_STRING, &strings.multicast,
           "Offer multicast to these addresses and ports, TTL 1 by default",
           "ADDRESS[-ADDRESS]:PORT-PORT[/TTL]"},
       {"retransmission", 0, 0, G_OPTION_ARG_INT, &options.retransmission_ms,
-          "Keep packets so long to send them again to who asks (default 0: none)", "MS"},
+          "Keep packets for this time for retransmission (default 0: none)", "MS"},
       {"max-viewers", 0, 0, G_OPTION_ARG_INT, &options.max_viewers,
-          "Viewers at a time; more are refused (default 64)", "N"},
+          "Maximum number of viewers; more are refused (default 64)", "N"},
       {"send-buffer", 0, 0, G_OPTION_ARG_INT, &options.send_buffer_kb,
-          "Bytes that may wait for a slow TCP viewer; frame sets beyond are left out (default 256)",
-          "KB"},
+          "Send queue of a TCP viewer; frame sets that do not fit are dropped (default 256)", "KB"},
       {"timeout", 0, 0, G_OPTION_ARG_INT, &options.timeout_s,
-          "Forget viewers that have been silent for so long (default 30)", "S"},
+          "Drop viewers that have been silent for this time (default 30)", "S"},
       {"linger", 0, 0, G_OPTION_ARG_INT, &options.linger_s,
-          "Go on for so long after the last viewer left (default 5)", "S"},
+          "Keep running for this time after the last viewer has left (default 5)", "S"},
       {"always", 0, 0, G_OPTION_ARG_NONE, &strings.always,
-          "Run from the start and without viewers, not only for them", nullptr},
-      {"stats", 0, 0, G_OPTION_ARG_INT, &options.stats_s, "Print a line of numbers so often", "S"},
+          "Also run the pipeline when there are no viewers", nullptr},
+      {"stats", 0, 0, G_OPTION_ARG_INT, &options.stats_s,
+          "Print a line of statistics at this interval (default 0: never)", "S"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &strings.launch, nullptr, nullptr}, {}};
   GOptionContext *context =
       g_option_context_new ("-- LAUNCH STRING - serve coded frame sets over RTSP");
-  g_option_context_set_description (context,
-      "The launch string ends in coded frame sets (neighbourcodeenc, rangemux), or its payloader "
-      "is named pay0.\n");
+  g_option_context_set_description (context, "The launch string ends with coded frame sets "
+                                             "(neighbourcodeenc, rangemux) or has a payloader\n"
+                                             "named pay0.\n");
   g_option_context_add_main_entries (context, entries, nullptr);
   g_option_context_add_group (context, gst_init_get_option_group ());
   gchar **arguments = g_strdupv (argv); /* the parser takes what it knows out of it */

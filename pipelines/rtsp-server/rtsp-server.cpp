@@ -50,7 +50,7 @@ namespace {
 constexpr guint kThreads = 4;        /* that serve connections */
 constexpr guint kMaxContent = 16384; /* bytes of a request's body, which has a few lines */
 constexpr int kBacklog = 64;         /* connections that wait in the kernel */
-/* gst-rtsp-server waits so long for the first frame set before it answers. */
+/* Maximum time that gst-rtsp-server waits for the first frame set before it answers. */
 constexpr int kPrepareTimeout_s = 20;
 /* Less than the 60 s after which gst-rtsp-server closes idle connections, which can leak. */
 constexpr int kMaxIdle_s = 50;
@@ -58,7 +58,7 @@ constexpr guint kMaxEnd_ms = 3000;       /* from EOS at the payloader to EOS on 
 constexpr guint kEosGrace_ms = 500;      /* for EOS, or for the response to a failed request */
 constexpr guint kResponseGrace_ms = 100; /* for the response, before the connection is closed */
 constexpr gint64 kSecond_us = 1000000;   /* G_USEC_PER_SEC is an int, too small for a day */
-/* Frame sets come for so long before a failure that was reported is over. */
+/* A reported failure is over when frame sets have been coming for this time. */
 constexpr gint64 kRecovery_us = 5 * kSecond_us;
 constexpr std::size_t kMaxFailures = 16;
 constexpr gint64 kMaxSetup_us = 2 * kSecond_us; /* from a player's DESCRIBE to its SETUP */
@@ -400,7 +400,7 @@ on_new_session (GstRTSPClient *, GstRTSPSession *session, gpointer user_data)
       session, guint (static_cast<Server *> (user_data)->options.timeout_s));
 }
 
-/* Data that waits in the kernel cannot be dropped any more, and delays the viewer. */
+/* Data that waits in the kernel can no longer be dropped, and delays the viewer. */
 void
 limit_send_buffer (GstRTSPClient *client, int bytes)
 {

@@ -121,8 +121,8 @@ LatencyTrace::write (const char *path) const
     return false;
   std::fputs ("# factory element.pad capture-ns rtp-time passed-ns thread thread-cpu-ns\n", file);
   if (is_full_)
-    g_printerr ("rangecast-run: %s: full after %zu buffers; what came later is missing\n", path,
-        kMaxPassages);
+    g_printerr (
+        "rangecast-run: %s: full after %zu buffers; later ones are missing\n", path, kMaxPassages);
   for (const Passage &p : passages_)
     std::fprintf (file, "%s %" PRId64 " %" PRId64 " %" PRId64 " %" PRId64 " %" PRId64 "\n",
         p.point->name.c_str (), GST_CLOCK_TIME_IS_VALID (p.capture) ? std::int64_t (p.capture) : -1,

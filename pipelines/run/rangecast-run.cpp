@@ -43,6 +43,24 @@ send_eos (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
+/* Warnings say when rangemux lost a stream or stereocamsrc its cameras; only an element message
+ * says that they are back. */
+void
+report_recovery (GstMessage *message)
+{
+  const GstStructure *structure = gst_message_get_structure (message);
+  const gchar *name = GST_OBJECT_NAME (message->src);
+  if (gst_structure_has_name (structure, "stereocamsrc-back")) {
+    g_printerr ("%s: the cameras are back\n", name);
+  } else if (gst_structure_has_name (structure, "rangemux-stream") &&
+             g_strcmp0 (gst_structure_get_string (structure, "state"), "in") == 0) {
+    int view_id = -1;
+    gst_structure_get_int (structure, "view-id", &view_id);
+    g_printerr ("%s: pad %s (view %d) is back\n", name, gst_structure_get_string (structure, "pad"),
+        view_id);
+  }
+}
+
 gboolean
 on_message (GstBus *, GstMessage *message, gpointer user_data)
 {
@@ -73,6 +91,7 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
       gst_element_set_state (runner->pipeline, GST_STATE_PLAYING);
       break;
     case GST_MESSAGE_ELEMENT:
+      report_recovery (message);
       if (runner->stats)
         runner->stats->take (message);
       break;
@@ -94,7 +113,8 @@ report_failure (Runner &runner, GstBus *bus)
     on_message (bus, message, &runner);
     gst_message_unref (message);
   } else {
-    g_printerr ("ERROR: the pipeline does not start, and no element says why; GST_DEBUG=2 may\n");
+    g_printerr (
+        "ERROR: the pipeline does not start, and no element posted an error; try GST_DEBUG=2\n");
   }
 }
 

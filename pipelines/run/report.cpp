@@ -35,7 +35,7 @@ print_progress (RunMeasure &measure)
 {
   const StreamStats stats = measure.stats ();
   if (stats.frames == 0)
-    std::printf ("  waiting: cameras learn their background\n");
+    std::printf ("  waiting: cameras are learning their background\n");
   else
     std::printf ("  frame set %5" G_GUINT64_FORMAT "  %5.1f /s  %7.0f points  %6.1f ms\n",
         stats.frames, measure.fps (), per_frame (stats.points_out, stats.cylinder_frames),
@@ -77,8 +77,8 @@ namespace {
 
 /* ---- the last picture ---- */
 
-/* One with all views, if there was one. @return transfer full; null if there is none, or it cannot
- * be converted */
+/* The last picture with all views, else the last one. @return transfer full; null if there is none
+ * or it cannot be converted */
 GstSample *
 last_picture (GstElement *pipeline, RunMeasure &measure, const char *path, GError **error)
 {
@@ -157,7 +157,7 @@ other_threads ()
 bool
 write_threads_left (const char *path)
 {
-  g_thread_pool_set_max_unused_threads (0); /* else some stay for later use */
+  g_thread_pool_set_max_unused_threads (0); /* idle threads of the pool */
   std::vector<std::string> left = other_threads ();
   for (int i = 0; !left.empty () && i < 20; i++) {
     g_usleep (50000);

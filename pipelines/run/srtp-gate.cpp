@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::size_t kMaxKnown = 256, kKept = 128; /* senders; after some are forgotten */
 constexpr guint kClosedPackets = 64;                /* in a row of a sender who is known, ... */
-constexpr gint64 kClosedTimeUs = 2'000'000; /* ... and for so long: look where it is by now */
-constexpr gint64 kGoneTimeUs = 10'000'000;  /* and after so long it may have started over */
+constexpr gint64 kClosedTimeUs = 2'000'000; /* ... and this time: look for its current index */
+constexpr gint64 kGoneTimeUs = 10'000'000;  /* after this time it may have started over */
 
 /* A sender who has the key. An index is a packet's sequence number with the roll-over counter
  * before it, as RFC 3711, 3.3.1 has it. */
@@ -55,8 +55,8 @@ struct Gate {
 struct Before {
   bool known = false;  /* has shown that it has the key; where it is RTP, by RTP */
   bool old = false;    /* the packet may be a replay */
-  bool closed = false; /* its packets do not open any longer */
-  bool gone = false;   /* for so long that it may have started over */
+  bool closed = false; /* its packets can no longer be decrypted */
+  bool gone = false;   /* for kGoneTimeUs: it may have started over */
   guint roll_over = 0; /* probably */
 };
 
@@ -222,7 +222,7 @@ on_opened (GstPad *, GstPadProbeInfo *info, gpointer user_data)
   if (known && known->index) {
     known->index = std::max (*known->index, guess_index (*known->index, sequence_of (buffer)));
     known->peak = std::max (known->peak, *known->index);
-    /* With replays between them, too, a sender's packets that do not open add up. */
+    /* Undecryptable packets add up even if replays come between them. */
     known->closed = known->started_over () ? known->closed - std::min (known->closed, 1U) : 0;
     known->opened_us = g_get_monotonic_time ();
   }

@@ -9,13 +9,13 @@
 namespace {
 
 constexpr std::size_t kKeyBytes = 30;       /* of AES-128 in counter mode, RFC 3711 */
-constexpr guint kClosedPackets = 20;        /* in a row, before it is reported, ... */
-constexpr gint64 kClosedTimeUs = 3'000'000; /* ... and for so long: a flood is no wrong key */
+constexpr guint kClosedPackets = 20;        /* in a row, and ... */
+constexpr gint64 kClosedTimeUs = 3'000'000; /* ... for this time, before it is reported */
 
 /** What goes into a srtpdec and comes out of it; its streaming threads count. */
 struct Watched {
   std::string name, path;
-  std::atomic<guint> closed = 0;           /* packets in a row that did not open */
+  std::atomic<guint> closed = 0;           /* undecryptable packets in a row */
   std::atomic<gint64> closed_since_us = 0; /* when the first of them came */
   bool reported = false;                   /* one streaming thread per pad, and one pad counts in */
 };
@@ -55,8 +55,8 @@ on_packet_in (GstPad *, GstPadProbeInfo *, gpointer user_data)
       !watched->reported) {
     watched->reported = true;
     g_printerr (
-        "WARNING: %s: packets do not open with the key in %s: the sender has another key, or "
-        "does not encrypt\n",
+        "WARNING: %s: packets cannot be decrypted with the key in %s: the sender uses another "
+        "key, or does not encrypt\n",
         watched->name.c_str (), watched->path.c_str ());
   }
   return GST_PAD_PROBE_OK;
@@ -106,13 +106,12 @@ give_srtp_key (GstElement *pipeline, const char *path)
     if (g_str_equal (name, "srtpenc")) {
       g_object_set (element, "key", key, nullptr);
     } else if (g_str_equal (name, "srtpdec")) {
-      watch (element, path); /* before the gate: it sees what that drops */
+      watch (element, path); /* before the gate, to see packets that it drops */
       good = add_srtp_gate (element, key);
     }
   }
   gst_buffer_unref (key);
   if (!good)
-    g_printerr ("rangecast-run: --srtp-key: expected another srtpdec, to try packets with, but "
-                "there is none\n");
+    g_printerr ("rangecast-run: --srtp-key: cannot create the second srtpdec that tries packets\n");
   return good;
 }

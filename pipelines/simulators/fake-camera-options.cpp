@@ -21,7 +21,7 @@ FakeCameraOptions::serves (const std::string &name) const
 
 namespace {
 
-/* As they stand on the command line. */
+/* Values of the command line, unchecked. */
 struct RawOptions {
   gint views = 4, third = 0, empty_frames = 25, loop = 0, no_resend = 0;
   gdouble fps = 15, loss = 0, link = 1000;
@@ -46,30 +46,33 @@ bool
 parse (int *argc, char ***argv, RawOptions &raw)
 {
   const GOptionEntry entries[] = {
-      {"views", 0, 0, G_OPTION_ARG_INT, &raw.views, "stereo cameras (default 4)", "N"},
-      {"third", 0, 0, G_OPTION_ARG_NONE, &raw.third, "each with a third camera", nullptr},
-      {"size", 0, 0, G_OPTION_ARG_STRING, &raw.size, "of the sensors (default 320x240)", "WxH"},
+      {"views", 0, 0, G_OPTION_ARG_INT, &raw.views, "number of stereo cameras (default 4)", "N"},
+      {"third", 0, 0, G_OPTION_ARG_NONE, &raw.third, "add a third camera to each", nullptr},
+      {"size", 0, 0, G_OPTION_ARG_STRING, &raw.size, "sensor size (default 320x240)", "WxH"},
       {"fps", 0, 0, G_OPTION_ARG_DOUBLE, &raw.fps,
-          "rate of the free-running cameras at first; also how long a tick may last (default 15)",
+          "initial free-running rate; triggers within half a period show the same moment (default "
+          "15)",
           "F"},
       {"colour", 0, 0, G_OPTION_ARG_STRING, &raw.colour,
-          "rgb8 (default), bayer or mono8: pixel format at first", "FORMAT"},
+          "initial pixel format: rgb8 (default), bayer or mono8", "FORMAT"},
       {"address-base", 0, 0, G_OPTION_ARG_STRING, &raw.address,
-          "of view0-left; each camera has the next one (default 127.0.1.1)", "ADDRESS"},
+          "address of view0-left; other cameras have the following ones (default 127.0.1.1)",
+          "ADDRESS"},
       {"only", 0, 0, G_OPTION_ARG_STRING, &raw.only,
-          "serve only these of the rig's cameras, e.g. view0-left,view0-right", "NAMES"},
-      {"rig-export", 0, 0, G_OPTION_ARG_FILENAME, &raw.rig, "write the rig", "FILE"},
+          "serve only these cameras of the rig, e.g. view0-left,view0-right", "NAMES"},
+      {"rig-export", 0, 0, G_OPTION_ARG_FILENAME, &raw.rig, "write the rig file", "FILE"},
       {"log", 0, 0, G_OPTION_ARG_FILENAME, &raw.log,
-          "write when each picture was taken: camera, number, ns of the time of day", "FILE"},
+          "write a line for each exposure: camera, frame number, time of day in ns", "FILE"},
       {"model", 0, 0, G_OPTION_ARG_FILENAME, &raw.model,
           "glTF or OBJ model instead of the built-in figure", "FILE"},
       {"empty-frames", 0, 0, G_OPTION_ARG_INT, &raw.empty_frames,
-          "the person comes after so many frame periods (default 25)", "N"},
+          "the person appears after N frame periods, and not before N pictures (default 25)", "N"},
       {"loop", 0, 0, G_OPTION_ARG_INT, &raw.loop,
-          "draw N moments beforehand and show them again and again (default 0: draw each)", "N"},
-      {"loss", 0, 0, G_OPTION_ARG_DOUBLE, &raw.loss, "picture packets lost, of a thousand", "N"},
-      {"no-resend", 0, 0, G_OPTION_ARG_NONE, &raw.no_resend, "lost packets stay lost", nullptr},
-      {"link", 0, 0, G_OPTION_ARG_DOUBLE, &raw.link, "speed of each camera's cable (default 1000)",
+          "draw N moments in advance and repeat them (default 0: draw each)", "N"},
+      {"loss", 0, 0, G_OPTION_ARG_DOUBLE, &raw.loss,
+          "lose N of a thousand image packets (default 0)", "N"},
+      {"no-resend", 0, 0, G_OPTION_ARG_NONE, &raw.no_resend, "do not resend lost packets", nullptr},
+      {"link", 0, 0, G_OPTION_ARG_DOUBLE, &raw.link, "link speed of each camera (default 1000)",
           "MBIT/S"},
       {nullptr, 0, 0, G_OPTION_ARG_NONE, nullptr, nullptr, nullptr},
   };

@@ -7,7 +7,7 @@
 
 #include "gige-camera.hpp"
 
-/** What fake-cameras was asked for, checked. */
+/** Checked options of fake-cameras. */
 struct FakeCameraOptions {
   rangecast::SceneSettings scene;
   GigeCameraSettings camera;               ///< the same for all, but address and serial
@@ -20,6 +20,6 @@ struct FakeCameraOptions {
   [[nodiscard]] bool serves (const std::string &name) const;
 };
 
-/** Reads the command line; says on stderr what is wrong with it.
+/** Parses the command line; prints errors to stderr.
  *  @return the exit status, or -1 to go on */
 int read_fake_camera_options (int argc, char **argv, FakeCameraOptions &options);

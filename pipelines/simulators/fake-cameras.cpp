@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Stereo cameras round avatartestsrc's person, as GigE Vision cameras on this machine's network:
- * for programs that want cameras where there are none. */
+ * to run programs that need cameras without hardware. */
 #include <arpa/inet.h>
 #include <glib-unix.h>
 

@@ -30,7 +30,7 @@ NetworkFaults::is_lost ()
     burst_left_--;
     return true;
   }
-  /* Of the packets outside bursts so many begin one that the share of all is as configured. */
+  /* The share of packets that begin a burst, so that the total loss is as configured. */
   const double begins =
       settings_.loss >= 1
           ? 1
@@ -127,16 +127,17 @@ NetworkFaults::due_ns () const
 /* ---- options ---- */
 
 const char *const kFaultOptions =
-    "  --loss SHARE       packets lost, 0 to 1 (default 0)\n"
-    "  --burst N          as many in a row where a loss begins (default 1)\n"
-    "  --duplicate SHARE  packets that come twice (default 0)\n"
-    "  --reorder SHARE    packets that are held back (default 0) ...\n"
-    "  --reorder-by N     ... until N later ones have passed, or 100 ms (default 10)\n"
-    "  --delay MS         of every packet (default 0)\n"
-    "  --jitter MS        more delay by chance, evenly from 0; packets may overtake (default 0)\n"
-    "  --bandwidth KBIT   1,000 bits per second; what waits for more than 200 ms is lost (default "
-    "0: no limit)\n"
-    "  --seed N           of all chances (default 1)\n";
+    "  --loss SHARE       share of packets that are lost, 0 to 1 (default 0)\n"
+    "  --burst N          packets lost in a row at each loss (default 1)\n"
+    "  --duplicate SHARE  share of packets that are duplicated (default 0)\n"
+    "  --reorder SHARE    share of packets that are held back (default 0)\n"
+    "  --reorder-by N     until N later packets have passed, or for 100 ms (default 10)\n"
+    "  --delay MS         delay of every packet (default 0)\n"
+    "  --jitter MS        random extra delay, uniform from 0; reorders packets (default 0)\n"
+    "  --bandwidth KBIT   1,000 bits per second; packets that would wait for more than 200 ms are "
+    "lost\n"
+    "                     (default 0: no limit)\n"
+    "  --seed N           seed of the random numbers (default 1)\n";
 
 namespace {
 

@@ -15,7 +15,7 @@ struct FaultSettings {
   int burst = 1;            ///< packets that are lost in a row where a loss begins
   double duplicate = 0;     ///< share of packets that come twice
   double reorder = 0;       ///< share of packets that are held back
-  int reorder_by = 10;      ///< until so many later ones have passed (or kHoldNs)
+  int reorder_by = 10;      ///< until this number of later ones have passed (or kHoldNs)
   int64_t delay_ns = 0;     ///< of every packet
   int64_t jitter_ns = 0;    ///< more delay, evenly from 0 to this; later packets may overtake
   double bandwidth_bps = 0; ///< bits per second; 0: no limit

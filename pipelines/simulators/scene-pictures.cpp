@@ -45,8 +45,10 @@ void
 EmptyPhase::camera_starts ()
 {
   std::lock_guard guard (lock_);
-  if (cameras_++ == 0)
-    first_ns_ = -1;
+  if (cameras_++ == 0) {
+    first_ns_ = end_ns_ = -1;
+    pictures_ = 0;
+  }
 }
 
 void
@@ -61,8 +63,15 @@ EmptyPhase::at (std::int64_t moment_ns)
 {
   std::lock_guard guard (lock_);
   if (first_ns_ < 0)
-    first_ns_ = moment_ns;
-  return moment_ns < first_ns_ + length_ns_;
+    first_ns_ = last_ns_ = moment_ns;
+  /* All pictures of one moment show the same scene, so the phase ends with a new moment. */
+  const bool ends = moment_ns > last_ns_ && moment_ns >= first_ns_ + length_ns_ &&
+                    pictures_ >= frames_ * cameras_;
+  last_ns_ = std::max (last_ns_, moment_ns);
+  pictures_++;
+  if (end_ns_ < 0 && (ends || frames_ == 0))
+    end_ns_ = moment_ns;
+  return end_ns_ < 0 || moment_ns < end_ns_;
 }
 
 namespace {

@@ -40,18 +40,24 @@ private:
   std::int64_t period_ns_, last_ns_ = -1;
 };
 
-/** The cameras of a view see the empty scene for the first frames since they all stood still. Any
- *  thread. */
+/** After all cameras of a view stood still, they see the empty scene for a number of frame periods
+ *  and, if they run at a lower rate, of pictures. Any thread. */
 class EmptyPhase {
 public:
-  EmptyPhase (std::int64_t period_ns, int frames) : length_ns_ (period_ns * frames) {}
+  EmptyPhase (std::int64_t period_ns, int frames)
+      : length_ns_ (period_ns * frames), frames_ (frames)
+  {
+  }
   void camera_starts ();
   void camera_stops ();
+  /** Once for each picture. @return whether it shows the empty scene */
   bool at (std::int64_t moment_ns);
 
 private:
   std::mutex lock_;
-  std::int64_t length_ns_, first_ns_ = -1;
+  std::int64_t length_ns_, first_ns_ = -1, last_ns_ = -1; /* moments of the phase */
+  std::int64_t end_ns_ = -1;                              /* -1: not known yet */
+  std::int64_t frames_, pictures_ = 0;
   int cameras_ = 0;
 };
 

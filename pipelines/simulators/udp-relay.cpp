@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* A bad network on good machines: relays UDP packets with losses, delays and other faults. */
+/* Simulates a bad network: relays UDP packets with losses, delays and other faults. */
 #include "network-faults.hpp"
 
 #include <arpa/inet.h>
@@ -27,10 +27,9 @@ namespace {
 const char *const kUsage =
     "usage: udp-relay --listen PORT --to HOST:PORT [--listen PORT --to HOST:PORT ...] [options]\n"
     "       udp-relay --between INTERFACE,INTERFACE [options]\n"
-    "Passes on what arrives at a UDP port, and answers to it; or all that goes through a cable "
-    "that\n"
-    "is cut between two network interfaces (root), where only UDP over IPv4 suffers.\n"
-    "Both directions suffer alike. On SIGINT and SIGTERM it ends and says what it did.\n";
+    "Relays packets that arrive at a UDP port, and the answers; or, as root, bridges two network\n"
+    "interfaces, with faults for UDP over IPv4 only. Faults apply to both directions. Prints its\n"
+    "counters at SIGINT or SIGTERM.\n";
 
 int64_t
 now_ns ()
@@ -81,7 +80,7 @@ suffers (const Direction &direction, std::size_t size)
 void
 send_on (Direction &direction, std::span<const uint8_t> packet)
 {
-  /* What the network does not take is lost, as everywhere. */
+  /* Packets that the network does not accept are lost, as in any network. */
   if (direction.receiver && direction.receiver->ss_family == 0)
     return;
   const ssize_t sent = direction.receiver ? sendto (direction.to, packet.data (), packet.size (), 0,
@@ -94,7 +93,7 @@ send_on (Direction &direction, std::span<const uint8_t> packet)
 void
 read_all (Direction &direction)
 {
-  for (int i = 0; i < 64; i++) { /* the other direction has its turn, too */
+  for (int i = 0; i < 64; i++) { /* then the other direction has its turn */
     socklen_t length = sizeof (sockaddr_storage);
     const ssize_t size =
         recvfrom (direction.from, direction.buffer.data (), direction.buffer.size (), MSG_DONTWAIT,
@@ -153,7 +152,7 @@ cable_end (const std::string &interface)
   ifreq request = {};
   interface.copy (request.ifr_name, sizeof request.ifr_name - 1);
   if (ioctl (fd, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_LOOPBACK))
-    refuse ("--between " + interface + ": is no cable, but this machine's loopback");
+    refuse ("--between " + interface + ": is the loopback interface; expected a network interface");
   sockaddr_ll address = {};
   address.sll_family = AF_PACKET;
   address.sll_protocol = htons (ETH_P_ALL);
@@ -203,7 +202,7 @@ read_options (int argc, char **argv)
       std::exit (0);
     }
     if (i + 1 == argc)
-      refuse (name + " lacks its value, or is unknown (--help lists the options)");
+      refuse ("option " + name + " needs a value, or is unknown (--help lists the options)");
     const std::string value = argv[++i];
     std::string problem;
     if (name == "--listen") {
@@ -213,7 +212,7 @@ read_options (int argc, char **argv)
       settings.links.emplace_back (port, "");
     } else if (name == "--to") {
       if (settings.links.empty () || !settings.links.back ().second.empty ())
-        refuse ("--to " + value + ": expected after a --listen PORT of its own");
+        refuse ("--to " + value + ": expected after its --listen PORT");
       settings.links.back ().second = value;
     } else if (name == "--between") {
       settings.cable = read_cable (value);
@@ -229,7 +228,7 @@ read_options (int argc, char **argv)
   if (settings.links.empty () == settings.cable.empty ())
     refuse (settings.links.empty ()
                 ? "expected --listen PORT --to HOST:PORT, or --between INTERFACE,INTERFACE"
-                : "--listen and --between: expected one of them");
+                : "--listen and --between: expected only one of them");
   return settings;
 }
 
@@ -296,8 +295,8 @@ main (int argc, char **argv)
   relay (directions, signals);
   for (std::size_t i = 0; i < directions.size (); i++) {
     const FaultCounters &c = directions[i]->faults.counters ();
-    std::printf (
-        "%s: %llu in, %llu out, %llu lost, %llu lost for bandwidth, %llu twice, %llu held back\n",
+    std::printf ("%s: %llu in, %llu out, %llu lost, %llu lost for bandwidth, %llu duplicated, %llu "
+                 "reordered\n",
         i % 2 ? "back" : "there", (unsigned long long)c.in, (unsigned long long)c.out,
         (unsigned long long)c.lost, (unsigned long long)c.congested,
         (unsigned long long)c.duplicated, (unsigned long long)c.held_back);

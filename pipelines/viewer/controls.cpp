@@ -38,18 +38,18 @@ switch_view (Viewer &viewer, guint number)
   guint64 mask = G_MAXUINT64, all = 0;
   if (number == 0) {
     g_object_set (viewer.render, "view-mask", mask, nullptr);
-    return "all views on";
+    return "all views shown";
   }
   const std::vector<guint> ids = view_ids (viewer); /* none before the first frame set */
   if (number > ids.size ())
-    return "there is no view " + std::to_string (number);
+    return "no view " + std::to_string (number);
   for (guint id : ids)
     all |= guint64 (1) << id;
   g_object_get (viewer.render, "view-mask", &mask, nullptr);
   mask ^= guint64 (1) << ids[number - 1];
   g_object_set (viewer.render, "view-mask", mask, nullptr);
   if ((mask & all) == 0)
-    return "all views off, 0 shows them";
+    return "all views hidden; 0 shows them";
   const guint id = ids[number - 1];
   return "view " + std::to_string (number) +
          (id == number - 1 ? "" : " (view-id " + std::to_string (id) + ")") +
@@ -136,7 +136,7 @@ const Key kKeys[] = {
 std::vector<TextRow>
 key_rows (bool is_file)
 {
-  std::vector<TextRow> rows = {{"drag", "turn; with another button: move"}};
+  std::vector<TextRow> rows = {{"drag", "orbit; with another button: pan"}};
   rows.push_back ({"wheel, + -", "zoom"});
   rows.push_back (
       is_file ? TextRow{"up, down", "look from above or below"} : TextRow{"arrows", "turn"});

@@ -48,7 +48,7 @@ finish (Viewer &viewer)
   if (!viewer.is_file || viewer.options.once)
     g_main_loop_quit (viewer.loop);
   else if (!viewer.playback->seek (0, false))
-    fail (viewer, "the file cannot be played again: it has no times to go back to");
+    fail (viewer, "the file cannot be looped: it is not seekable");
 }
 
 gboolean
@@ -56,7 +56,7 @@ warn_no_frame_sets (gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
   if (!viewer.seen_frames)
-    g_printerr ("rangecast-viewer: nothing to show yet; is somebody sending?\n");
+    g_printerr ("rangecast-viewer: no frame sets received yet; is the sender running?\n");
   return G_SOURCE_REMOVE;
 }
 

@@ -24,7 +24,7 @@ check_numbers (const ViewerOptions &options)
   if (options.latency_ms < 0 || options.latency_ms > 10000)
     return bad_option ("--latency", "0 to 10000 ms", std::to_string (options.latency_ms).c_str ());
   if (!(options.auto_orbit >= -3600 && options.auto_orbit <= 3600))
-    return bad_option ("--auto-orbit", "-3600 to 3600 degrees a second",
+    return bad_option ("--auto-orbit", "-3600 to 3600 degrees per second",
         std::to_string (options.auto_orbit).c_str ());
   return true;
 }
@@ -84,11 +84,11 @@ check_display ()
       g_strcmp0 (window, "egl-device") != 0 && g_strcmp0 (window, "surfaceless") != 0;
   if (!g_getenv ("DISPLAY") && !g_getenv ("WAYLAND_DISPLAY"))
     g_printerr (
-        "rangecast-viewer: there is no display: expected DISPLAY or WAYLAND_DISPLAY in the "
-        "environment; pipelines/play.sh --film and viewer-host.sh --out make films without one\n");
+        "rangecast-viewer: no display: neither DISPLAY nor WAYLAND_DISPLAY is set; without one, "
+        "pipelines/play.sh --film and viewer-host.sh --out write videos\n");
   else if (!is_seen)
     g_printerr (
-        "rangecast-viewer: GST_GL_WINDOW=%s draws without a window: expected it not to be set\n",
+        "rangecast-viewer: GST_GL_WINDOW=%s draws without a window; expected it to be unset\n",
         window);
   else
     return true;
@@ -99,22 +99,21 @@ bool
 parse_arguments (int *argc, char ***argv, const char *keys, ViewerOptions &options)
 {
   const GOptionEntry entries[] = {{"listen", 0, 0, G_OPTION_ARG_INT, &options.listen,
-                                      "Show the RTP stream that comes to this UDP port", "PORT"},
+                                      "Show the RTP stream that arrives at this UDP port", "PORT"},
       {"latency", 0, 0, G_OPTION_ARG_INT, &options.latency_ms,
           "Jitter buffer of RTP and RTSP (default 30)", "MS"},
       {"no-filter", 0, 0, G_OPTION_ARG_NONE, &options.no_filter,
-          "Leave the points that several cameras saw", nullptr},
+          "Do not remove redundant points where views overlap", nullptr},
       {"mode", 0, 0, G_OPTION_ARG_STRING, &options.mode,
           "blend (default), strips, rectangles or points", "MODE"},
-      {"background", 0, 0, G_OPTION_ARG_STRING, &options.background, "Colour behind the scene",
-          "RRGGBB"},
+      {"background", 0, 0, G_OPTION_ARG_STRING, &options.background, "Background colour", "RRGGBB"},
       {"size", 0, 0, G_OPTION_ARG_STRING, &options.size, "Picture size (default 640x480)", "WxH"},
       {"auto-orbit", 0, 0, G_OPTION_ARG_DOUBLE, &options.auto_orbit,
-          "Degrees a second by which the view turns by itself", "DEG"},
-      {"once", 0, 0, G_OPTION_ARG_NONE, &options.once,
-          "Quit at the end of a file (default: begin again)", nullptr},
+          "Orbit by itself, degrees per second (default 0)", "DEG"},
+      {"once", 0, 0, G_OPTION_ARG_NONE, &options.once, "Quit at the end of a file (default: loop)",
+          nullptr},
       {"out", 0, 0, G_OPTION_ARG_FILENAME, &options.out,
-          "Folder for pictures and point clouds (default: here)", "FOLDER"},
+          "Folder for pictures and point clouds (default: current folder)", "FOLDER"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &options.inputs, nullptr, nullptr},
       {}};
   GOptionContext *context =

@@ -57,9 +57,9 @@ add (Viewer &viewer, const char *factory)
 {
   GstElement *element = gst_element_factory_make (factory, nullptr);
   if (!element) {
-    g_printerr (
-        "rangecast-viewer: there is no element %s: expected GST_PLUGIN_PATH to lead to the plugins "
-        "of gst-rangecast, as pipelines/env.sh does, and gst-plugins-base and -good\n",
+    g_printerr ("rangecast-viewer: no element %s: expected GST_PLUGIN_PATH to name the folder of "
+                "the plugins "
+                "of gst-rangecast, as pipelines/env.sh does, and gst-plugins-base and -good\n",
         factory);
     std::exit (1);
   }
@@ -248,8 +248,7 @@ is_supported (const char *uri)
   gchar *scheme = gst_uri_get_protocol (uri);
   const bool supported = scheme && gst_uri_protocol_is_supported (GST_URI_SRC, scheme);
   if (!supported)
-    g_printerr (
-        "rangecast-viewer: %s: no plugin of GStreamer opens %s://\n", uri, scheme ? scheme : "");
+    g_printerr ("rangecast-viewer: %s: no GStreamer plugin for %s://\n", uri, scheme ? scheme : "");
   g_free (scheme);
   return supported;
 }
@@ -263,9 +262,10 @@ input_uri (const char *input)
   if (g_file_test (input, G_FILE_TEST_IS_REGULAR))
     return gst_filename_to_uri (input, nullptr);
   g_printerr ("rangecast-viewer: %s: %s\n", input,
-      g_file_test (input, G_FILE_TEST_IS_DIR)   ? "is a folder; expected a .rcnc recording in it"
-      : g_file_test (input, G_FILE_TEST_EXISTS) ? "is no ordinary file; expected a .rcnc recording"
-                                                : "no such file");
+      g_file_test (input, G_FILE_TEST_IS_DIR) ? "is a folder; expected a .rcnc recording in it"
+      : g_file_test (input, G_FILE_TEST_EXISTS)
+          ? "is not a regular file; expected a .rcnc recording"
+          : "no such file");
   return nullptr;
 }
 

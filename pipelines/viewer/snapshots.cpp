@@ -27,7 +27,7 @@ write_file (const std::string &path, GstBuffer *buffer)
 {
   GstMapInfo map;
   if (!gst_buffer_map (buffer, &map, GST_MAP_READ)) {
-    g_printerr ("rangecast-viewer: %s: cannot read what was to be written\n", path.c_str ());
+    g_printerr ("rangecast-viewer: %s: cannot map the buffer to write\n", path.c_str ());
     return;
   }
   GError *error = nullptr;
@@ -72,14 +72,14 @@ write_last_picture (Viewer &viewer)
     write_file (free_name (viewer, "png"), gst_sample_get_buffer (converted));
     gst_sample_unref (converted);
   } else {
-    g_printerr (
-        "rangecast-viewer: no PNG of the picture: %s\n", error ? error->message : "unknown error");
+    g_printerr ("rangecast-viewer: cannot encode the picture as PNG: %s\n",
+        error ? error->message : "unknown error");
   }
   g_clear_error (&error);
   return true;
 }
 
-/* Before the first picture, and where a file begins again, there is none for a moment. */
+/* There is no picture before the first one, and for a moment where a file starts over. */
 gboolean
 try_to_write_picture (gpointer user_data)
 {
@@ -88,7 +88,7 @@ try_to_write_picture (gpointer user_data)
     return G_SOURCE_REMOVE;
   if (viewer.patience-- > 0)
     return G_SOURCE_CONTINUE;
-  g_printerr ("rangecast-viewer: there is no picture yet\n");
+  g_printerr ("rangecast-viewer: no picture yet\n");
   return G_SOURCE_REMOVE;
 }
 
@@ -116,8 +116,8 @@ report_end (GstElement *pipeline, const std::string &path)
   if (message && !error)
     std::printf ("wrote %s\n", path.c_str ());
   else
-    g_printerr ("rangecast-viewer: %s: %s\n", path.c_str (),
-        error ? error->message : "writing takes too long");
+    g_printerr (
+        "rangecast-viewer: %s: %s\n", path.c_str (), error ? error->message : "writing timed out");
   std::fflush (stdout);
   g_clear_error (&error);
   if (message)
@@ -141,7 +141,7 @@ write_points (Viewer &viewer)
 {
   GstSample *sample = last_frame_set (viewer);
   if (!sample) {
-    g_printerr ("rangecast-viewer: there are no points yet\n");
+    g_printerr ("rangecast-viewer: no points yet\n");
     return;
   }
   GError *error = nullptr;
@@ -162,7 +162,7 @@ write_points (Viewer &viewer)
     gst_object_unref (out);
     gst_object_unref (encoder);
   } else {
-    g_printerr ("rangecast-viewer: no point cloud: %s\n", error->message);
+    g_printerr ("rangecast-viewer: cannot write a point cloud: %s\n", error->message);
   }
   g_clear_error (&error);
   gst_sample_unref (sample);

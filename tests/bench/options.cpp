@@ -127,7 +127,7 @@ Options::parse (int argc, char **argv)
     if (taker == values_.end ())
       return refuse ("unknown option '" + name + "'");
     if (++i == argc)
-      return refuse (name + " lacks its value");
+      return refuse ("option " + name + " needs a value");
     if (const std::string expected = taker->second (argv[i]); !expected.empty ())
       return refuse (name + " " + argv[i] + ": expected " + expected);
   }

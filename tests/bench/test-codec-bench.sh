@@ -175,7 +175,7 @@ test_own_settings_are_run () {
 test_bad_options_are_named () {
   make_pictures
   refuse 2 "--depht" --depht depth0.png
-  refuse 2 "--depth lacks its value" --color colour0.png --depth
+  refuse 2 "option --depth needs a value" --color colour0.png --depth
   refuse 2 "--rounds many" "${pair0[@]}" --rounds many
   refuse 2 "--depth-unit 0" "${pair0[@]}" --depth-unit 0
   refuse 2 "--size 64" --size 64

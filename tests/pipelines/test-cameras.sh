@@ -80,6 +80,8 @@ test_host_waits_for_cameras_that_are_killed_and_come_back () {
   local before
   before=$(stat -c %s all.rcnc)
   wait_for_size all.rcnc $((before + 30000)) 60
+  [ "$(grep -c '^WARNING: cameras: ' host.log)" = 1 ] || fail "$(cat host.log)"
+  [ "$(grep -c '^cameras: the cameras are back' host.log)" = 1 ] || fail "$(cat host.log)"
   stop_all "$host" "$parent" "$recorder" "$cameras"
 }
 

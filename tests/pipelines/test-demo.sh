@@ -101,7 +101,7 @@ test_demo_checks_its_options_before_it_builds () {
   printf '#!/bin/sh\ntouch "%s/built"\nexit 1\n' "$PWD" >tree/setup.sh
   chmod +x tree/setup.sh
   expect_error "unknown option '--no-such-option'" tree/pipelines/demo.sh --no-such-option
-  expect_error "lacks its value" tree/pipelines/demo.sh --frames
+  expect_error "option --frames needs a value" tree/pipelines/demo.sh --frames
   expect_error "--frames: expected a whole number" tree/pipelines/demo.sh --frames abc
   expect_error "--views: expected a whole number" tree/pipelines/demo.sh --views 65
   expect_error "no model" tree/pipelines/demo.sh --input avatar=nowhere.glb

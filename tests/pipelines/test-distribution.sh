@@ -102,10 +102,10 @@ test_encrypted_hosts_need_the_same_key () {
   start_viewer two --key wrong.key
   local i
   for ((i = 0; i < 150; i++)); do
-    ! grep -q 'packets do not open with the key in .*wrong.key' two.log || break
+    ! grep -q 'packets cannot be decrypted with the key in .*wrong.key' two.log || break
     sleep 0.2
   done
-  grep -q 'packets do not open' two.log || fail "nothing was said: $(cat two.log)"
+  grep -q 'packets cannot be decrypted' two.log || fail "nothing was said: $(cat two.log)"
   [ ! -s two.rcnc ] || fail "a wrong key shows something"
 }
 

@@ -10,7 +10,7 @@ test_links_and_named_pages_exist () {
 
 # As they stand in README.md, but for a window, which a picture in memory replaces, and an end.
 test_launch_lines_of_the_readme_run () {
-  local line
+  local line depths
   need_gl
   awk '/^```/ { inside = !inside; next } inside' "$source_dir/README.md" | sed -e ':a' -e '/\\$/N; s/\\\n//; ta' | grep '^gst-launch-1.0 ' >lines
   [ "$(wc -l <lines)" = 4 ] || fail "expected four launch lines: $(cat lines)"
@@ -20,7 +20,16 @@ test_launch_lines_of_the_readme_run () {
     ! grep -q '^WARNING' launch.log || fail "$line: $(cat launch.log)"
   done <lines
   expect_file depth.webm 1000
-  expect_file cloud.ply 20000 # of the pictures that the line before makes
+  # The pictures that one line makes are the next one's input. 8 bits would leave 256 depths.
+  [ "$(head -c 26 depth.png | tail -c 2 | od -An -tu1 | tr -s ' ')" = " 16 0" ] || fail "depth.png is not a 16-bit greyscale PNG"
+  depths=$(python3 -c '
+import struct
+header, points = open("cloud.ply", "rb").read().split(b"end_header\n", 1)
+count = int(header.split(b"element vertex ")[1].split()[0])
+assert b"format binary_little_endian" in header and b"property float x\nproperty float y\nproperty float z\n" in header, header
+size = len(points) // count
+print(len({struct.unpack_from("<f", points, i * size + 8)[0] for i in range(count)}))')
+  [ "$depths" -gt 1000 ] || fail "only $depths different depths"
 }
 
 test_each_page_is_in_the_index () {

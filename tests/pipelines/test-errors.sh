@@ -115,11 +115,11 @@ test_an_empty_file_is_removed_and_nothing_else_is () {
 }
 
 test_folders_that_there_are_not_are_named () {
-  expect_error "record.sh: nowhere/new.rcnc: there is no folder 'nowhere'" "$pipelines/record.sh" nowhere/new.rcnc
+  expect_error "record.sh: nowhere/new.rcnc: directory 'nowhere' does not exist" "$pipelines/record.sh" nowhere/new.rcnc
   mkdir folder
-  expect_error "record.sh: folder: is a folder" "$pipelines/record.sh" folder
+  expect_error "record.sh: folder: is a directory" "$pipelines/record.sh" folder
   touch some.rcnc
-  expect_error "play.sh: nowhere/new.webm: there is no folder 'nowhere'" "$pipelines/play.sh" some.rcnc --film nowhere/new.webm
+  expect_error "play.sh: nowhere/new.webm: directory 'nowhere' does not exist" "$pipelines/play.sh" some.rcnc --film nowhere/new.webm
 }
 
 test_a_recording_from_a_port_that_is_taken_gives_one_cause () {
@@ -147,9 +147,9 @@ test_without_a_display_what_is_wrong_with_the_file_comes_first () {
   unset DISPLAY WAYLAND_DISPLAY
   echo "no recording" >bad.rcnc
   "$pipelines/record.sh" good.rcnc --frames 2 --size 160x120 --views 1
-  expect_error "'bad.rcnc' is no recording" "$pipelines/play.sh" bad.rcnc
-  expect_error "there is no display" "$pipelines/play.sh" good.rcnc
-  ! "$pipelines/play.sh" good.rcnc 2>&1 | grep 'no recording' || fail "it is one"
+  expect_error "'bad.rcnc' is not a recording" "$pipelines/play.sh" bad.rcnc
+  expect_error "no display" "$pipelines/play.sh" good.rcnc
+  ! "$pipelines/play.sh" good.rcnc 2>&1 | grep 'not a recording' || fail "it is one"
 }
 
 test_an_element_that_fails_without_a_word_ends_the_run () {
@@ -160,13 +160,16 @@ test_addresses_and_interfaces_that_there_are_not_are_named () {
   expect_error "239.255.7.300" "$pipelines/parent-host.sh" --views 1 --listen $((ports + 207)) --to 239.255.7.300:$((ports + 208))
   expect_error "239.255.7.999" "$pipelines/viewer-host.sh" --listen $((ports + 208)) --multicast 239.255.7.999
   expect_error "nosuch0" "$pipelines/viewer-host.sh" --listen $((ports + 208)) --multicast 239.255.7.1 --interface nosuch0
+  expect_error "--interface: no interface named 'nosuch0'" "$pipelines/record.sh" none.rcnc --listen $((ports + 208)) \
+    --multicast 239.255.7.1 --interface nosuch0
+  expect_error "--fec: takes no value on a receiver" "$pipelines/viewer-host.sh" --listen $((ports + 208)) --fec 20
 }
 
 test_ports_that_are_taken_twice_are_named () {
   local parent=("$pipelines/parent-host.sh" --views 4 --listen 5000 --to 127.0.0.1:6000)
-  expect_error "--feedback: port 5002 is that of view 2" "${parent[@]}" --feedback 5002
-  expect_error "--clock-port: port 5003 is that of view 3" "${parent[@]}" --clock-port 5003
-  expect_error "--feedback: port 5100 is that of --clock-port" "${parent[@]}" --clock-port 5100 --feedback 5100
+  expect_error "--feedback: port 5002 is used by view 2" "${parent[@]}" --feedback 5002
+  expect_error "--clock-port: port 5003 is used by view 3" "${parent[@]}" --clock-port 5003
+  expect_error "--feedback: port 5100 is used by --clock-port" "${parent[@]}" --clock-port 5100 --feedback 5100
 }
 
 test_a_comma_too_many_is_named () {
@@ -174,11 +177,10 @@ test_a_comma_too_many_is_named () {
   make_rig
   export RANGECAST_LAUNCH=echo
   for list in 127.0.0.1:6000, 127.0.0.1:6000,127.0.0.1:6001, 127.0.0.1:6000,,127.0.0.1:6001 ,127.0.0.1:6000 ,; do
-    expect_error "--to: expected HOST:PORT[,HOST:PORT...] and no comma more, got '$list'" "${parent[@]}" --to "$list"
-    expect_error "--to: expected HOST:PORT[,HOST:PORT...] and no comma more, got '$list'" "${camera[@]}" --to "$list"
+    expect_error "--to: expected HOST:PORT[,HOST:PORT...] without empty entries, got '$list'" "${parent[@]}" --to "$list"
+    expect_error "--to: expected HOST:PORT[,HOST:PORT...] without empty entries, got '$list'" "${camera[@]}" --to "$list"
   done
-  expect_error "--to: expected HOST:PORT" "${camera[@]}"
-  expect_error "--cameras: expected HOST:PORT[,HOST:PORT...] and no comma more" "${parent[@]}" --to 127.0.0.1:6000 --cameras 127.0.0.1:1,127.0.0.1:2,
+  expect_error "--cameras: expected HOST:PORT[,HOST:PORT...] without empty entries" "${parent[@]}" --to 127.0.0.1:6000 --cameras 127.0.0.1:1,127.0.0.1:2,
   expect_error "--cameras: expected 2 addresses" "${parent[@]}" --to 127.0.0.1:6000 --cameras 127.0.0.1:1
   expect_error "--input: expected cameras=LEFT,RIGHT" "${camera[@]}" --to 127.0.0.1:6000 --input cameras=a,b,
   "${parent[@]}" --to 127.0.0.1:6000,127.0.0.1:6001 --cameras 127.0.0.1:7000,127.0.0.1:7001 >parent.txt
@@ -213,9 +215,9 @@ test_udp_relay_names_what_is_missing () {
   expect_error "--between lo,lo: expected two interfaces" udp-relay --between lo,lo
   expect_error "--between lo: expected two interfaces" udp-relay --between lo
   expect_error "--listen 20400: expected --to HOST:PORT" udp-relay --listen 20400
-  expect_error "--to 127.0.0.1:5: expected after a --listen" udp-relay --to 127.0.0.1:5
+  expect_error "--to 127.0.0.1:5: expected after its --listen PORT" udp-relay --to 127.0.0.1:5
   expect_error "--listen and --between" udp-relay --listen 20400 --to 127.0.0.1:5 --between a,b
-  [ "$(id -u)" != 0 ] || expect_error "lo: is no cable" udp-relay --between lo,eth0
+  [ "$(id -u)" != 0 ] || expect_error "lo: is the loopback interface" udp-relay --between lo,eth0
 }
 
 test_recordings_that_there_are_are_kept () {
@@ -227,11 +229,60 @@ test_recordings_that_there_are_are_kept () {
   cmp good.rcnc~ before.rcnc || fail "it is gone: $(ls) $(cat record.log)"
   echo text >old.txt
   cp before.rcnc film.webm
-  expect_error "is no recording" "$pipelines/play.sh" old.txt --film film.webm
+  expect_error "is not a recording" "$pipelines/play.sh" old.txt --film film.webm
   cmp film.webm before.rcnc || fail "the film before is gone"
 }
 
+test_required_options_are_named () {
+  expect_error "camera-host.sh: --view is required" "$pipelines/camera-host.sh" --rig rig.yaml --to 127.0.0.1:1
+  expect_error "camera-host.sh: --to is required" "$pipelines/camera-host.sh" --view 0 --rig rig.yaml
+  expect_error "camera-host.sh: --rig is required" "$pipelines/camera-host.sh" --view 0 --to 127.0.0.1:1
+  expect_error "parent-host.sh: --views is required" "$pipelines/parent-host.sh" --listen 5000 --to 127.0.0.1:1
+  expect_error "parent-host.sh: --listen is required" "$pipelines/parent-host.sh" --views 1 --to 127.0.0.1:1
+  expect_error "parent-host.sh: --to is required" "$pipelines/parent-host.sh" --views 1 --listen 5000
+  expect_error "viewer-host.sh: --listen is required" "$pipelines/viewer-host.sh" --window
+  expect_error "record.sh: option --frames needs a value" "$pipelines/record.sh" none.rcnc --frames
+  expect_error "viewer-host.sh: option --feedback needs a value" "$pipelines/viewer-host.sh" --listen 5000 --feedback
+}
+
+test_ports_up_to_the_last_one_are_taken () {
+  local parent=("$pipelines/parent-host.sh" --views 2)
+  expect_error "--listen: expected a whole number from 1 to 65534, got '65535'" "${parent[@]}" --listen 65535 --to 127.0.0.1:1
+  expect_error "--to: expected a port from 1 to 65535, got 'localhost:70000'" "${parent[@]}" --listen 5000 --to localhost:70000
+  expect_error "--to: expected a port from 1 to 65535, got 'localhost:0'" "${parent[@]}" --listen 5000 --to localhost:0
+  RANGECAST_LAUNCH=echo "${parent[@]}" --listen 65534 --to 127.0.0.1:65535 >parent.txt
+  grep -q 'port=65535' parent.txt || fail "$(cat parent.txt)"
+}
+
+# A view of another number of views would be simulated at another place than the rig has it.
+test_simulated_views_are_those_of_the_rig () {
+  local format camera=("$pipelines/camera-host.sh" --view 1 --to 127.0.0.1:6000 --input range)
+  for format in yaml json; do
+    run avatartestsrc views=3 num-buffers=1 rig-export=three.$format ! fakesink
+    expect_error "--views is 2, but the rig 'three.$format' has 3 views" "${camera[@]}" --rig three.$format --views 2
+    RANGECAST_LAUNCH=echo "${camera[@]}" --rig three.$format >camera.txt
+    grep -q ' views=3 ' camera.txt || fail "$(cat camera.txt)"
+  done
+  echo "no rig" >bad.yaml
+  expect_error "bad.yaml" "$pipelines/camera-host.sh" --view 1 --to 127.0.0.1:6000 --rig bad.yaml
+}
+
+test_point_clouds_of_several_frame_sets_need_a_number () {
+  "$pipelines/record.sh" two.rcnc --frames 2 --size 160x120 --views 1
+  expect_error "'same.ply': the recording has more than one frame set; expected a name with a number, e.g. same-%05d.ply" \
+    "$pipelines/range-to-ply.sh" two.rcnc same.ply
+  [ ! -e same.ply ] || fail "a point cloud was written"
+  "$pipelines/record.sh" one.rcnc --frames 1 --size 160x120 --views 1
+  "$pipelines/range-to-ply.sh" one.rcnc one.ply
+  expect_file one.ply 1000
+  echo text >bad.rcnc
+  expect_error "No access unit found" "$pipelines/range-to-ply.sh" bad.rcnc bad.ply
+  expect_error "expected a name with a number" "$pipelines/rgbd-to-ply.sh" colour-%05d.jpg depth-%05d.png same.ply
+}
+
 test_scripts_name_the_bad_option () {
+  expect_error "--size: expected 16x16 to 4096x4096, got '1x1'" "$pipelines/record.sh" none.rcnc --size 1x1
+  expect_error "--size: expected 16x16 to 4096x4096, got '16384x16384'" "$pipelines/record.sh" none.rcnc --size 16384x16384
   expect_error "--listen: expected a whole number" "$pipelines/parent-host.sh" --views 1 --listen 08000 --to 127.0.0.1:1
   expect_error "--frames: expected a whole number" "$pipelines/record.sh" none.rcnc --frames 99999999999999999999
   expect_error "--key: expected a file" "$pipelines/record.sh" none.rcnc --listen $((ports + 203)) --key ''

@@ -73,5 +73,7 @@ test_parent_goes_on_without_a_killed_camera_and_takes_it_back () {
   wait_for_views all.rcnc '222.*0000' 30
   start_camera 1 $((ports + 120))
   wait_for_views all.rcnc '222.*0000.*222' 40
+  [ "$(grep -c '^WARNING: mux: pad sink_1 (view 1): nothing came for 2 s' parent.log)" = 1 ] || fail "$(cat parent.log)"
+  [ "$(grep -c '^mux: pad sink_1 (view 1) is back' parent.log)" = 1 ] || fail "$(cat parent.log)"
   stop_all "$recorder" "${camera[@]}" "$parent"
 }

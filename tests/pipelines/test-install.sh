@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# What `meson install` leaves is enough to build an application and to find the elements. What setup.sh and env.sh say.
+# What `meson install` leaves is enough to build an application and to find the elements.
 
 build=${RANGECAST_BUILD:-$source_dir/build}
 
@@ -100,76 +100,4 @@ test_programs_have_names_that_say_whose_they_are () {
     [ -x "$prefix/bin/$program" ] || fail "no $program in $(ls "$prefix/bin")"
   done
   [ ! -e "$prefix/bin/viewer" ] || fail "there is a program named viewer"
-}
-
-# A tree with setup.sh, and meson, ninja and dpkg-query in its place. ninja fails if $FAIL is set.
-make_tree () {
-  mkdir -p tree/bin
-  cp "$source_dir/setup.sh" tree
-  ln -s "$pipelines" tree/pipelines
-  printf '#!/bin/sh\nmkdir -p build\ntouch build/build.ninja\n' >tree/bin/meson
-  printf '#!/bin/sh\necho installed\n' >tree/bin/dpkg-query
-  cat >tree/bin/ninja <<'END'
-#!/bin/sh
-[ "$3" != demo ] || touch demo
-[ -z "$IDLE" ] || { echo "ninja: no work to do."; exit 0; }
-for i in 1 2 3; do echo "[$i/3] Compiling part$i.cpp"; done
-[ -z "$FAIL" ] || { echo "part3.cpp: error: no such thing"; exit 1; }
-END
-  chmod +x tree/bin/*
-  PATH=$PWD/tree/bin:$PATH
-}
-
-test_setup_says_that_it_builds () {
-  make_tree
-  tree/setup.sh --demo >setup.txt
-  grep -q "building.*build/setup.log" setup.txt || fail "$(cat setup.txt)"
-  ! grep -q "part1" setup.txt || fail "the compiler's output: $(cat setup.txt)"
-  grep -q "part3.cpp" tree/build/setup.log || fail "$(cat tree/build/setup.log)"
-  [ -e tree/demo ] || fail "not the target demo"
-  script -qec tree/setup.sh /dev/null >terminal.txt
-  grep -q "2 of 3" terminal.txt || fail "no progress in a terminal: $(cat terminal.txt)"
-  IDLE=1 tree/setup.sh >setup.txt
-  [ ! -s setup.txt ] || fail "nothing to build: $(cat setup.txt)"
-  FAIL=1 expect_error "part3.cpp: error: no such thing" tree/setup.sh
-  FAIL=1 expect_error "tree/build/setup.log" tree/setup.sh
-}
-
-test_demo_builds_no_more_than_it_needs () {
-  [ -f "$build/build.ninja" ] || skip "not a build folder"
-  ninja -C "$build" -t query demo >demo.txt
-  grep -q "codec/libgstneighbourcode.so" demo.txt || fail "$(cat demo.txt)"
-  grep -q "pipelines/rangecast-run" demo.txt || fail "$(cat demo.txt)"
-  ! grep -E "gst/camera|gst/calibration|tests/" demo.txt || fail "$(cat demo.txt)"
-}
-
-test_env_says_that_the_build_is_missing_or_incomplete () {
-  make_tree
-  local say="source tree/pipelines/env.sh" file
-  unset GST_PLUGIN_PATH
-  export GST_REGISTRY=$PWD/registry.bin
-  ! gst-inspect-1.0 --exists neighbourcodeenc || skip "an installed gst-rangecast"
-  bash -c "$say" 2>said.txt
-  [ "$(wc -l <said.txt)" = 1 ] && grep -q "neither built nor installed.*setup.sh" said.txt || fail "$(cat said.txt)"
-  mkdir -p tree/build/gst/codec
-  bash -c "$say" 2>said.txt
-  [ "$(wc -l <said.txt)" = 1 ] && grep -q "incomplete.*setup.sh" said.txt || fail "$(cat said.txt)"
-  for file in "$build"/gst/*/*.so "$build/pipelines/rangecast-run"; do
-    mkdir -p "$(dirname "tree/build/${file#"$build"}")"
-    ln -s "$file" "tree/build/${file#"$build"}"
-  done
-  bash -c "$say" 2>said.txt
-  [ ! -s said.txt ] || fail "a complete build: $(cat said.txt)"
-}
-
-test_python_example_says_what_it_needs () {
-  mkdir gi # a PyGObject without typelibs, then none
-  echo 'def require_version (name, version): raise ValueError ("Namespace %s not available" % name)' >gi/__init__.py
-  local text
-  for text in "Namespace Gst not available" "No module named"; do
-    PYTHONPATH=$PWD expect_error "$text" /usr/bin/python3 "$pipelines/examples/count-points.py" recording.rcnc
-    ! PYTHONPATH=$PWD /usr/bin/python3 "$pipelines/examples/count-points.py" recording.rcnc 2>said.txt || fail "no error"
-    [ "$(wc -l <said.txt)" = 1 ] && grep -q "setup.sh" said.txt || fail "$(cat said.txt)"
-    echo 'raise ModuleNotFoundError ("No module named gi")' >gi/__init__.py
-  done
 }

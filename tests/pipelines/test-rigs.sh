@@ -142,7 +142,7 @@ test_messages_begin_with_the_file () {
 test_lengths_that_are_hardly_metres_are_said () {
   opencv_pair -3.2
   rig-convert opencv intrinsics.yml extrinsics.yml rig.yaml --size 640x480 2>said.txt
-  grep -q "cameras stand 3.2 m apart" said.txt || fail "no warning: $(cat said.txt)"
+  grep -q "the baseline is 3.2 m" said.txt || fail "no warning: $(cat said.txt)"
   rig-convert opencv intrinsics.yml extrinsics.yml rig.yaml --size 640x480 --unit 0.025 2>said.txt
   [ ! -s said.txt ] || fail "$(cat said.txt)"
 }

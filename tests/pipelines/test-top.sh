@@ -89,8 +89,8 @@ test_messages_are_forwarded () {
 
 test_once_without_statistics_is_an_error_that_names_the_file () {
   printf 'neither JSON\nnor a message\n' >text.txt
-  expect_error "text.txt: no statistics in it" "$pipelines/top.sh" --once text.txt
-  expect_error "no statistics in it" "$pipelines/top.sh" --once - <text.txt
+  expect_error "text.txt: no statistics found" "$pipelines/top.sh" --once text.txt
+  expect_error "no statistics found" "$pipelines/top.sh" --once - <text.txt
 }
 
 test_times_that_are_none_are_refused () {

@@ -222,8 +222,8 @@ test_wrong_usage_is_named () {
   expect_error "expected one file" rangecast-viewer
   expect_error "nowhere.rcnc: no such file" rangecast-viewer nowhere.rcnc
   expect_error "is a folder" rangecast-viewer .
-  expect_error "is no ordinary file" rangecast-viewer /dev/null
-  expect_error "no plugin of GStreamer opens foo://" rangecast-viewer foo://bar
+  expect_error "is not a regular file" rangecast-viewer /dev/null
+  expect_error "no GStreamer plugin for foo://" rangecast-viewer foo://bar
   expect_error "--listen" rangecast-viewer --listen 99999
   expect_error "--size" rangecast-viewer --size 640 x.rcnc
   expect_error "--mode" rangecast-viewer --mode nice x.rcnc

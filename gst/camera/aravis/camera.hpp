@@ -114,7 +114,7 @@ public:
 
   /** Starts streaming; frame numbers begin at 0.
    *  @param arrived  a frame came, or was given up; in order of `number`
-   *  @param lost     at most once: the camera does not answer any more, or another program took
+   *  @param lost     at most once: the camera no longer responds, or another program took
    *  control. With GigE that takes up to 6 s; class Heartbeat is quicker. */
   CameraStatus start (Arrived arrived, Lost lost);
   /** No callback runs or comes after it. */

@@ -121,7 +121,7 @@ CameraControl::execute (const std::string &feature)
     return found;
   if (!ARV_IS_GC_COMMAND (node))
     return refuse (CameraFault::kBadSetting,
-        "feature '" + feature + "' is no command; give it a value: " + feature + "=...");
+        "feature '" + feature + "' is not a command; give it a value: " + feature + "=...");
   GError *error = nullptr;
   arv_device_execute_command (device (), feature.c_str (), &error);
   return status ("command " + feature, error);

@@ -195,7 +195,7 @@ open_by_id (const std::string &name, const std::string &id, ArvDevice *&device)
   else if (error)
     status = open_failed (name, error);
   else
-    status = {CameraFault::kNotFound, "camera '" + name + "' does not answer any more"};
+    status = {CameraFault::kNotFound, "camera '" + name + "' no longer responds"};
   g_clear_error (&error);
   if (!status.ok ())
     g_clear_object (&device);

@@ -39,8 +39,8 @@ inline std::string
 lost_text (const std::string &label)
 {
   return label +
-         ": the camera does not answer any more; expected it plugged in and powered, and no other "
-         "program to take control of it";
+         ": the camera no longer responds; check power and cable, and that no other program "
+         "controls it";
 }
 
 /** The result of a camera function: ok, or a fault and one sentence that names the camera and what

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <functional>
 #include <future>
@@ -10,22 +9,30 @@
 #include <utility>
 
 /** Runs functions that may have to wait for a camera that does not answer, one after the other in a
- *  thread of GLib's pool. They are finished also when this object is gone. If no thread can be
- *  started, the calling thread runs them. */
+ *  thread of their own. They are finished also when this object is gone. */
 class TeardownQueue {
 public:
-  TeardownQueue ()
-      : pool_ (g_thread_pool_new_full (run_task, nullptr, drop_task, 1, FALSE, nullptr))
+  TeardownQueue () : pool_ (g_thread_pool_new (run_task, nullptr, 1, TRUE, &error_)) {}
+  ~TeardownQueue ()
   {
+    g_thread_pool_free (pool_, FALSE, FALSE);
+    g_clear_error (&error_);
   }
-  /* Immediately if all are finished: without a thread, tasks that were run here are still queued.
-   */
-  ~TeardownQueue () { g_thread_pool_free (pool_, wait (std::chrono::milliseconds (0)), FALSE); }
   TeardownQueue (const TeardownQueue &) = delete;
   TeardownQueue &operator= (const TeardownQueue &) = delete;
 
+  /** Why the thread could not be started; nullptr if it was. Without it nothing may be run. */
+  [[nodiscard]] const GError *error () const { return error_; }
   /** @param wait_for_it  wait up to a second, unless an earlier function is still running */
-  void run (std::function<void ()> function, bool wait_for_it);
+  void run (std::function<void ()> function, bool wait_for_it)
+  {
+    wait_for_it = wait_for_it && wait (std::chrono::milliseconds (0));
+    auto task = std::make_unique<Task> (std::move (function));
+    done_ = task->done.get_future ();
+    g_thread_pool_push (pool_, task.release (), nullptr);
+    if (wait_for_it)
+      wait (std::chrono::seconds (1));
+  }
   /** @return false if the last function is still running after that time */
   bool wait (std::chrono::milliseconds limit)
   {
@@ -38,26 +45,17 @@ public:
 private:
   struct Task {
     explicit Task (std::function<void ()> f) : function (std::move (f)) {}
-    void run ()
-    {
-      if (started.exchange (true))
-        return;
-      auto once = std::move (function); /* the queue keeps the task, but not what it holds */
-      once ();
-    }
-
-    std::packaged_task<void ()> function;
-    std::atomic<bool> started = false;
+    std::function<void ()> function;
+    std::promise<void> done;
   };
-  using TaskPointer = std::shared_ptr<Task>;
-
-  static void run_task (gpointer task, gpointer)
+  static void run_task (gpointer data, gpointer)
   {
-    (*static_cast<TaskPointer *> (task))->run ();
-    drop_task (task);
+    const std::unique_ptr<Task> task (static_cast<Task *> (data));
+    std::exchange (task->function, {}) (); /* releases what it holds before it counts as done */
+    task->done.set_value ();
   }
-  static void drop_task (gpointer task) { delete static_cast<TaskPointer *> (task); }
 
-  GThreadPool *pool_;
+  GError *error_ = nullptr;
+  GThreadPool *pool_; /* exclusive: its thread starts with it */
   std::future<void> done_;
 };

@@ -147,14 +147,14 @@ ViewAgreement::evaluate_views (std::span<const RangeImage> images)
   std::uint64_t trusted = all;
   for (;;) {
     std::uint64_t rest_of_best = 0;
-    double least = std::numeric_limits<double>::max ();
+    double min = std::numeric_limits<double>::max ();
     for (std::uint64_t rest = trusted; rest; rest &= rest - 1) {
       const int id = std::countr_zero (rest);
       if (!contradicts (agreement_among (id, trusted), of_[static_cast<std::size_t> (id)].left_out))
         continue;
       const std::uint64_t others = trusted & ~(std::uint64_t{1} << id);
-      if (const double left = contradictions_of (others); left < least && has_good_pair (others))
-        least = left, rest_of_best = others;
+      if (const double left = contradictions_of (others); left < min && has_good_pair (others))
+        min = left, rest_of_best = others;
     }
     if (!rest_of_best)
       break;

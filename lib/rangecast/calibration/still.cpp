@@ -5,13 +5,13 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "../roi/opencv_image.hpp"
+#include "../opencv/image.hpp"
 
 namespace rangecast {
 namespace {
 
 constexpr int kMaxInARow = 4;
-constexpr double kMaxTileHeight = 2, kMinTileHeight = 0.01; /* share of the width */
+constexpr double kMaxTileAspect = 2, kMinTileAspect = 0.01; /* height / width */
 
 /* Hue rotates from row to row. */
 cv::Scalar
@@ -61,16 +61,16 @@ lay_out (std::span<const CalibrationCamera> cameras, int tile_width)
   const int count = int (cameras.size ());
   layout.columns = std::min (count, kMaxInARow);
   layout.rows = count ? (count + layout.columns - 1) / layout.columns : 0;
-  double tallest = 0; /* share of the width */
+  double aspect = 0; /* height / width, of the tallest */
   for (const CalibrationCamera &camera : cameras)
     if (camera.width > 0)
-      tallest = std::max (tallest, double (camera.height) / camera.width);
-  tallest = std::min (tallest, kMaxTileHeight);
+      aspect = std::max (aspect, double (camera.height) / camera.width);
+  aspect = std::min (aspect, kMaxTileAspect);
   const double widest =
       std::sqrt (double (kMaxStillPixels) /
-                 (std::max (1, layout.columns * layout.rows) * std::max (tallest, kMinTileHeight)));
+                 (std::max (1, layout.columns * layout.rows) * std::max (aspect, kMinTileAspect)));
   layout.tile_width = std::max (2, std::min (tile_width, int (widest)) & ~1);
-  layout.tile_height = std::max (2, (int (std::lround (layout.tile_width * tallest)) + 1) & ~1);
+  layout.tile_height = std::max (2, (int (std::lround (layout.tile_width * aspect)) + 1) & ~1);
   return layout;
 }
 

@@ -17,8 +17,8 @@ enum class DepthScale : std::uint8_t {
 };
 
 /** Depth to codes of `bits` bits and back; near is code 0 and far the greatest, on either scale.
- *  Formulas: docs/formats/bitstream.md, "Quantisation". At most one code for each depth
- *  unit is used, which is lossless. On the inverse scale several codes may have one depth: code()
+ *  Formulas: docs/formats/bitstream.md, "Quantisation". There are no more codes
+ *  than lossless quantisation needs. On the inverse scale several codes may have one depth: code()
  *  returns the lowest of them, decoders accept all. Tables: 128 KiB and up to 128 KiB more. */
 class DepthQuantiser {
 public:

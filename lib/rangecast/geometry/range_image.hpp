@@ -21,7 +21,7 @@ inline constexpr int kMaxViews = 64;
 /** Maximum width and height of images in a rig, a range image or a bitstream, pixels. */
 inline constexpr int kMaxImageSide = 16384;
 /** Views times the widest times the tallest of a rig, pixels: 64 views of 1920x1080 are just below.
- *  A frame set has room for that much, so this bounds the memory that untrusted data can get. */
+ *  A frame set has room for that much, which limits the memory that untrusted data can allocate. */
 inline constexpr std::int64_t kMaxRigPixels = std::int64_t{1} << 27;
 
 /** Depth and colour of one view at one capture time, cut to the ROI. Both planes have the ROI's

@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "../geometry/point_cloud.hpp"
-#include "../roi/opencv_image.hpp"
+#include "../opencv/image.hpp"
 
 namespace rangecast {
 namespace {

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "../base/simd.hpp"
-#include "../roi/opencv_image.hpp"
+#include "../opencv/image.hpp"
 #include "histogram_range.hpp"
 
 namespace rangecast {

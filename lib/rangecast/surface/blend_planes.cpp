@@ -168,8 +168,8 @@ private:
         sweep (x, y, 1);
   }
 
-  /* Replaces pixels that the code copied by means of those within its threshold around them, along
-   * rows, then along columns. */
+  /* Replaces copied pixels by the mean of the surrounding pixels within the code's threshold,
+   * first along rows, then along columns. */
   void smooth_copies ()
   {
     bool any = false;

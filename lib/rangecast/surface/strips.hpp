@@ -110,7 +110,7 @@ struct BlendVertex {
   std::int16_t x, y;    ///< quarters of a pixel; (0, 0) is the centre of the ROI's first pixel
   std::uint16_t depth;  ///< depth units
   std::uint16_t unused; ///< 0
-  Rgbx colour;          ///< x is the square root of the weight, 255 = 1; 0: the least possible
+  Rgbx colour;          ///< x is the square root of the weight, 255 = 1; 0: the minimum weight
 };
 
 /** Makes vertices of those that build_strips() made in mode kBlend.

@@ -283,7 +283,7 @@ GST_START_TEST (test_refused_features_name_feature_value_and_range)
       {"Gama=1", "has no feature 'Gama'"},
       {"SensorWidth=100", "feature 'SensorWidth' can only be read"},
       {"AcquisitionStart=1", "is a command and takes no value"},
-      {"GainRaw", "is no command; give it a value"},
+      {"GainRaw", "is not a command; give it a value"},
       {"GainRaw=1 =", "features: expected a feature's name"},
       {"PixelFormat=Mono16", "Mono16 are not supported"},
   };

@@ -296,7 +296,7 @@ GST_START_TEST (test_vanished_camera_is_told_once_and_is_no_hang)
   (void)listener.next_complete ();
   fake.unplug ();
   const CameraStatus status = listener.wait_for_loss ();
-  assert_refused (status, CameraFault::kLost, "does not answer any more");
+  assert_refused (status, CameraFault::kLost, "no longer responds");
   assert_refused (status, CameraFault::kLost, "camera '127.0.0.1'");
   fail_unless (camera->is_lost ());
   assert_refused (camera->trigger_software (), CameraFault::kLost, "lost");

@@ -8,6 +8,7 @@
 #include "simulators/gige-camera.hpp"
 #include "simulators/gige-description.hpp"
 #include "simulators/gige-listener.hpp"
+#include "simulators/scene-pictures.hpp"
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -389,6 +390,29 @@ GST_START_TEST (test_address_of_another_machine_is_refused)
 }
 GST_END_TEST;
 
+/* So that a background can be learnt from pictures at a lower rate than that of the scene, too. */
+GST_START_TEST (test_empty_phase_lasts_for_its_frame_periods_and_pictures)
+{
+  const struct {
+    std::int64_t period_ns;
+    int empty;
+  } cases[] = {{kPeriodNs, 5}, {3 * kPeriodNs, 5}, {kPeriodNs / 2, 10}};
+  EmptyPhase phase (kPeriodNs, 5);
+  for (const auto &c : cases) {
+    phase.camera_starts ();
+    phase.camera_starts ();
+    for (int i = 0; i < 20; i++)
+      for (int camera = 0; camera < 2; camera++)
+        fail_unless_equals_int (phase.at (i * c.period_ns), i < c.empty);
+    phase.camera_stops ();
+    phase.camera_stops ();
+  }
+  EmptyPhase none (kPeriodNs, 0);
+  none.camera_starts ();
+  fail_if (none.at (0));
+}
+GST_END_TEST;
+
 static Suite *
 fakecameras_suite ()
 {
@@ -409,6 +433,7 @@ fakecameras_suite ()
   tcase_add_test (tc, test_nonsense_does_no_harm);
   tcase_add_test (tc, test_absurd_region_gives_no_picture);
   tcase_add_test (tc, test_address_of_another_machine_is_refused);
+  tcase_add_test (tc, test_empty_phase_lasts_for_its_frame_periods_and_pictures);
   return s;
 }
 

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
+
 #include "parse-check.hpp"
 
 using namespace rangecast;
@@ -90,15 +92,15 @@ GST_START_TEST (test_stream_that_ends_within_an_access_unit_is_one_warning)
   const gsize begin = recording.offsets[9];
   fail_unless_equals_int (warnings_of_stream (bytes).size (), 0);
   fail_unless_equals_int (warnings_of_stream (bytes.first (begin)).size (), 0);
-  for (gsize got : {gsize{1}, gsize{4}, gsize{27}, gsize{28}, gsize{29},
-           bytes.size () - begin - 500, bytes.size () - begin - 1}) {
+  for (gsize got : {gsize{4}, gsize{27}, gsize{28}, gsize{29}, bytes.size () - begin - 500,
+           bytes.size () - begin - 1}) {
     const auto texts = warnings_of_stream (bytes.first (begin + got));
-    const bool header = got < kStartCode.size () + kAccessUnitHeaderSize;
-    const std::string expected = "The stream ends at byte " + std::to_string (begin + got) +
-                                 ", within the access unit " + (header ? "header " : "") +
-                                 "at byte " + std::to_string (begin) + ": expected " +
-                                 std::to_string (header ? 28 : bytes.size () - begin) +
-                                 " bytes, got " + std::to_string (got);
+    const bool header = got < kStreamPrefixSize;
+    const std::string expected =
+        "The stream ends at byte " + std::to_string (begin + got) + ", within the access unit " +
+        (header ? "header " : "") + "at byte " + std::to_string (begin) + ": expected " +
+        std::to_string (header ? kStreamPrefixSize : bytes.size () - begin) + " bytes, got " +
+        std::to_string (got);
     fail_unless_equals_int (texts.size (), 1);
     fail_unless (texts[0] == expected, "%s", texts[0].c_str ());
   }

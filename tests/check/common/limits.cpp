@@ -117,6 +117,44 @@ GST_START_TEST (test_rig_of_more_than_2_27_pixels_is_one_error_of_its_caps)
 }
 GST_END_TEST;
 
+/* A source sends refused caps again with each buffer, and with EOS after its own error. */
+GST_START_TEST (test_caps_without_a_rig_are_one_error)
+{
+  for (const std::string name : {"roiextract", "cylinderfilter", "neighbourcodeenc", "plyenc",
+           "rangesplit", "rangedemux", "striprender"}) {
+    const std::string launch =
+        "fakesrc num-buffers=3 sizetype=fixed sizemax=100 ! video/x-range,format=Z16_RGBx,views=1,"
+        "width=320,height=240,framerate=15/1 ! " +
+        name + " name=refuses ! fakesink";
+    GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
+    GstBus *bus = gst_element_get_bus (pipeline);
+    for (int run = 0; run < 2; run++) { /* started again, it says so again */
+      int errors = 0;
+      gst_element_set_state (pipeline, GST_STATE_PLAYING);
+      for (bool source_failed = false; !source_failed;) {
+        GstMessage *message = gst_bus_timed_pop_filtered (bus, 30 * GST_SECOND, GST_MESSAGE_ERROR);
+        fail_unless (message != nullptr, "%s", name.c_str ());
+        source_failed = g_str_has_prefix (GST_OBJECT_NAME (message->src), "fakesrc");
+        errors += !source_failed;
+        gst_message_unref (message);
+      }
+      gst_element_set_state (pipeline, GST_STATE_READY); /* after EOS */
+      while (GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR)) {
+        GError *error = nullptr;
+        gst_message_parse_error (message, &error, nullptr);
+        errors += strstr (error->message, "no field \"rig\"") != nullptr;
+        g_error_free (error);
+        gst_message_unref (message);
+      }
+      fail_unless_equals_int (errors, 1);
+    }
+    gst_element_set_state (pipeline, GST_STATE_NULL);
+    gst_object_unref (bus);
+    gst_object_unref (pipeline);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_rig_file_beyond_4_MiB_is_refused_unread)
 {
   gchar *path = nullptr;
@@ -371,6 +409,7 @@ limits_suite ()
   tcase_add_test (tc, test_image_side_of_16385_is_refused);
   tcase_add_test (tc, test_name_of_256_bytes_is_refused);
   tcase_add_test (tc, test_rig_of_more_than_2_27_pixels_is_one_error_of_its_caps);
+  tcase_add_test (tc, test_caps_without_a_rig_are_one_error);
   tcase_add_test (tc, test_rig_file_beyond_4_MiB_is_refused_unread);
   tcase_add_test (tc, test_caps_beyond_the_templates_are_not_accepted);
   tcase_add_test (tc, test_slices_beyond_131072_are_left_out_and_counted);

@@ -362,7 +362,7 @@ GST_START_TEST (test_packets_that_are_not_sound_are_told_once_with_how_many)
   send (50); /* 2.5 s */
   fail_unless_equals_int (guard.warnings ("--key"), 0);
   send (50);
-  fail_unless_equals_int (guard.warnings ("60 packets arrived and none is valid"), 1);
+  fail_unless_equals_int (guard.warnings ("60 invalid packets and no valid one"), 1);
   send (500);
   fail_unless_equals_int (guard.warnings ("--key"), 0);
   guard.send_many (good, 10);

@@ -82,7 +82,7 @@ TEST (FrameThinning, never_fewer_than_the_least_frame_rate)
   FrameThinning thinning;
   kept (thinning, 0, 60, 1e3, 1e6, 5);
   EXPECT_EQ (kept (thinning, 60, 300, 1e3, 1e6, 5).size (), 50u);
-  EXPECT_EQ (kept (thinning, 360, 30, 1e3, 1e6, 30).size (), 30u) << "a new least rate";
+  EXPECT_EQ (kept (thinning, 360, 30, 1e3, 1e6, 30).size (), 30u) << "a new minimum rate";
 }
 
 TEST (FrameThinning, lost_frame_sets_cost_no_others)

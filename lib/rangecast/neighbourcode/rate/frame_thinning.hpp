@@ -11,7 +11,7 @@ struct ThinningInput {
   std::uint64_t interval_ns = 0; ///< between frame sets, from the caps
   double bits_per_s = 0;         ///< available rate; 0: no limit
   double min_bits = 0;           ///< size of a frame set at the worst quality; 0: unknown
-  double min_fps = 1;            ///< frame sets per second to keep at least
+  double min_fps = 1;            ///< minimum number of frame sets per second to keep
 };
 
 /** Drops whole frame sets when the worst quality still exceeds the rate: one of n is kept, evenly.

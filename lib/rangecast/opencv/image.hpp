@@ -7,8 +7,7 @@
 
 namespace rangecast {
 
-/** The pixels of a colour image as a CV_8UC4 matrix that shares them: to be written only if
- *  they may be. */
+/** Wraps a colour image as CV_8UC4 without copying; write only if the image is writable. */
 inline cv::Mat
 opencv_image (ImageView<const Rgbx> image)
 {
