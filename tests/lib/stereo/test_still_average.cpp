@@ -2,6 +2,7 @@
 #include "../test-support.hpp"
 
 #include <opencv2/imgproc.hpp>
+#include <rangecast/base/cpu.hpp>
 #include <rangecast/stereo/still_average.hpp>
 
 using namespace rangecast;
@@ -112,4 +113,33 @@ TEST (StillAverage, picture_of_another_size_starts_over)
     (void)still.add (shot (truth, random));
   const cv::Mat smaller = shot (truth (cv::Rect (0, 0, 40, 30)).clone (), random);
   EXPECT_EQ (cv::norm (still.add (smaller), smaller, cv::NORM_INF), 0);
+}
+
+TEST (StillAverage, outside_of_the_part_the_mean_stays)
+{
+  StillAverage still;
+  still.set (10);
+  cv::RNG random (1);
+  const cv::Mat truth = scene ();
+  const cv::Mat first = still.add (shot (truth, random)).clone ();
+  const cv::Rect part (40, 24, 32, 16); /* whole blocks */
+  const cv::Mat second = still.add (shot (truth, random), part);
+  EXPECT_GT (cv::norm (second (part), first (part), cv::NORM_INF), 0);
+  cv::Mat rest = second.clone ();
+  first (part).copyTo (rest (part));
+  EXPECT_EQ (cv::norm (rest, first, cv::NORM_INF), 0);
+}
+
+TEST (StillAverage, rungs_agree)
+{
+  cv::Mat means[2];
+  for (CpuLevel level : {CpuLevel::kScalar, CpuLevel::kAvx2}) {
+    limit_cpu (level);
+    StillAverage still;
+    still.set (10);
+    cv::RNG random (1);
+    for (int i = 0; i < 5; i++)
+      still.add (shot (scene (), random)).copyTo (means[int (level)]);
+  }
+  EXPECT_EQ (cv::norm (means[0], means[1], cv::NORM_INF), 0);
 }
