@@ -45,8 +45,8 @@ public:
       return kNone;
     return ~row (line)[column];
   }
-  /** Pixels of a row from column x on; kNone outside the ROI. */
-  void fetch (int x, int y, std::span<std::uint64_t> to) const;
+  /** Pixels of a row from column x on; `outside` outside the ROI. */
+  void fetch (int x, int y, std::span<std::uint64_t> to, std::uint64_t outside = kNone) const;
 
 private:
   struct Free {

@@ -81,6 +81,10 @@ clamped (Components c, Components min, Components max)
  *  other pixel has it, because Y is not negative. */
 inline constexpr PixelCode kNoPixel = ReferencePlane::kNone;
 
+/** An invalid pixel of an earlier frame set, as a ReferencePlane holds it. Unlike kNoPixel, a
+ * reader knows that there is none. */
+inline constexpr PixelCode kEmptyPixel = kNoPixel ^ 1 << 16;
+
 /** Magnitudes of a residual's components, at most 9 each, one a byte from the least significant; 0
  *  for copies. */
 using Activity = std::uint32_t;

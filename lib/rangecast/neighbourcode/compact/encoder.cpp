@@ -137,7 +137,7 @@ CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand
   const int first_y = roi.y + y, band_y = roi.y + band.first_row, end_y = band_y + band.rows;
   const int height = std::min ((first_y / kMotionBlock + 1) * kMotionBlock, end_y) - first_y;
   const MotionSearch::Pictures pictures = {
-      image, quantisers_->depth, quantisers_->colour, *reference_.before, limits_};
+      image, quantisers_->depth, quantisers_->colour, *reference_.before, scale_};
   BlockMotion near_by[2];                   /* to the left, above */
   if (header_.first_column >= kMotionBlock) /* another partition's, of the last frame set */
     near_by[0] = motion_memory_->before (first_x - kMotionBlock, first_y);
@@ -158,8 +158,8 @@ CompactEncoder::load_earlier (int y, const RowBand &band)
   const auto columns = static_cast<std::size_t> (columns_);
   const Roi &roi = header_.roi;
   const int band_y = roi.y + band.first_row;
-  fetch_displaced (*reference_.before, roi.x + header_.first_column, roi.y + y, motions_,
-      limits_.max[0], band_y, band_y + band.rows, std::span (earlier_codes_).first (columns));
+  fetch_displaced (*reference_.before, roi.x + header_.first_column, roi.y + y, motions_, scale_,
+      band_y, band_y + band.rows, std::span (earlier_codes_).first (columns));
   std::uint8_t *const earlier = row_.earlier ().data ();
   const std::uint8_t *const valid = row_.valid ().data ();
   for (std::size_t x = 0; x < columns; x++) {
@@ -500,7 +500,7 @@ CompactEncoder::code_rows (
     }
     if (reference_.now)
       reference_.now->keep (header_.roi.x + header_.first_column, header_.roi.y + y,
-          {row_.codes (), static_cast<std::size_t> (columns_)});
+          row_.as_reference (static_cast<std::size_t> (columns_)));
     header_.rows++;
     std::swap (row_, upper_);
   }
@@ -537,6 +537,7 @@ CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &ba
   reciprocals_ = 1.0f / __builtin_convertvector(steps_, FloatComponents);
   limits_ =
       PixelLimits (quantisers_->depth.codes () - 1, (1 << quantisers_->colour.bits ()) - 1, steps_);
+  scale_ = MotionScale (steps_[0], limits_.max[0]);
   orders_ = {};
   size_sums_ = size_counts_ = Components{};
   const ConstRangeImage &image = picture.image;

@@ -92,6 +92,7 @@ private:
   Components steps_{}, half_steps_{};
   FloatComponents reciprocals_{};
   PixelLimits limits_;
+  MotionScale scale_;
   PixelKey bias_ = 0, earlier_bias_ = 0; /* of the thresholds */
   Components earlier_threshold_{};
   CodingReference reference_;

@@ -18,8 +18,8 @@ inline constexpr int kNonZero = kPredicted + 25;          /* 12 for each compone
 inline constexpr int kSize = kNonZero + kComponents * 12; /* 2 x 16 for each component */
 inline constexpr int kEarlier = kSize + kComponents * 2 * 16;
 inline constexpr int kMotion = kEarlier + 36;     /* whether it equals the expected motion */
-inline constexpr int kMotionNumber = kMotion + 1; /* 1 + 16 for each of dx, dy, dz */
-inline constexpr int kCount = kMotionNumber + 3 * 17;
+inline constexpr int kMotionNumber = kMotion + 1; /* 1 + 16 for each of dx, dy, dz and slopes */
+inline constexpr int kCount = kMotionNumber + 5 * 17;
 } // namespace context
 
 using EntropyModel = std::array<Probability, context::kCount>;
@@ -60,11 +60,14 @@ public:
       m = expected;
       return true;
     }
-    std::int32_t rest[] = {m.dx - expected.dx, m.dy - expected.dy, m.dz - expected.dz};
-    for (int i = 0; i < 3; i++)
-      if (const int at = context::kMotionNumber + 17 * i; !number (at, at + 1, rest[i]))
+    int at = context::kMotionNumber;
+    for (const auto member : kMotionMembers) {
+      std::int32_t rest = m.*member - expected.*member;
+      if (!number (at, at + 1, rest))
         return false;
-    m = {expected.dx + rest[0], expected.dy + rest[1], expected.dz + rest[2]};
+      m.*member = expected.*member + rest;
+      at += 17;
+    }
     return true;
   }
 

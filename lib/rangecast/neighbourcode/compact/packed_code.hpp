@@ -17,7 +17,7 @@ inline constexpr int kMaxGolombPrefix = 18;
 /** Bits of the greatest number that such a code holds. */
 inline constexpr int kMaxGolombBits = 20;
 /** Golomb orders of run ends and of depth motion. */
-inline constexpr int kRunOrder = 1, kMotionDepthOrder = 3;
+inline constexpr int kRunOrder = 1, kMotionOrder = 1;
 
 /** Lengths of the codes in bits, 0 = no code. Part of the format. */
 extern const std::array<std::array<std::uint8_t, kChoices>, kPackedContexts> kChoiceLengths;
@@ -123,9 +123,8 @@ public:
     put (m == expected, 1);
     if (m == expected)
       return;
-    golomb (zigzag (m.dx - expected.dx), 0);
-    golomb (zigzag (m.dy - expected.dy), 0);
-    golomb (zigzag (m.dz - expected.dz), kMotionDepthOrder);
+    for (const auto member : kMotionMembers)
+      golomb (zigzag (m.*member - expected.*member), kMotionOrder);
   }
   template <bool Delta> [[gnu::always_inline]] void choice (const Neighbours &n, int chosen)
   {
@@ -245,10 +244,12 @@ public:
     m = expected;
     if (take (1))
       return true;
-    std::uint32_t x = 0, y = 0, z = 0;
-    if (!golomb (0, x) || !golomb (0, y) || !golomb (kMotionDepthOrder, z))
-      return false;
-    m = {m.dx + unzigzag (x), m.dy + unzigzag (y), m.dz + unzigzag (z)};
+    for (const auto member : kMotionMembers) {
+      std::uint32_t rest = 0;
+      if (!golomb (kMotionOrder, rest))
+        return false;
+      m.*member += unzigzag (rest);
+    }
     return true;
   }
   /** A PixelChoice, or kNoSymbol for damage. */

@@ -43,8 +43,17 @@ public:
   /** One byte a pixel, not 0 = equals a pixel of an earlier frame set. */
   [[nodiscard]] std::vector<std::uint8_t> &earlier () { return earlier_; }
 
+  /** The pixels as later frame sets refer to them. */
+  [[nodiscard]] std::span<const PixelCode> as_reference (std::size_t columns)
+  {
+    reference_.resize (columns);
+    for (std::size_t x = 0; x < columns; x++)
+      reference_[x] = states ()[x] != 0 ? codes ()[x] : kEmptyPixel;
+    return reference_;
+  }
+
 private:
-  std::vector<PixelCode> codes_;
+  std::vector<PixelCode> codes_, reference_;
   std::vector<PixelState> states_;
   std::vector<std::uint64_t> shown_;
   std::vector<std::uint8_t> valid_, earlier_;
