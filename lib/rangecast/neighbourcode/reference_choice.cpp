@@ -14,6 +14,17 @@ constexpr int kLongestWait = 32;
  * thresholds ask, and would be smaller otherwise. */
 constexpr double kDoubt = 0.85;
 
+/* Slices may cross bands that touch and are coded alike. */
+void
+append (const RowBand &band, std::vector<RowBand> &to)
+{
+  if (!to.empty () && to.back ().first_row + to.back ().rows == band.first_row &&
+      to.back ().key == band.key)
+    to.back ().rows += band.rows;
+  else
+    to.push_back (band);
+}
+
 } // namespace
 
 void
@@ -34,13 +45,9 @@ ReferenceChoice::sort (std::span<const RowBand> bands, std::vector<RowBand> &fin
       has_tried = has_tried || known.state != State::kUnknown;
       both.push_back (band);
     } else if (known.state != State::kPaysNot) {
-      fine.push_back (band);
-    } else if (!coarse.empty () &&
-               coarse.back ().first_row + coarse.back ().rows == band.first_row) {
-      coarse.back ().rows += band.rows;
+      append (band, fine);
     } else {
-      coarse.push_back (band);
-      coarse.back ().key = true;
+      append ({band.first_row, band.rows, true, band.index}, coarse);
     }
   }
 }

@@ -9,8 +9,9 @@ namespace rangecast {
 void
 RefreshSchedule::reset (int view_height, int view_id)
 {
-  constexpr int kMin = 64, kBands = 4;
-  band_rows_ = std::max (kMin, (view_height + kBands - 1) / kBands);
+  constexpr int kMin = 64, kBands = 4, kMultiple = 16;
+  const int quarter = (view_height + kBands - 1) / kBands;
+  band_rows_ = std::max (kMin, (quarter + kMultiple - 1) / kMultiple * kMultiple);
   age_ns_.assign (static_cast<std::size_t> ((view_height + band_rows_ - 1) / band_rows_), 0);
   last_time_ns_ = 0;
   view_id_ = view_id;

@@ -17,9 +17,9 @@ struct RowBand {
 };
 
 /** Rolling intra refresh of one view. Its full image is cut into bands of rows; each is coded
- *  without reference to earlier frame sets at least once in a period, one after the other. Slices
- *  do not cross bands, so the damage of a lost packet is repaired when its band is refreshed: after
- *  a period at most, plus a frame interval if intervals grow. */
+ *  without reference to earlier frame sets at least once in a period, one after the other. Pixels
+ *  refer to pixels of their own band only, so the damage of a lost packet is repaired when its band
+ * is refreshed: after a period at most, plus a frame interval if intervals grow. */
 class RefreshSchedule {
 public:
   struct Time {
@@ -28,7 +28,8 @@ public:
     std::uint64_t period_ns;   ///< 0: no refresh
   };
 
-  /** Rows of a band: a quarter of the image, but not so few that slices become small. */
+  /** Rows of a band: about a quarter of the image, whole blocks of motion, and not so few that
+   * slices become small. */
   [[nodiscard]] int band_rows () const { return band_rows_; }
   /** Bands of the image. */
   [[nodiscard]] std::size_t bands () const { return age_ns_.size (); }

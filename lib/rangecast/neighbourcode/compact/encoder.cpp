@@ -134,8 +134,9 @@ CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand
 {
   const Roi &roi = header_.roi;
   const int first_x = roi.x + header_.first_column, end_x = first_x + columns_;
-  const int first_y = roi.y + y, band_y = roi.y + band.first_row, end_y = band_y + band.rows;
-  const int height = std::min ((first_y / kMotionBlock + 1) * kMotionBlock, end_y) - first_y;
+  const int first_y = roi.y + y, band_y = first_y / refresh_rows_ * refresh_rows_;
+  const int block_end = (first_y / kMotionBlock + 1) * kMotionBlock;
+  const int height = std::min (block_end, roi.y + band.first_row + band.rows) - first_y;
   const MotionSearch::Pictures pictures = {
       image, quantisers_->depth, quantisers_->colour, *reference_.before, scale_};
   BlockMotion near_by[2];                   /* to the left, above */
@@ -146,20 +147,20 @@ CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand
     const int next = std::min ((x / kMotionBlock + 1) * kMotionBlock, end_x);
     near_by[1] = motions_[i];
     motions_[i] = search_.find (pictures, earlier_threshold_,
-        {x, first_y, next - x, height, band_y, end_y}, near_by, *motion_memory_);
+        {x, first_y, next - x, height, band_y, band_y + refresh_rows_}, near_by, *motion_memory_);
     near_by[0] = motions_[i];
   }
 }
 
 /* Finds the pixels that are within the thresholds of those of the earlier frame set. */
 void
-CompactEncoder::load_earlier (int y, const RowBand &band)
+CompactEncoder::load_earlier (int y)
 {
   const auto columns = static_cast<std::size_t> (columns_);
   const Roi &roi = header_.roi;
-  const int band_y = roi.y + band.first_row;
-  fetch_displaced (*reference_.before, roi.x + header_.first_column, roi.y + y, motions_, scale_,
-      band_y, band_y + band.rows, std::span (earlier_codes_).first (columns));
+  const int full_y = roi.y + y, band_y = full_y / refresh_rows_ * refresh_rows_;
+  fetch_displaced (*reference_.before, roi.x + header_.first_column, full_y, motions_, scale_,
+      band_y, band_y + refresh_rows_, std::span (earlier_codes_).first (columns));
   std::uint8_t *const earlier = row_.earlier ().data ();
   const std::uint8_t *const valid = row_.valid ().data ();
   for (std::size_t x = 0; x < columns; x++) {
@@ -481,7 +482,7 @@ CompactEncoder::code_rows (
     if constexpr (Delta) {
       if (y == band.first_row || (header_.roi.y + y) % kMotionBlock == 0)
         find_motions (image, y, band);
-      load_earlier (y, band);
+      load_earlier (y);
     }
     const EncoderResult result = result_;
     const Components sums = size_sums_, counts = size_counts_;
@@ -515,6 +516,7 @@ CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &ba
   reference_ = picture.reference;
   quantisers_ = &picture.quantisers;
   motion_memory_ = &picture.motions;
+  refresh_rows_ = picture.refresh_rows;
   header_ = header;
   result_ = {};
   const auto bias = [] (int depth, int colour) {

@@ -40,6 +40,7 @@ struct CompactPicture {
   CompactQuantisers quantisers;
   CompactSettings settings;
   MotionMemory &motions; ///< of the view
+  int refresh_rows;      ///< of the bands of its full image that refer to their own pixels only
 };
 
 /** Codes partitions of range images in the profiles packed and entropy, each independently of those
@@ -78,7 +79,7 @@ private:
   [[nodiscard, gnu::always_inline]] FullPixel make_full (PixelKey own, const Neighbours &n) const;
   [[gnu::always_inline]] void load_row (const ConstRangeImage &image, int y);
   [[gnu::always_inline]] void find_upper (std::size_t begin, std::size_t end);
-  void load_earlier (int y, const RowBand &band);
+  void load_earlier (int y);
   void find_motions (const ConstRangeImage &image, int y, const RowBand &band);
   void resize (int columns);
   [[nodiscard]] std::size_t header_size () const;
@@ -106,6 +107,7 @@ private:
   std::vector<BlockMotion> motions_; /* of the blocks that the row touches */
   MotionSearch search_;
   PixelCode last_ = kNoPixel;
+  int refresh_rows_ = 1;
   int columns_ = 0;
   std::vector<int> runs_; /* ends of the row's runs */
   EntropyModel model_{};
