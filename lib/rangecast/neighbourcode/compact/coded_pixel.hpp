@@ -38,6 +38,11 @@ enum PixelChoice : int {
 };
 inline constexpr int kChoices = 6;
 
+/** What each choice of a pixel would cost, bits: up to kTakeUpperRight alone, of kCorrect without
+ * the residual. Greater than any sum where a choice cannot be written. */
+using ChoiceBits = std::array<float, kChoices>;
+inline constexpr float kImpossible = 1e9f;
+
 /** Depth code and colour of a pixel as one number that can be compared: from bit 0 upwards, 16 bits
  *  each, depth, Y, Co, Cg. */
 using PixelCode = std::uint64_t;

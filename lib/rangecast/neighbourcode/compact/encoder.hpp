@@ -75,7 +75,9 @@ private:
       Code &code, const Neighbours &n, Components residual);
   template <class Code, bool Delta> Code begin_slice (int first_row);
   template <class Code> void close_slice (Code &code, std::vector<std::uint8_t> &to);
-  int best_choice (std::size_t x, const Neighbours &n, FullPixel &full);
+  template <class Code, bool Delta>
+  [[gnu::always_inline]] int best_choice (
+      const Code &code, std::size_t x, const Neighbours &n, bool earlier, FullPixel &full);
   [[nodiscard, gnu::always_inline]] FullPixel make_full (PixelKey own, const Neighbours &n) const;
   [[gnu::always_inline]] void load_row (const ConstRangeImage &image, int y);
   [[gnu::always_inline]] void find_upper (std::size_t begin, std::size_t end);

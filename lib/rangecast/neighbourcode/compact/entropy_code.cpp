@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "entropy_code.hpp"
 
+#include <cmath>
+
 namespace rangecast {
 
 /* clang-format off */
@@ -81,5 +83,12 @@ const EntropyModel kInitialDeltaModel = {
     0x8000, 0x8000, 0x8000, 0x8000, 0x8000,
 };
 /* clang-format on */
+
+const std::array<float, 256> kBitsOfProbability = [] {
+  std::array<float, 256> bits;
+  for (int i = 0; i < 256; i++)
+    bits[static_cast<std::size_t> (i)] = -std::log2 ((float (i) + 0.5f) / 256);
+  return bits;
+}();
 
 } // namespace rangecast

@@ -170,6 +170,32 @@ public:
     quick (3);
     put (bits, length);
   }
+  /** @name What choices and residuals would cost, bits @{ */
+  template <bool Delta> [[nodiscard]] ChoiceBits choice_bits (const Neighbours &n) const
+  {
+    ChoiceBits bits;
+    bits.fill (kImpossible);
+    bits[kCorrect] = 0;
+    if (n.any ())
+      for (std::size_t i = 0; i < kChoices; i++)
+        if (const int length = tables_->choice[n.kinds ()][i].length; length > 0)
+          bits[i] = float (length);
+    return bits;
+  }
+  [[nodiscard]] float residual_bits (const Neighbours &, bool has_neighbour, Components r) const
+  {
+    const auto pattern = static_cast<std::size_t> (
+        (r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3);
+    int bits = tables_->pattern[pattern_code (has_neighbour, exact_)][pattern].length;
+    for (int i = 0; i < kComponents; i++)
+      if (r[i] != 0) {
+        const int order = orders_[static_cast<std::size_t> (i)];
+        const auto size = static_cast<std::uint32_t> (std::abs (r[i])) - 1;
+        bits += 2 + order + 2 * (std::bit_width ((size >> order) + 1) - 1);
+      }
+    return float (bits);
+  }
+  /** @} */
   /** The bytes that finish() returns. */
   [[nodiscard]] std::size_t bound () const
   {
