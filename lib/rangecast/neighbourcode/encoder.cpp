@@ -163,7 +163,7 @@ ViewEncoder::cut (Band &band, int partitions)
   key.rows.key = true;
   const auto reserved = static_cast<std::size_t> (
       std::max (partitions, band.plan.rows.key ? 0 : partitions_of (key)));
-  const int rows = std::max (band.plan.rows.rows, settings_.temporal ? refresh_.band_rows () : 0);
+  const int rows = settings_.temporal ? header_.roi.height : band.plan.rows.rows; /* bands merge */
   if (band.partitions.size () < reserved)
     band.partitions.resize (reserved);
   for (std::size_t i = 0; i < reserved; i++) {

@@ -227,12 +227,21 @@ CompactEncoder::best_choice (
         return best;
     }
   }
+  if (n.left.valid () && near_bits (own, row_.shown ()[x - 1], bias_) == kNearMask) {
+    const auto [yes, no] = code.left_bits (n);
+    if (const float sum = before + kPriceOfBit * yes + error (row_.shown ()[x - 1]); sum < min) {
+      best = kTakeLeft;
+      min = sum;
+    }
+    if (min <= before + kPriceOfBit * no) /* the least that any other can cost */
+      return best;
+  }
   const ChoiceBits bits = code.template choice_bits<Delta> (n);
-  for (std::size_t i = 0; i < 4; i++) {
+  for (std::size_t i = kTakeUpperLeft; i <= kTakeUpperRight; i++) {
     const float cost = before + kPriceOfBit * bits[i];
     if (bits[i] >= kImpossible || cost >= min)
       continue;
-    const PixelKey other = i == 0 ? row_.shown ()[x - 1] : upper_.shown ()[x + i - 2];
+    const PixelKey other = upper_.shown ()[x + i - kTakeUpper];
     if (near_bits (own, other, bias_) != kNearMask)
       continue;
     if (const float sum = cost + error (other); sum < min) {

@@ -117,6 +117,12 @@ public:
   {
     return bits_of (context::kEarlier + earlier_context (n), yes);
   }
+  /** Of the left neighbour, which is valid: to take it, and at least to take another. */
+  [[nodiscard]] std::pair<float, float> left_bits (const Neighbours &n) const
+  {
+    const int at = context::kLeft + static_cast<int> (n.kinds ());
+    return {bits_of (at, true), bits_of (at, false)};
+  }
   template <bool Delta> [[nodiscard]] ChoiceBits choice_bits (const Neighbours &n) const
   {
     ChoiceBits bits;

@@ -165,28 +165,38 @@ void
 MotionSearch::pair_up (const Pictures &pictures, const Area &area, const BlockMotion &m)
 {
   pairs_.clear ();
+  const ReferencePlane &before = pictures.before;
   const int right = m.dx & 3, down = m.dy & 3, next = right > 0, below = down > 0;
-  const std::int32_t weights[] = {
-      (4 - right) * (4 - down), right * (4 - down), (4 - right) * down, right * down};
+  const int left = m.dx >> 2, top = m.dy >> 2;
+  const std::uint64_t *const inside =
+      before.inverted (area.x + left, area.y + top, area.width + next, area.height + below);
+  const std::ptrdiff_t stride = before.stride ();
+  const int nearest = (right >= 2) + 2 * (down >= 2);
   for (const Sample &s : samples_) {
-    const int x = s.x + (m.dx >> 2), y = s.y + (m.dy >> 2);
+    const int x = s.x + left, y = s.y + top;
     if (y < area.first_y || y + below >= area.end_y)
       continue;
-    Components mixed = {8, 8, 8, 8};
-    bool valid = true;
-    std::int32_t min = 65535, max = 0;
-    for (int t = 0; t < 4 && valid; t++) {
-      const PixelCode code = pictures.before.at (x + (t & 1 & next), y + (t >> 1 & below));
-      const Components c = components_of (code);
-      valid = c[1] >= 0;
-      mixed += c * weights[t];
-      min = std::min (min, c[0]);
-      max = std::max (max, c[0]);
+    Components taps[4];
+    if (inside) {
+      const std::uint64_t *const at = inside + (s.y - area.y) * stride + (s.x - area.x);
+      const std::uint64_t *const lower = at + below * stride;
+      taps[0] = components_of (~at[0]);
+      taps[1] = components_of (~at[next]);
+      taps[2] = components_of (~lower[0]);
+      taps[3] = components_of (~lower[next]);
+    } else {
+      for (int t = 0; t < 4; t++)
+        taps[t] = components_of (before.at (x + (t & 1 & next), y + (t >> 1 & below)));
     }
-    mixed >>= 4;
-    if (!valid || max - min > pictures.scale.max_gap) {
-      const PixelCode nearest = pictures.before.at (x + (right >= 2), y + (down >= 2));
-      mixed = components_of (nearest);
+    const Components upper = 4 * taps[0] + right * (taps[1] - taps[0]);
+    const Components lower = 4 * taps[2] + right * (taps[3] - taps[2]);
+    Components mixed = (4 * upper + down * (lower - upper) + 8) >> 4;
+    const std::int32_t first = taps[0][0], gap = pictures.scale.max_gap;
+    const bool is_one =
+        ((taps[0] | taps[1] | taps[2] | taps[3])[1] >= 0) & (std::abs (taps[1][0] - first) <= gap) &
+        (std::abs (taps[2][0] - first) <= gap) & (std::abs (taps[3][0] - first) <= gap);
+    if (!is_one) {
+      mixed = taps[nearest];
       if (mixed[1] < 0)
         continue;
     }
@@ -315,7 +325,7 @@ MotionSearch::find (const Pictures &pictures, Components threshold, const Area &
     if (m.dx != best.dx || m.dy != best.dy)
       attempt (m.dx, m.dy, 0);
   for (const int step : {4, 2, 1})
-    for (bool better = true; better && least > price / 2;) {
+    for (bool better = step < 4 || least > all / 4; better && least > price / 2;) {
       const int x = best.dx, y = best.dy;
       better = attempt (x - step, y, 0) || attempt (x + step, y, 0);
       better |= attempt (best.dx, y - step, 0) || attempt (best.dx, y + step, 0);

@@ -171,6 +171,11 @@ public:
     put (bits, length);
   }
   /** @name What choices and residuals would cost, bits @{ */
+  /** Of the left neighbour, which is valid: to take it, and at least to take another. */
+  [[nodiscard]] std::pair<float, float> left_bits (const Neighbours &n) const
+  {
+    return {float (tables_->choice[n.kinds ()][kTakeLeft].length), 1};
+  }
   template <bool Delta> [[nodiscard]] ChoiceBits choice_bits (const Neighbours &n) const
   {
     ChoiceBits bits;
