@@ -241,10 +241,15 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
     DecodedPixels &decoded)
 {
   const auto columns = static_cast<std::size_t> (header.columns);
+  const auto most = static_cast<std::size_t> (header.roi.width); /* columns of other slices */
+  row_.reserve (most);
+  upper_.reserve (most);
   row_.reset (columns, 0);
   upper_.reset (columns, 0);
-  runs_.reserve (columns + 1);
+  runs_.reserve (most + 1);
   if constexpr (Delta) {
+    earlier_codes_.reserve (most);
+    motions_.reserve (most / kMotionBlock + 2);
     earlier_codes_.assign (columns, kNoPixel);
     motions_.assign (
         motion_blocks (header.roi.x + header.first_column, header.columns), BlockMotion{});

@@ -494,16 +494,20 @@ CompactEncoder::resize (int columns)
 {
   columns_ = columns;
   const auto n = static_cast<std::size_t> (columns);
+  const auto most = static_cast<std::size_t> (header_.roi.width); /* of later partitions */
+  row_.reserve (most);
+  upper_.reserve (most);
   row_.reset (n, kInvalidKey);
   upper_.reset (n, kInvalidKey);
-  own_.resize (std::max (own_.size (), n + CompactRow::kMargin));
+  own_.resize (std::max (own_.size (), most + CompactRow::kMargin));
   others_.resize (own_.size ());
   earlier_codes_.resize (own_.size ());
   earlier_keys_.resize (own_.size ());
-  runs_.reserve (n + 1);
+  runs_.reserve (most + 1);
+  motions_.reserve (most / kMotionBlock + 2);
   /* A row is coded completely before its size is checked. */
   const std::size_t size = static_cast<std::size_t> (settings_.max_slice_size) +
-                           (kMaxBytesOfPixel + kMaxBytesOfRun) * (n + 1);
+                           (kMaxBytesOfPixel + kMaxBytesOfRun) * (most + 1);
   bytes_.resize (std::max (bytes_.size (), size));
 }
 
