@@ -1,16 +1,20 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Installs what the project needs (Debian 12 packages), configures and builds build/.
-# Quick when nothing changed. Everything it prints beyond a line goes to build/setup.log.
+# Quick when nothing changed. What the compiler prints goes to build/setup.log.
 # usage: setup.sh [--demo | --tests]
-#   --demo   plugins and programs of the demo only, without calibration, cameras, RTSP server, language bindings, tests and benchmarks
+#   --demo   what demo.sh, the viewer and README's launch lines need: no calibration, cameras, RTSP server, other programs,
+#            language bindings, tests and benchmarks, even where their libraries are installed
 #   --tests  everything, as without an option
 set -euo pipefail
 cd "$(dirname "$0")"
 
 targets=(all)
 case "${1:-}" in
-  --demo) targets=(plugins programs) ;;
+  --demo)
+    targets=(demo)
+    # What was built before is kept up to date, because env.sh makes all plugins known.
+    ! compgen -G "build/gst/camera/*.so" >/dev/null || targets+=(plugins programs) ;;
   --tests | "") ;;
   *)
     echo "setup.sh: unknown option '$1'; expected --demo or --tests" >&2
@@ -26,7 +30,7 @@ packages=(
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-base-apps gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
   gstreamer1.0-libav glib-networking gstreamer1.0-gl libgl1-mesa-dri libegl1 libegl-mesa0 libgles2 libgl1
 )
-[ "${targets[0]}" != all ] || packages+=(
+[ "${targets[0]}" = demo ] || packages+=(
   # calibration, cameras, RTSP server
   libopencv-contrib-dev libceres-dev libaravis-dev libusb-1.0-0-dev libgstrtspserver-1.0-dev
   # language bindings of libgstrange
@@ -55,28 +59,52 @@ install_packages () {
   missing=$(missing_packages)
   [ -n "$missing" ] || return 0
   [ "$(id -u)" = 0 ] || sudo=sudo
-  echo "setup.sh: installing $(wc -w <<<"$missing") packages"
+  echo "setup.sh: installing $(wc -w <<<"$missing") packages, which may take some minutes"
   $sudo apt-get update -qq
   # shellcheck disable=SC2086
   $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null
   installed=yes
 }
 
+log=build/setup.log
+
+# usage: logged command...: its output goes to the log; when it fails, the end of that is shown
+logged () {
+  "$@" >"$log" 2>&1 || { show_failure; return 1; }
+}
+
+show_failure () {
+  # ninja lets other jobs finish after the first failure, whose message may be long.
+  { grep -q '^FAILED: ' "$log" && sed -n '/^FAILED: /,$p' "$log" | head -n 80 || tail -n 60 "$log"; } >&2
+  echo "setup.sh: failed; the whole log is $PWD/$log" >&2
+}
+
+# Reads ninja's output: prints one line when the first job ends, and in a terminal the progress.
+show_progress () {
+  local line begun=
+  while IFS= read -r line; do
+    [[ "$line" =~ ^\[([0-9]+)/([0-9]+)\]\  ]] || continue
+    [ -n "$begun" ] || echo "setup.sh: building; the first time this takes some minutes; the log is $log"
+    begun=yes
+    [ ! -t 1 ] || printf '\r%s of %s ' "${BASH_REMATCH[1]}" "${BASH_REMATCH[2]}"
+  done
+  [ -z "$begun" ] || [ ! -t 1 ] || echo
+}
+
 build () {
-  local log=build/setup.log
   mkdir -p build
   # What was left out of build/ for want of a package is not, from now on.
   if [ -n "$installed" ] && [ -f build/build.ninja ]; then
-    { meson configure build --clearcache && meson setup build --reconfigure; } >"$log" 2>&1 || { cat "$log" >&2; return 1; }
+    logged meson configure build --clearcache
+    logged meson setup build --reconfigure
   fi
   if ! [ -f build/build.ninja ]; then
     echo "setup.sh: configuring"
     # -g1: backtraces have names and lines; no local variables, in three quarters of the time to compile.
     # ccache does not cache files that use a precompiled header.
-    meson setup build -Ddebug=false -Dc_args=-g1 -Dcpp_args=-g1 -Db_pch="$(command -v ccache >/dev/null && echo false || echo true)" >"$log" 2>&1 ||
-      { cat "$log" >&2; return 1; }
+    logged meson setup build -Ddebug=false -Dc_args=-g1 -Dcpp_args=-g1 -Db_pch="$(command -v ccache >/dev/null && echo false || echo true)"
   fi
-  ninja -C build "${targets[@]}" >"$log" 2>&1 || { cat "$log" >&2; return 1; }
+  NINJA_STATUS='[%f/%t] ' ninja -C build "${targets[@]}" 2>&1 | tee "$log" | show_progress || { show_failure; return 1; }
 }
 
 install_packages

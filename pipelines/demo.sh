@@ -5,6 +5,7 @@
 set -euo pipefail
 called_from=$PWD
 cd "$(dirname "$0")/.."
+source pipelines/options.sh
 
 # Paths are the caller's.
 absolute () { case "$1" in /*) echo "$1" ;; *) echo "$called_from/$1" ;; esac; }
@@ -63,8 +64,6 @@ while [ $# -gt 0 ]; do
   shift || { echo "demo.sh: the last option lacks its value" >&2; exit 2; }
 done
 
-./setup.sh --demo
-source pipelines/env.sh
 need_size "$size" --size
 [ "${size%x*}" -ge 16 ] && [ "${size#*x}" -ge 16 ] && [ "${size%x*}" -le 4096 ] && [ "${size#*x}" -le 4096 ] ||
   die "--size: expected 16x16 to 4096x4096, got '$size'"
@@ -79,13 +78,28 @@ need_number "$port" --port 1024 65000
 [ -z "$loop" ] || [[ "$input" == avatar* ]] || die "--loop: expected with --input avatar"
 [ -z "$depth" ] || [ "$input" != range ] || die "--depth: expected with cameras; --input range has no stereodepth"
 [ -n "$out" ] || die "--out: expected a folder"
+[ -z "$views" ] || need_number "$views" --views 1 64
 out=$(absolute "$out")
 case "$input" in
-  avatar | range | cameras) ;;
-  avatar=*) input=avatar=$(absolute "${input#avatar=}") ;;
-  *) input=$(absolute "$input") ;;
+  avatar | range | cameras) views=${views:-4} ;;
+  avatar=*)
+    views=${views:-4}
+    input=avatar=$(absolute "${input#avatar=}")
+    [ -f "${input#avatar=}" ] || die "--input: no model '${input#avatar=}'" ;;
+  *)
+    input=$(absolute "$input")
+    [ -f "$input/rig.yaml" ] || die "--input: '$input' is not avatar, avatar=MODEL, range, cameras, or a folder with a rig.yaml"
+    recorded_views=$(grep -c '^ *id:' "$input/rig.yaml" || true)
+    views=${views:-$recorded_views}
+    need_number "$views" --views 1 "$recorded_views" ;;
 esac
 mkdir -p "$out/log" 2>/dev/null || die "--out: cannot make '$out'"
+
+case "$input" in
+  cameras) ./setup.sh ;; # Aravis and the simulated cameras
+  *) ./setup.sh --demo ;;
+esac
+source pipelines/env.sh
 
 pids=()
 stop_hosts () {
@@ -114,25 +128,13 @@ start_fake_cameras () {
 # The rig: written by the test source or the fake cameras, or recorded with the pictures.
 rig=$out/rig.yaml
 case "$input" in
-  cameras)
-    views=${views:-4}
-    need_number "$views" --views 1 64
-    command -v fake-cameras >/dev/null || die "--input cameras: fake-cameras was not built; it needs Aravis (libaravis-dev)"
-    start_fake_cameras ;;
+  cameras) start_fake_cameras ;;
   avatar | avatar=* | range)
-    views=${views:-4}
-    need_number "$views" --views 1 64
     model=()
     [[ "$input" != avatar=* ]] || model=("location=${input#avatar=}")
-    [[ "$input" != avatar=* || -f "${input#avatar=}" ]] || die "--input: no model '${input#avatar=}'"
     (launch avatartestsrc "views=$views" num-buffers=1 "rig-export=$rig" "${model[@]}" \
       ! "video/x-range,width=${size%x*},height=${size#*x}" ! fakesink) || exit 1 ;;
-  *)
-    [ -f "$input/rig.yaml" ] || die "--input: '$input' is not avatar, avatar=MODEL, range, cameras, or a folder with a rig.yaml"
-    cp "$input/rig.yaml" "$rig"
-    recorded_views=$(grep -c '^ *id:' "$rig" || true)
-    views=${views:-$recorded_views}
-    need_number "$views" --views 1 "$recorded_views" ;;
+  *) cp "$input/rig.yaml" "$rig" ;;
 esac
 
 trace_option () { [ -z "$trace" ] || printf -- '--trace-latency %q' "$out/log/$1.trace"; }

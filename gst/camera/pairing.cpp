@@ -83,7 +83,7 @@ FramePairing::drop_waiting ()
 {
   std::lock_guard guard (lock_);
   FrameSets::Set frames;
-  while (sets_.take_rest (frames) == FrameSets::Step::kDrop)
+  while (sets_.drain (frames) == FrameSets::Step::kDrop)
     for (FrameSets::Frame frame : frames.frames)
       if (frame)
         release (static_cast<WaitingFrame *> (frame));

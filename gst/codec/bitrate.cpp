@@ -57,7 +57,7 @@ NeighbourCodeRate::begin (
   const double bits_per_s = receivers.update (
       {double (rate.min_bitrate), double (rate.target_bitrate)}, meter_.bits_per_s (interval));
   rate_.target_bitrate = guint (std::min (bits_per_s, double (G_MAXUINT)));
-  return thinning_.keep ({time_, interval, bits_per_s, is_on_ ? control_.least_bits () : 0,
+  return thinning_.keep ({time_, interval, bits_per_s, is_on_ ? control_.min_bits () : 0,
       double (rate.min_fps_n) / rate.min_fps_d});
 }
 

@@ -552,19 +552,21 @@ finish_access_unit (
   return gst_base_parse_finish_frame (base, frame, gint (length));
 }
 
-/* Of a recording that was cut off, the rest of the last access unit is still output. */
+/* Of a truncated recording, the whole units of the last access unit are still output. */
 static void
-warn_if_cut_off (GstBaseParse *base, const StreamPart &part)
+warn_if_truncated (GstBaseParse *base, const GstBaseParseFrame *frame, const StreamPart &part)
 {
   const Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
-  const gsize expected = kStreamPrefixSize + part.header.size;
-  const bool at_end = NeighbourCodeSeek::reads_file (base) || stream.ending;
-  if (!at_end || !GST_BASE_PARSE_DRAINING (base) || part.length >= expected)
+  if (!part.expected || !(NeighbourCodeSeek::reads_file (base) || stream.ending))
     return;
+  const auto offset = guint64 (frame->offset);
+  const gsize got = part.length + part.rubbish;
   GST_ELEMENT_WARNING (base, STREAM, DECODE,
-      ("The stream ends within an access unit: missing %" G_GSIZE_FORMAT " bytes",
-          expected - part.length),
-      ("expected %" G_GSIZE_FORMAT " bytes, got %" G_GSIZE_FORMAT, expected, part.length));
+      ("The stream ends at byte %" G_GUINT64_FORMAT
+       ", within the access unit%s at byte %" G_GUINT64_FORMAT ": expected %" G_GSIZE_FORMAT
+       " bytes, got %" G_GSIZE_FORMAT,
+          offset + got, part.rubbish ? " header" : "", offset, part.expected, got),
+      (nullptr));
 }
 
 static GstFlowReturn
@@ -576,9 +578,11 @@ handle_access_unit_of_stream (GstBaseParse *base, GstBaseParseFrame *frame, cons
   if (!update_caps (base))
     return caps_refused_flow (base);
   priv->seen = std::max (priv->seen.load (), stream.src_caps_set ? Seen::kRig : Seen::kAccessUnit);
-  if (!stream.src_caps_set || stream.output.empty ()) /* the rig is unknown, or it is empty */
-    return drop (base, frame, part.length);
-  return finish_access_unit (base, frame, part.header, part.length);
+  const bool passes = stream.src_caps_set && !stream.output.empty ();
+  if (passes || priv->seen == Seen::kSlices) /* else the end of the stream is an error */
+    warn_if_truncated (base, frame, part);
+  return passes ? finish_access_unit (base, frame, part.header, part.length)
+                : drop (base, frame, part.length);
 }
 
 static GstFlowReturn
@@ -594,12 +598,13 @@ handle_stream (GstBaseParse *base, GstBaseParseFrame *frame)
     handle_units (base, bytes.subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
   }
   gst_buffer_unmap (frame->buffer, &map);
-  if (part.rubbish)
+  if (part.rubbish) {
+    if (GST_NEIGHBOUR_CODE_PARSE (base)->priv->seen == Seen::kSlices)
+      warn_if_truncated (base, frame, part);
     return drop_rubbish (base, frame, part.rubbish);
-  if (part.length) {
-    warn_if_cut_off (base, part);
-    return handle_access_unit_of_stream (base, frame, part);
   }
+  if (part.length)
+    return handle_access_unit_of_stream (base, frame, part);
   gst_base_parse_set_min_frame_size (base, guint (part.wanted));
   return GST_FLOW_OK;
 }

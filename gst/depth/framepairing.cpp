@@ -201,6 +201,20 @@ log_waiting (GstDebugCategory *category, GstAggregatorPad *pad)
         gst_pad_has_current_caps (GST_PAD (pad)) ? "a frame" : "caps and a frame");
 }
 
+std::optional<GstVideoInfo>
+parse_caps_event (GstDebugCategory *category, GstAggregatorPad *pad, GstEvent *event)
+{
+  GstCaps *caps;
+  GstVideoInfo info;
+  gst_event_parse_caps (event, &caps);
+  if (!gst_video_info_from_caps (&info, caps)) {
+    GST_CAT_WARNING_OBJECT (category, pad, "refused caps %" GST_PTR_FORMAT, caps);
+    return {};
+  }
+  GST_CAT_INFO_OBJECT (category, pad, "caps %" GST_PTR_FORMAT, caps);
+  return info;
+}
+
 GstClockTime
 frame_duration (const std::optional<GstVideoInfo> &info)
 {

@@ -81,6 +81,10 @@ GstFlowReturn pop_companion (GstAggregatorPad *pad, GstDebugCategory *category,
  *  aggregate() is not called without a frame on every pad, unless live. */
 void log_waiting (GstDebugCategory *category, GstAggregatorPad *pad);
 
+/** Reads and logs a pad's caps event. @return std::nullopt if the caps are not valid video caps */
+std::optional<GstVideoInfo> parse_caps_event (
+    GstDebugCategory *category, GstAggregatorPad *pad, GstEvent *event);
+
 /** Frame duration of a pad's caps, ns; GST_CLOCK_TIME_NONE if there are none or the rate is
  *  unknown. */
 GstClockTime frame_duration (const std::optional<GstVideoInfo> &info);

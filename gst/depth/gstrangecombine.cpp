@@ -113,16 +113,12 @@ gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, 
 {
   GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
-    GstCaps *caps;
-    GstVideoInfo info;
-    gst_event_parse_caps (event, &caps);
-    if (!gst_video_info_from_caps (&info, caps)) {
-      GST_WARNING_OBJECT (pad, "refused caps %" GST_PTR_FORMAT, caps);
+    const auto info = parse_caps_event (GST_CAT_DEFAULT, pad, event);
+    if (!info) {
       gst_event_unref (event);
       return FALSE;
     }
-    GST_INFO_OBJECT (pad, "caps %" GST_PTR_FORMAT, caps);
-    (pad == priv->colour_pad ? priv->colour : priv->depth) = info;
+    (pad == priv->colour_pad ? priv->colour : priv->depth) = *info;
     priv->negotiate = true;
   }
   return GST_AGGREGATOR_CLASS (gst_range_combine_parent_class)->sink_event (aggregator, pad, event);

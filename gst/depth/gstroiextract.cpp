@@ -32,9 +32,9 @@
 #include <rangecast/base/output_path.hpp>
 #include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/geometry/size_text.hpp>
+#include <rangecast/opencv/threads.hpp>
 #include <rangecast/roi/background.hpp>
 #include <rangecast/roi/bounding_box.hpp>
-#include <rangecast/roi/opencv_threads.hpp>
 #include <rangecast/roi/segmentation.hpp>
 #include <string>
 

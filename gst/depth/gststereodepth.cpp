@@ -173,15 +173,11 @@ gst_stereo_depth_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, G
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
     const Side side = pad == priv->left ? kLeft : pad == priv->right ? kRight : kThird;
-    GstCaps *caps;
-    GstVideoInfo info;
-    gst_event_parse_caps (event, &caps);
-    if (!gst_video_info_from_caps (&info, caps)) {
-      GST_WARNING_OBJECT (pad, "refused caps %" GST_PTR_FORMAT, caps);
+    const auto info = parse_caps_event (GST_CAT_DEFAULT, pad, event);
+    if (!info) {
       gst_event_unref (event);
       return FALSE;
     }
-    GST_INFO_OBJECT (pad, "caps %" GST_PTR_FORMAT, caps);
     apply_release_of_third (priv);
     if (side != kThird && priv->pair.buffers.first) {
       priv->inputs[side].next_info = info;

@@ -301,11 +301,7 @@ BlendPainter::upload (std::span<const RenderLayer> layers)
     if (is_new)
       describe_vertices (gl);
     const std::size_t size = layer.blend_vertices.size_bytes ();
-    if (size > objects.capacity) { /* with room to grow: allocations are rare */
-      objects.capacity = size + size / 2;
-      gl->BufferData (GL_ARRAY_BUFFER, GLsizeiptr (objects.capacity), nullptr, GL_DYNAMIC_DRAW);
-    }
-    gl->BufferSubData (GL_ARRAY_BUFFER, 0, GLsizeiptr (size), layer.blend_vertices.data ());
+    upload_vertices (gl, objects.capacity, layer.blend_vertices.data (), size);
     uploaded += size;
   }
   gl->BindVertexArray (0);

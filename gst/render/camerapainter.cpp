@@ -66,7 +66,7 @@ CameraPainter::draw (GstGLContext *context, std::span<const LineVertex> lines, g
   }
   const bool changed = uploaded_ != serial;
   if (changed)
-    gl->BufferData (GL_ARRAY_BUFFER, gssize (lines.size_bytes ()), lines.data (), GL_STREAM_DRAW);
+    upload_vertices (gl, capacity_, lines.data (), lines.size_bytes ());
   uploaded_ = serial;
   gl->Enable (GL_DEPTH_TEST);
   gl->DrawArrays (GL_LINES, 0, GLsizei (lines.size ()));

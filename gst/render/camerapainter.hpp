@@ -21,5 +21,6 @@ public:
 private:
   LazyShader shader_;
   guint vertices_ = 0;
-  guint64 uploaded_ = 0; /* serial */
+  std::size_t capacity_ = 0; /* of the vertices, bytes */
+  guint64 uploaded_ = 0;     /* serial */
 };

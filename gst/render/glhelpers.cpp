@@ -14,6 +14,16 @@ define_texture (const GstGLFuncs *gl, guint internal, int width, int height, gui
   gl->TexImage2D (GL_TEXTURE_2D, 0, gint (internal), width, height, 0, format, type, data);
 }
 
+void
+upload_vertices (const GstGLFuncs *gl, std::size_t &capacity, const void *data, std::size_t size)
+{
+  if (size > capacity) {
+    capacity = size + size / 2;
+    gl->BufferData (GL_ARRAY_BUFFER, GLsizeiptr (capacity), nullptr, GL_DYNAMIC_DRAW);
+  }
+  gl->BufferSubData (GL_ARRAY_BUFFER, 0, GLsizeiptr (size), data);
+}
+
 GstGLShader *
 make_shader (GstGLContext *context, const char *vertex, const char *fragment, GError **error)
 {

@@ -33,6 +33,12 @@ is_gles (GstGLContext *context)
 void define_texture (const GstGLFuncs *gl, guint internal, int width, int height, guint format,
     guint type, const void *data = nullptr);
 
+/** Writes `size` bytes into the buffer bound to GL_ARRAY_BUFFER. Reallocates its storage only if it
+ *  is too small, with 50 % headroom.
+ *  @param[in,out] capacity  bytes of the storage; 0 before the first call */
+void upload_vertices (
+    const GstGLFuncs *gl, std::size_t &capacity, const void *data, std::size_t size);
+
 /** @name Shaders @{ */
 
 /** Compiles and links sources without a version line, for OpenGL 3.3 or OpenGL ES 3.0.

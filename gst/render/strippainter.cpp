@@ -212,8 +212,7 @@ StripPainter::upload_layer (ViewObjects &objects, const RenderLayer &layer)
       colour.data);
   gl->PixelStorei (GL_UNPACK_ROW_LENGTH, 0);
   gl->BindBuffer (GL_ARRAY_BUFFER, objects.vertices);
-  gl->BufferData (
-      GL_ARRAY_BUFFER, layer.vertices.size_bytes (), layer.vertices.data (), GL_STREAM_DRAW);
+  upload_vertices (gl, objects.capacity, layer.vertices.data (), layer.vertices.size_bytes ());
   return guint64 (depth.width) * guint64 (depth.height) * 6 + layer.vertices.size_bytes ();
 }
 

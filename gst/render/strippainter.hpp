@@ -29,6 +29,7 @@ public:
 private:
   struct ViewObjects { /* OpenGL names of one view */
     guint depth = 0, colour = 0, vertices = 0, array = 0;
+    std::size_t capacity = 0;  /* of the vertices, bytes */
     int width = 0, height = 0; /* of the textures, pixels */
   };
   void prepare (ViewObjects &objects, int width, int height);

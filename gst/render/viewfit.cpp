@@ -57,7 +57,7 @@ ViewFit::refit (const StripScene &scene, const Picture &picture)
       rangecast::fitted_frame (scene.frame (), picture.orbit, picture.aspect, candidates_);
   const double fov = picture.orbit.fov_deg > 0 ? picture.orbit.fov_deg : frame.fov_deg;
   settled_ = !GST_CLOCK_TIME_IS_VALID (picture.pts) ||
-             (fitted_ && views == views_ && rangecast::is_about_same (frame, frame_, fov));
+             (fitted_ && views == views_ && rangecast::is_similar (frame, frame_, fov));
   if (settled_ && fitted_)
     return; /* no jump for a small difference */
   fitted_ = true;

@@ -8,12 +8,18 @@ needs: PyGObject, NumPy, the Gst overrides (Debian: python3-gst-1.0 python3-nump
 """
 import sys
 
-import gi
-import numpy as np
+try:
+    import gi
+    import numpy as np
 
-gi.require_version("Gst", "1.0")
-gi.require_version("GstRange", "1.0")
-from gi.repository import Gst, GstRange  # noqa: E402
+    gi.require_version("Gst", "1.0")
+    gi.require_version("GstRange", "1.0")
+    from gi.repository import Gst, GstRange
+except (ImportError, ValueError) as error:  # ValueError: no typelib
+    sys.exit(
+        f"count-points.py: {error}; needs PyGObject, NumPy and the typelib GstRange-1.0: run ./setup.sh, "
+        "then this in the shell of `meson devenv -C build`, with Debian's /usr/bin/python3"
+    )
 
 
 def plane(data, offset, stride, width, height, dtype):

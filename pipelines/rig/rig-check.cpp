@@ -384,8 +384,8 @@ check_rig (const Options &options)
 const char *
 complaint_of (const Options &o)
 {
-  const auto is_within = [] (double x, double least, double most) {
-    return x >= least && x <= most; /* NaN is not */
+  const auto is_within = [] (double x, double min, double max) {
+    return x >= min && x <= max; /* NaN is not */
   };
   if (!o.paths || o.paths[1])
     return "expected one rig file";

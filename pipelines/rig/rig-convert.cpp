@@ -314,7 +314,7 @@ read_middlebury (const std::vector<std::string> &paths, const Options &)
 
 struct Format {
   const char *name;
-  std::size_t least_inputs, most_inputs;
+  std::size_t min_inputs, max_inputs;
   View (*read) (const std::vector<std::string> &paths, const Options &options);
 };
 const Format kFormats[] = {{"opencv", 1, 2, read_opencv}, {"luxonis", 1, 1, read_luxonis},
@@ -366,7 +366,7 @@ convert (const Options &options)
       kFormats, [&] (const Format &f) { return !words.empty () && words[0] == f.name; });
   if (format == std::end (kFormats))
     throw BadInput{"expected a format: opencv, luxonis or middlebury; see --help", kWrongUsage};
-  if (words.size () < format->least_inputs + 2 || words.size () > format->most_inputs + 2)
+  if (words.size () < format->min_inputs + 2 || words.size () > format->max_inputs + 2)
     throw BadInput{
         std::string (format->name) + ": expected its calibration and RIG; see --help", kWrongUsage};
   if (!(options.scale > 0 && options.scale <= 1000) || !(options.unit_m > 0))

@@ -46,7 +46,7 @@ public:
   /** Main loop. Closes all, and waits until they are gone, 3 s at most. */
   void end ();
   /** Main loop. Accepts the next connection. Where there would be too many it closes the oldest
-   * that is no viewer; where all are viewers it refuses the new one. */
+   *  that is no viewer; where all are viewers it refuses the new one. */
   void accept (GSocket *socket);
 
 private:

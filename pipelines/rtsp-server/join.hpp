@@ -29,7 +29,7 @@ inline constexpr gint64 kMaxHold_us = 2 * G_USEC_PER_SEC;
 class ShortPause {
 public:
   /** Also waits for packets that passed before to reach the transports. Does nothing within 100 ms
-   * of the last pause, so that many joining viewers do not slow the others down. */
+   *  of the last pause, so that many joining viewers do not slow the others down. */
   void begin ();
   void end ();
   /** Streaming thread: waits for end(), 50 ms at most, since a PLAY may fail. */

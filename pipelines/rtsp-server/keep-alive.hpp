@@ -18,7 +18,7 @@ public:
    *  @return whether this media is held */
   bool hold (GstRTSPMedia *media);
   /** Plays the media if it is held. Call it when the first viewer's transports are in place, so
-   * that this viewer gets the first frame set. */
+   *  that this viewer gets the first frame set. */
   void start (GstRTSPMedia *media);
   bool has_started (GstRTSPMedia *media);
   /** Stops the media that is held.
@@ -28,7 +28,7 @@ public:
   void release_unless_asked_since (gint64 monotonic_us);
   bool holds_any ();
   /** Before a DESCRIBE is handled. Waits until no release() is in progress, during which the
-   * factory would return a media that is ending. */
+   *  factory would return a media that is ending. */
   void record_request ();
 
 private:

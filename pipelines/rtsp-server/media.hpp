@@ -28,8 +28,8 @@ struct StreamCounts {
 GstElement *make_stream_bin (const std::string &launch, GError **error);
 
 /** Called by any thread when a stream ends: maybe with is_over = false at EOS of the payloader,
- * then with is_over = true at EOS or an error on the bus. `why` is empty at EOS, otherwise the
- * error. */
+ *  then with is_over = true at EOS or an error on the bus. `why` is empty at EOS, otherwise the
+ *  error. */
 using StreamEnd = std::function<void (GstRTSPMedia *media, bool is_over, const std::string &why)>;
 
 /** The factory of the launch string.
@@ -41,12 +41,12 @@ GstRTSPMediaFactory *make_factory (
 void begin_new_run (GstRTSPMediaFactory *factory);
 
 /** Ends waits for a first frame set, for which gst_rtsp_media_prepare() waits up to 20 s. For good;
- * any thread. */
+ *  any thread. */
 void end_waiting (GstRTSPMediaFactory *factory);
 
 /** Call it once, before the server has clients. At each PLAY gst-rtsp-server 1.22 makes the sinks
- * of live media, too, wait for the clock, for all viewers; this turns it off until
- * disable_live_sync(). */
+ *  of live media, too, wait for the clock, for all viewers; this turns it off until
+ *  disable_live_sync(). */
 void disable_live_sync_at_play ();
 
 /** Sinks of a live media send at once instead of delaying frame sets by the pipeline's latency:

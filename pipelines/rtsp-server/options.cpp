@@ -194,7 +194,7 @@ check_numbers (const RtspOptions &options)
 {
   struct {
     const char *option;
-    int value, least, most;
+    int value, min, max;
   } const numbers[] = {{"--port", options.port, 0, 65535},
       {"--retransmission", options.retransmission_ms, 0, 10000},
       {"--max-viewers", options.max_viewers, 1, 100000},
@@ -202,9 +202,9 @@ check_numbers (const RtspOptions &options)
       {"--timeout", options.timeout_s, 5, 86400}, {"--linger", options.linger_s, 0, 86400},
       {"--stats", options.stats_s, 0, 3600}};
   for (const auto &number : numbers)
-    if (number.value < number.least || number.value > number.most) {
-      const std::string expected = "a whole number from " + std::to_string (number.least) + " to " +
-                                   std::to_string (number.most);
+    if (number.value < number.min || number.value > number.max) {
+      const std::string expected = "a whole number from " + std::to_string (number.min) + " to " +
+                                   std::to_string (number.max);
       return bad_option (number.option, expected.c_str (), std::to_string (number.value));
     }
   return true;

@@ -26,5 +26,5 @@ void queue_tcp_transports (
     GstRTSPSessionMedia *media, std::atomic<guint64> &left_out, bool holds_back);
 
 /** Ends the queues of a session. Any thread. Call it before gst-rtsp-server removes the connection
- * from the session's transports, which it may do in another thread than the connection's. */
+ *  from the session's transports, which it may do in another thread than the connection's. */
 void drop_tcp_transports (GstRTSPSession *session);

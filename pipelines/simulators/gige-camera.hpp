@@ -30,8 +30,8 @@ struct GigeCameraSettings {
 };
 
 /** A GigE Vision camera on real sockets. Registers and GenICam description are those of Aravis'
- * fake camera, with a few features more. A thread of its own answers and sends; one program
- * controls it.
+ *  fake camera, with a few features more. A thread of its own answers and sends; one program
+ *  controls it.
  */
 class GigeCamera {
 public:

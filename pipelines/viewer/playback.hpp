@@ -6,7 +6,7 @@
 #include <optional>
 
 /** Position, pause and seeks of the viewer's pipeline. One seek is under way at a time: of those
- * that are asked for meanwhile the last one follows. Main thread. */
+ *  that are asked for meanwhile the last one follows. Main thread. */
 class Playback {
 public:
   /** @param seekable  a file: it can be paused and sought in */

@@ -60,6 +60,6 @@ std::vector<TextRow> key_rows (bool is_file);
 /** Handles the viewer's keys and the mouse on the time bar, which do not reach striprender. */
 void watch_controls (Viewer &viewer);
 /** For a message that a mouse or key event was not handled: events do not reach the elements while
- * the pipeline seeks, so the viewer's own are handled here. Main thread. */
+ *  the pipeline seeks, so the viewer's own are handled here. Main thread. */
 void handle_missed_event (Viewer &viewer, GstMessage *message);
 /** @} */

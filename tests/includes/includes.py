@@ -17,7 +17,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
 SOURCES = (".c", ".cpp", ".h", ".hpp")
 CORE = ("base", "geometry", "neighbourcode", "alignment", "overlap", "surface", "sync")
 RIGFILE = ("rigfile",)
-VISION = ("stereo", "roi", "registration", "calibration", "overlay")
+VISION = ("opencv", "stereo", "roi", "registration", "calibration", "overlay")
 SCENE = ("scene",)
 
 # What a folder may include besides itself and its own subfolders: the first row whose prefix matches.

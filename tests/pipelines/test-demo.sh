@@ -64,9 +64,11 @@ test_demo_takes_loops_and_jumbo_frames () {
 
 test_demo_plays_recorded_pairs () {
   need_gl
+  # The hosts begin together, whether or not the viewer is there: the recording goes on for 25 s after the background.
+  local pairs=225 view
   mkdir pairs
   for view in 0 1; do
-    gst-launch-1.0 -q avatartestsrc name=s views=2 arc=60 view-id=$view num-buffers=60 empty-frames=25 \
+    gst-launch-1.0 -q avatartestsrc name=s views=2 arc=60 view-id=$view num-buffers=$pairs empty-frames=25 \
       rig-export=pairs/rig.yaml \
       s.left ! video/x-raw,format=RGB,width=160,height=120,framerate=8/1 ! queue ! pngenc ! multifilesink location="pairs/view$view-left-%05d.png" \
       s.right ! video/x-raw,format=RGB,width=160,height=120,framerate=8/1 ! queue ! pngenc ! multifilesink location="pairs/view$view-right-%05d.png"
@@ -90,6 +92,27 @@ test_demo_says_what_is_wrong () {
   expect_error "rig.yaml" "$pipelines/demo.sh" --input nowhere --out demo
   echo "this is no model" >bad.glb
   expect_error "bad.glb" "$pipelines/demo.sh" --input avatar=bad.glb --out demo
+}
+
+# A tree whose setup.sh says that it was run.
+test_demo_checks_its_options_before_it_builds () {
+  mkdir -p tree pairs
+  ln -s "$pipelines" tree/pipelines
+  printf '#!/bin/sh\ntouch "%s/built"\nexit 1\n' "$PWD" >tree/setup.sh
+  chmod +x tree/setup.sh
+  expect_error "unknown option '--no-such-option'" tree/pipelines/demo.sh --no-such-option
+  expect_error "lacks its value" tree/pipelines/demo.sh --frames
+  expect_error "--frames: expected a whole number" tree/pipelines/demo.sh --frames abc
+  expect_error "--views: expected a whole number" tree/pipelines/demo.sh --views 65
+  expect_error "no model" tree/pipelines/demo.sh --input avatar=nowhere.glb
+  expect_error "rig.yaml" tree/pipelines/demo.sh --input pairs
+  touch file
+  expect_error "--out" tree/pipelines/demo.sh --out file
+  tree/pipelines/demo.sh --help >help.txt
+  grep -q '^usage: demo.sh' help.txt || fail "$(cat help.txt)"
+  [ ! -e built ] || fail "setup.sh was run"
+  ! tree/pipelines/demo.sh --out out || fail "the demo went on without setup.sh"
+  [ -e built ] || fail "setup.sh was not run"
 }
 
 test_demo_says_which_host_was_killed () {

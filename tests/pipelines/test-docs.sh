@@ -12,17 +12,15 @@ test_links_and_named_pages_exist () {
 test_launch_lines_of_the_readme_run () {
   local line
   need_gl
-  gst-launch-1.0 -q videotestsrc num-buffers=1 ! video/x-raw,width=64,height=48 ! jpegenc ! filesink location=colour.jpg
-  gst-launch-1.0 -q videotestsrc num-buffers=1 ! video/x-raw,format=GRAY16_BE,width=64,height=48 ! pngenc ! filesink location=depth.png
   awk '/^```/ { inside = !inside; next } inside' "$source_dir/README.md" | sed -e ':a' -e '/\\$/N; s/\\\n//; ta' | grep '^gst-launch-1.0 ' >lines
-  [ "$(wc -l <lines)" = 3 ] || fail "expected three launch lines: $(cat lines)"
+  [ "$(wc -l <lines)" = 4 ] || fail "expected four launch lines: $(cat lines)"
   sed -i -e 's/is-live=true/num-buffers=5/; s/ glimagesink$/ fakesink/' lines
   while read -r line; do
     timeout 60 bash -c "$line" >launch.log 2>&1 || fail "$line: $(tail -n 5 launch.log)"
     ! grep -q '^WARNING' launch.log || fail "$line: $(cat launch.log)"
   done <lines
   expect_file depth.webm 1000
-  expect_file cloud.ply 1000
+  expect_file cloud.ply 20000 # of the pictures that the line before makes
 }
 
 test_each_page_is_in_the_index () {

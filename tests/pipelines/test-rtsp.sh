@@ -276,7 +276,7 @@ END
 test_stream_goes_on_when_each_transport_is_joined () {
   LD_PRELOAD=${RANGECAST_BUILD:-$source_dir/build}/tests/pipelines/libslow-plugging.so \
     ASAN_OPTIONS="${ASAN_OPTIONS:+$ASAN_OPTIONS:}verify_asan_link_order=0" \
-    serve --always --multicast 239.7.7.7:5000-5001 --stats 1 -- "$figure"
+    serve --always --multicast "239.7.7.7:$ports-$((ports + 1))" --stats 1 -- "$figure"
   local transport before
   until_true 20 grep -q '^slow-plugging' server.log
   for transport in tcp udp multicast; do

@@ -110,6 +110,9 @@ CameraStatus
 Camera::open (const std::string &name, std::unique_ptr<Camera> &camera, CameraInfo *seen)
 {
   auto impl = std::make_unique<Impl> ();
+  if (const GError *no_thread = impl->teardown.error ())
+    return {CameraFault::kFailed,
+        "could not start the thread that releases the camera: " + std::string (no_thread->message)};
   ArvDevice *device = nullptr;
   CameraStatus status = open_camera_device (name, device, impl->info);
   if (seen)

@@ -36,7 +36,7 @@ SurfacePlanes::make_row (const ConstRangeImage &image, int y, float focal_px)
   for (int x = reach; x < end; x++) {
     const std::int32_t d = middle[x], l = middle[x - reach], r = middle[x + reach], a = above[x],
                        b = below[x];
-    const std::int32_t least = std::min (std::min (std::min (l, r), std::min (a, b)), d);
+    const std::int32_t nearest = std::min (std::min (std::min (l, r), std::min (a, b)), d);
     const auto depth = static_cast<float> (d);
     const float across = static_cast<float> (l - r) * per_pixel,
                 down = static_cast<float> (a - b) * per_pixel;
@@ -44,8 +44,8 @@ SurfacePlanes::make_row (const ConstRangeImage &image, int y, float focal_px)
                bend_y = static_cast<float> (std::abs (a + b - 2 * d));
     const float slope = (across * across + down * down) * focal2, depth2 = depth * depth;
     const float cosine2 = depth2 / (slope + depth2 + 1e-9f);
-    const bool good =
-        (least > 0) & (bend_x <= bend * depth) & (bend_y <= bend * depth) & (cosine2 > kMinCosine2);
+    const bool good = (nearest > 0) & (bend_x <= bend * depth) & (bend_y <= bend * depth) &
+                      (cosine2 > kMinCosine2);
     to[x].depth = static_cast<float> (l + r + a + b + d) * 0.2f;
     to[x].across = across;
     to[x].down = down;

@@ -76,11 +76,11 @@ ViewAgreement::correct_rig (bool poses)
 {
   if (evaluated_ && frame_ - changed_at_ < kChangeEvery)
     return;
-  double most = 0, change = 0;
+  double largest = 0, change = 0;
   for (const View &view : nominal_.views)
-    most = std::max (most, poses_.correction (view.id).size ());
+    largest = std::max (largest, poses_.correction (view.id).size ());
   const double needed = kNeedsCorrection + kErrorsOff * poses_.depth_error ();
-  const bool corrects = poses && most > (corrected_ ? kStaysCorrected * needed : needed);
+  const bool corrects = poses && largest > (corrected_ ? kStaysCorrected * needed : needed);
   const auto wanted = [&] (int id) { return corrects ? poses_.correction (id) : PoseCorrection{}; };
   for (const View &view : nominal_.views) {
     const PoseCorrection by = wanted (view.id),
@@ -147,14 +147,14 @@ ViewAgreement::evaluate_views (std::span<const RangeImage> images)
   std::uint64_t trusted = all;
   for (;;) {
     std::uint64_t rest_of_best = 0;
-    double least = std::numeric_limits<double>::max ();
+    double min = std::numeric_limits<double>::max ();
     for (std::uint64_t rest = trusted; rest; rest &= rest - 1) {
       const int id = std::countr_zero (rest);
       if (!contradicts (agreement_among (id, trusted), of_[static_cast<std::size_t> (id)].left_out))
         continue;
       const std::uint64_t others = trusted & ~(std::uint64_t{1} << id);
-      if (const double left = contradictions_of (others); left < least && has_good_pair (others))
-        least = left, rest_of_best = others;
+      if (const double left = contradictions_of (others); left < min && has_good_pair (others))
+        min = left, rest_of_best = others;
     }
     if (!rest_of_best)
       break;

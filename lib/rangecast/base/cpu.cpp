@@ -54,9 +54,9 @@ cpu_level ()
 }
 
 void
-limit_cpu (CpuLevel most)
+limit_cpu (CpuLevel max)
 {
-  limit.store (most, std::memory_order_relaxed);
+  limit.store (max, std::memory_order_relaxed);
 }
 
 int

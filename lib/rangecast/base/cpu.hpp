@@ -20,7 +20,7 @@ CpuLevel cpu_supports ();
 CpuLevel cpu_level ();
 
 /** For tests: limits cpu_level() from now on. */
-void limit_cpu (CpuLevel most);
+void limit_cpu (CpuLevel max);
 
 /** Number of processors that the process may use (its affinity mask, as taskset and container
  * cpusets set it), counted once; at least 1. CPU quotas of containers are not considered. */

@@ -208,17 +208,17 @@ FrameSelector::is_moving (
 double
 FrameSelector::difference (const Places &places, std::size_t except) const
 {
-  double most = 0;
+  double max = 0;
   for (const auto &[camera, place] : places) {
-    double least = std::numeric_limits<double>::max ();
+    double nearest = std::numeric_limits<double>::max ();
     for (std::size_t f = 0; f < places_.size (); f++)
       if (f != except)
         for (const auto &[other, old] : places_[f])
           if (other == camera)
-            least = std::min (least, distance (place, old));
-    most = std::max (most, least);
+            nearest = std::min (nearest, distance (place, old));
+    max = std::max (max, nearest);
   }
-  return most;
+  return max;
 }
 
 bool
@@ -241,17 +241,17 @@ FrameSelector::take (CalibrationFrame frame, Places places)
     places_.push_back (std::move (places));
     return FrameVerdict::kTaken;
   }
-  std::size_t dullest = 0;
-  double least = std::numeric_limits<double>::max ();
+  std::size_t most_redundant = 0;
+  double smallest = std::numeric_limits<double>::max ();
   for (std::size_t f = 1; f < places_.size (); f++)
-    if (const double d = difference (places_[f], f); d < least) {
-      least = d;
-      dullest = f;
+    if (const double d = difference (places_[f], f); d < smallest) {
+      smallest = d;
+      most_redundant = f;
     }
-  if (difference (places, dullest) <= least)
+  if (difference (places, most_redundant) <= smallest)
     return FrameVerdict::kSimilar;
-  frames_[dullest] = std::move (frame);
-  places_[dullest] = std::move (places);
+  frames_[most_redundant] = std::move (frame);
+  places_[most_redundant] = std::move (places);
   return FrameVerdict::kTaken;
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "session.hpp"
 
-#include "../roi/opencv_threads.hpp"
+#include "../opencv/threads.hpp"
 #include "pose_chain.hpp"
 
 #include <algorithm>

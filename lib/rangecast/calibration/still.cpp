@@ -5,18 +5,13 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "../opencv/image.hpp"
+
 namespace rangecast {
 namespace {
 
 constexpr int kMaxInARow = 4;
-constexpr double kTallestTile = 2, kFlattestTile = 0.01; /* height over width */
-
-cv::Mat
-as_mat (ImageView<const Rgbx> picture)
-{
-  return {picture.height, picture.width, CV_8UC4, const_cast<Rgbx *> (picture.data),
-      std::size_t (picture.stride)};
-}
+constexpr double kMaxTileAspect = 2, kMinTileAspect = 0.01; /* height / width */
 
 /* Hue rotates from row to row. */
 cv::Scalar
@@ -66,16 +61,16 @@ lay_out (std::span<const CalibrationCamera> cameras, int tile_width)
   const int count = int (cameras.size ());
   layout.columns = std::min (count, kMaxInARow);
   layout.rows = count ? (count + layout.columns - 1) / layout.columns : 0;
-  double tallest = 0; /* height over width */
+  double aspect = 0; /* height / width, of the tallest */
   for (const CalibrationCamera &camera : cameras)
     if (camera.width > 0)
-      tallest = std::max (tallest, double (camera.height) / camera.width);
-  tallest = std::min (tallest, kTallestTile);
+      aspect = std::max (aspect, double (camera.height) / camera.width);
+  aspect = std::min (aspect, kMaxTileAspect);
   const double widest =
       std::sqrt (double (kMaxStillPixels) /
-                 (std::max (1, layout.columns * layout.rows) * std::max (tallest, kFlattestTile)));
+                 (std::max (1, layout.columns * layout.rows) * std::max (aspect, kMinTileAspect)));
   layout.tile_width = std::max (2, std::min (tile_width, int (widest)) & ~1);
-  layout.tile_height = std::max (2, (int (std::lround (layout.tile_width * tallest)) + 1) & ~1);
+  layout.tile_height = std::max (2, (int (std::lround (layout.tile_width * aspect)) + 1) & ~1);
   return layout;
 }
 
@@ -84,7 +79,7 @@ draw_tile (const TileContents &contents, ImageView<Rgbx> tile)
 {
   if (tile.empty ())
     return;
-  cv::Mat out = as_mat (tile);
+  cv::Mat out = opencv_image (tile);
   out = cv::Scalar (24, 24, 24, 255);
   if (contents.picture.empty ())
     return;
@@ -93,7 +88,7 @@ draw_tile (const TileContents &contents, ImageView<Rgbx> tile)
   const cv::Size size (std::clamp (int (contents.picture.width * scale), 1, tile.width),
       std::clamp (int (contents.picture.height * scale), 1, tile.height));
   cv::Mat inner = out (cv::Rect ({0, 0}, size));
-  cv::resize (as_mat (contents.picture), inner, size, 0, 0, cv::INTER_AREA);
+  cv::resize (opencv_image (contents.picture), inner, size, 0, 0, cv::INTER_AREA);
   draw_missing_cells (contents.coverage, size, inner);
   draw_corners (contents, scale, inner);
   if (contents.taken)

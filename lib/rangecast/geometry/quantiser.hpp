@@ -17,9 +17,9 @@ enum class DepthScale : std::uint8_t {
 };
 
 /** Depth to codes of `bits` bits and back; near is code 0 and far the greatest, on either scale.
- *  Formulas: docs/formats/bitstream.md, "Quantisation". No more codes are used than give each depth
- *  unit its own, which is lossless. On the inverse scale several codes may have one depth: code()
- *  returns the least of them, decoders accept all. Tables: 128 KiB and up to 128 KiB more. */
+ *  Formulas: docs/formats/bitstream.md, "Quantisation". There are no more codes
+ *  than lossless quantisation needs. On the inverse scale several codes may have one depth: code()
+ *  returns the lowest of them, decoders accept all. Tables: 128 KiB and up to 128 KiB more. */
 class DepthQuantiser {
 public:
   /** @param near, far  depth units, 1 <= near < far; @param bits  6 to 16 */
@@ -39,7 +39,7 @@ public:
   /** Greatest change of a depth, depth units, by quantisation and a change of its code by up to
    *  `threshold`. Examines all depths. */
   [[nodiscard]] int max_error (int threshold = 0) const;
-  /** Depth units from one code to the next at far, where they are most. */
+  /** Depth units from one code to the next at far, where the step is largest. */
   [[nodiscard]] double step () const { return step_; }
 
 private:

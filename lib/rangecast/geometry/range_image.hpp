@@ -18,16 +18,16 @@ struct Roi {
 
 inline constexpr std::uint16_t kInvalidDepth = 0;
 inline constexpr int kMaxViews = 64;
-/** No image side in a rig, a range image or a bitstream is longer, pixels. */
+/** Maximum width and height of images in a rig, a range image or a bitstream, pixels. */
 inline constexpr int kMaxImageSide = 16384;
 /** Views times the widest times the tallest of a rig, pixels: 64 views of 1920x1080 are just below.
- *  A frame set has room for that much, so this bounds the memory that foreign bytes can ask for. */
+ *  A frame set has room for that much, which limits the memory that untrusted data can allocate. */
 inline constexpr std::int64_t kMaxRigPixels = std::int64_t{1} << 27;
 
 /** Depth and colour of one view at one capture time, cut to the ROI. Both planes have the ROI's
  *  size; plane pixel (0, 0) is image pixel (roi.x, roi.y). Depth is in the view's depth units,
- *  kInvalidDepth where there is none; the colour of invalid pixels means nothing.
- *  Pixels belong to whoever made the views. */
+ *  kInvalidDepth where there is none; the colour of invalid pixels is undefined.
+ *  Does not own the pixels. */
 template <typename DepthT, typename ColourT> struct BasicRangeImage {
   int view_id = 0; ///< 0 .. kMaxViews - 1
   Roi roi;

@@ -25,15 +25,15 @@ struct PartnerCamera {
 /** One view of a rig. A raw view may have lens distortion and partners (right, third); a *range
  *  view*, what the caps of range images carry, is a plain pinhole camera without either. */
 struct View {
-  int id = 0;            ///< 0 .. kMaxViews - 1, unique in the rig
-  std::string name;      ///< at most kMaxViewName bytes of UTF-8; for people only
-  std::string camera;    ///< serial number, name or address of the (left) camera, for who opens
-                         ///< it; at most kMaxViewName bytes; in the file form only
-  int width = 0;         ///< pixels, full image
-  int height = 0;        ///< pixels, full image
-  Intrinsics intrinsics; ///< of the left camera, or of the range image
-  Distortion distortion; ///< of the left camera; empty for a range view
-  Pose world_from_view;  ///< of the left camera; world: right-handed, y up, metres
+  int id = 0;                 ///< 0 .. kMaxViews - 1, unique in the rig
+  std::string name;           ///< at most kMaxViewName bytes of UTF-8; for display only
+  std::string camera;         ///< serial number, name or address of the (left) camera, for programs
+                              ///< that open it; at most kMaxViewName bytes; in the file form only
+  int width = 0;              ///< pixels, full image
+  int height = 0;             ///< pixels, full image
+  Intrinsics intrinsics;      ///< of the left camera, or of the range image
+  Distortion distortion;      ///< of the left camera; empty for a range view
+  Pose world_from_view;       ///< of the left camera; world: right-handed, y up, metres
   double depth_unit_m = 1e-4; ///< metres per depth step
   double near_m = 0.3;        ///< nearest depth of interest, metres, > 0
   double far_m = 3.0;         ///< farthest depth of interest, metres, > near_m, < 65536 units
@@ -64,7 +64,7 @@ struct Rig {
 };
 
 /** Checks every field against the ranges above; the message names view and field.
- *  @return kBadSize if the rig is larger than kMaxRigPixels, else kBadValue for what is wrong */
+ *  @return kBadSize if the rig is larger than kMaxRigPixels, else kBadValue */
 Status validate (const Rig &rig);
 
 /** Union of two rigs. A view that both have must be the same in both.

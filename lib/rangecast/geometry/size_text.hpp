@@ -5,7 +5,7 @@
 
 namespace rangecast {
 
-/** "640x480", as error texts say it. Pixels. */
+/** "640x480", for error messages. Sizes in pixels. */
 inline std::string
 size_text (int width, int height)
 {

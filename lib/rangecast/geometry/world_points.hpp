@@ -35,7 +35,7 @@ struct PixelLookup {
   explicit PixelLookup (const View &view);
 
   /** @param[out] u, v   pixel of the full image, not rounded
-   *  @param[out] depth  depth units; u and v mean nothing if it is not positive */
+   *  @param[out] depth  depth units; u and v are undefined if it is not positive */
   void find (const float point[3], float &u, float &v, float &depth) const
   {
     const auto row = [&] (int k) {

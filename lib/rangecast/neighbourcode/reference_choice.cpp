@@ -8,7 +8,7 @@ namespace {
 
 /* A reference that does not pay is tried again after 1, 2, 4... frame sets, up to this many: about
  * a second at 30 frame sets a second. */
-constexpr int kLongestWait = 32;
+constexpr int kMaxWait = 32;
 
 /* A reference is doubtful from this share of the key size on: key bands are coded finer than the
  * thresholds ask, and would be smaller otherwise. */
@@ -37,7 +37,7 @@ ReferenceChoice::sort (std::span<const RowBand> bands, std::vector<RowBand> &fin
   bool has_tried = false; /* one retry a frame set, which bounds its time */
   for (const RowBand &band : bands) {
     Band &known = bands_[band.index];
-    known.waited = std::min (known.waited + 1, kLongestWait);
+    known.waited = std::min (known.waited + 1, kMaxWait);
     const bool is_due = known.waited >= known.wait && !has_tried;
     const bool may_try = known.state == State::kUnknown ||
                          (is_due && (known.state == State::kPaysNot || known.is_doubtful));
@@ -65,7 +65,7 @@ ReferenceChoice::record_trial (const RowBand &band, std::size_t delta_bytes, con
   const bool pays = delta_bytes < key.bytes;
   const State state = pays ? State::kPays : State::kPaysNot;
   const bool is_new = pays && known.state == State::kPaysNot;
-  known.wait = state == known.state ? std::min (2 * known.wait, kLongestWait) : 1;
+  known.wait = state == known.state ? std::min (2 * known.wait, kMaxWait) : 1;
   known.state = state;
   known.waited = 0;
   known.key_bytes = double (key.bytes) / double (std::max<std::size_t> (key.pixels, 1));

@@ -77,18 +77,18 @@ template <typename L> struct CellRows::RowLoops {
   void add_nearest (
       const Slice &other, std::size_t column, const F &radius, F &x, F &z, U (&seen)[2]) const
   {
-    F least = rules.layer_gap + F{}, best_x = {}, best_z = {};
+    F nearest = rules.layer_gap + F{}, best_x = {}, best_z = {};
     U best[2] = {};
     for (int q = 0; q < other.planes; q++) {
       const std::size_t at = std::size_t{other.first_row + q} * rows.width_ + kPad + column;
       F d = L::at (&rows.radius_[at]) - radius;
       L::make_positive (d);
-      const I take = d <= least;
-      least = take ? d : least;
-      best_x = take ? L::at (&rows.sum_[0][at]) : best_x;
-      best_z = take ? L::at (&rows.sum_[1][at]) : best_z;
+      const I nearer = d <= nearest;
+      nearest = nearer ? d : nearest;
+      best_x = nearer ? L::at (&rows.sum_[0][at]) : best_x;
+      best_z = nearer ? L::at (&rows.sum_[1][at]) : best_z;
       for (int w = 0; w < kWords; w++)
-        best[w] = take ? L::at (&rows.views_[w][at]) : best[w];
+        best[w] = nearer ? L::at (&rows.views_[w][at]) : best[w];
     }
     x += best_x;
     z += best_z;
@@ -144,15 +144,15 @@ template <typename L> struct CellRows::RowLoops {
     const std::size_t to = std::size_t{row} * rows.width_ + kPad;
     for (int c = 0; c < rows.columns_; c += kLanes) {
       const F radius = L::at (&rows.radius_[to + c]);
-      F least = rules.layer_gap + F{};
+      F nearest = rules.layer_gap + F{};
       I held = I{} - 1;
       for (int q = 0; old && q < old->planes; q++) {
         const std::size_t at = std::size_t{old->first_row + q} * rows.old_width_ + kPad + c;
         F d = L::at (&rows.old_radius_[at]) - radius;
         L::make_positive (d);
-        const I take = d <= least;
-        least = take ? d : least;
-        held = take ? L::at (&rows.old_first_[at]) : held;
+        const I nearer = d <= nearest;
+        nearest = nearer ? d : nearest;
+        held = nearer ? L::at (&rows.old_first_[at]) : held;
       }
       L::at (&rows.held_[to + c]) = held;
     }
@@ -229,9 +229,9 @@ template <typename L> struct CellRows::RowLoops {
     for (int k = 0; k < around.count; k++)
       agreeing -= around.winners[k] == view;
     score += bonus + __builtin_convertvector(agreeing, F) * (rules.agreement / 4);
-    const I take = in & (score > best.score);
-    best.score = take ? score : best.score;
-    best.view = take ? view + I{} : best.view;
+    const I better = in & (score > best.score);
+    best.score = better ? score : best.score;
+    best.view = better ? view + I{} : best.view;
   }
 
   void decide_block (std::size_t here, const Slice &slice, const Neighbours &around) const

@@ -17,8 +17,9 @@ Cells::lay_out (std::span<const HeightRange> ranges)
   double height = 0;
   for (const HeightRange &range : ranges)
     height += std::max (0.0, double{range.y_max} - range.y_min);
-  const double most = kMaxCells / settings_.columns - 2.0 * static_cast<double> (ranges.size ());
-  const double step = slice_height_m = std::max (settings_.height_m, height / most);
+  const double max_slices =
+      kMaxCells / settings_.columns - 2.0 * static_cast<double> (ranges.size ());
+  const double step = slice_height_m = std::max (settings_.height_m, height / max_slices);
   slices.clear ();
   for (std::size_t cluster = 0; cluster < ranges.size (); cluster++) {
     const HeightRange &range = ranges[cluster];
@@ -95,16 +96,16 @@ void
 Cells::make_works (int threads)
 {
   const std::size_t workers = workers_for (slices.size (), threads);
-  std::size_t most = 0;
+  std::size_t largest = 0;
   for (std::size_t s = 0; s < slices.size (); s++)
-    most = std::max<std::size_t> (
-        most, begin_[(s + 1) * static_cast<std::size_t> (settings_.columns) - 1] - slices[s].begin);
+    largest = std::max<std::size_t> (largest,
+        begin_[(s + 1) * static_cast<std::size_t> (settings_.columns) - 1] - slices[s].begin);
   if (works_.size () < workers)
     works_.resize (workers);
   for (Work &work : works_)
-    if (work.chain.size () < most) {
-      work.entries.resize (most + most / 4);
-      work.chain.resize (most + most / 4);
+    if (work.chain.size () < largest) {
+      work.entries.resize (largest + largest / 4);
+      work.chain.resize (largest + largest / 4);
     }
 }
 
@@ -122,11 +123,11 @@ Cells::sort (const WorldPoints &cloud, std::span<const float> radius,
       [&] (std::size_t s, std::size_t worker) { cut (slices[s], works_[worker]); });
   const auto images = static_cast<int> (cloud.parts ().size ());
   rows.begin (settings.columns, slice_height_m, images, slices.size ());
-  int most = static_cast<int> (kMaxNodes / (settings.columns + 24)); /* rows */
+  int rows_left = static_cast<int> (kMaxNodes / (settings.columns + 24));
   for (const Slice &slice : slices) {
-    const int planes = std::min ({slice.planes, CellRows::kPlanes, most});
+    const int planes = std::min ({slice.planes, CellRows::kPlanes, rows_left});
     rows.add_slice (slice.cluster, slice.number, planes);
-    most -= planes;
+    rows_left -= planes;
   }
   rows.make_room ();
 }

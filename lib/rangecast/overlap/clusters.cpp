@@ -89,9 +89,9 @@ int
 Clusters::label_places (int max_clusters, std::array<Found, kMaxClusters + 1> &found)
 {
   /* A place with a point or two is noise between clusters, not a bridge. */
-  const std::uint32_t least = 1 + counted_ / 5000;
+  const std::uint32_t noise = 1 + counted_ / 5000;
   for (std::uint32_t &points : points_)
-    points = points > least ? points : 0;
+    points = points > noise ? points : 0;
   labels_.assign (kSide * kSide, 0);
   queue_.reserve (kSide * kSide);
   int count = 0;

@@ -60,9 +60,9 @@ is_steady (const RangeImage &image, int x, int y, float steepest)
             above = image.depth.at (x, y - kReach), below = image.depth.at (x, y + kReach);
   if (!left || !right || !above || !below)
     return false;
-  const float most = steepest * image.depth.at (x, y) * 2 * kReach;
-  return static_cast<float> (std::abs (right - left)) < most &&
-         static_cast<float> (std::abs (below - above)) < most;
+  const float max_change = steepest * image.depth.at (x, y) * 2 * kReach;
+  return static_cast<float> (std::abs (right - left)) < max_change &&
+         static_cast<float> (std::abs (below - above)) < max_change;
 }
 
 /* The median of a histogram, linear within its bin. */
@@ -273,7 +273,7 @@ ColourBalance::solve ()
 void
 ColourBalance::follow (std::span<const RangeImage> images)
 {
-  const float most = std::log (kMaxGain);
+  const float max = std::log (kMaxGain);
   for (const RangeImage &image : images) {
     const auto id = static_cast<std::size_t> (image.view_id);
     if (!(linked_ >> id & 1)) /* keeps its gains */
@@ -285,7 +285,7 @@ ColourBalance::follow (std::span<const RangeImage> images)
     const float share = std::max (kShareOfNew, 1 / static_cast<float> (frames_[id]));
     for (std::size_t c = 0; c < 3; c++) {
       float &gain = log_gains_[id][c];
-      gain += share * (std::clamp (measured_[id][c], -most, most) - gain);
+      gain += share * (std::clamp (measured_[id][c], -max, max) - gain);
     }
   }
 }

@@ -73,7 +73,7 @@ ColourBlend::owner_of (Images images, std::size_t i, int x, int y) const
   float point[3];
   cameras_.point (images[i], x, y, before (images, i, x, y), point);
   int owner = -1;
-  float least = 1; /* of what counts as the same surface */
+  float nearest = 1; /* share of the maximum difference on one surface */
   for (std::size_t j = 0; j < images.size (); j++) {
     const RangeImage &other = images[j];
     ColourCameras::Place place;
@@ -85,8 +85,8 @@ ColourBlend::owner_of (Images images, std::size_t i, int x, int y) const
       continue;
     const float off = std::abs (place.depth - there) /
                       cameras_.of[static_cast<std::size_t> (other.view_id)].max_difference;
-    if (off < least) {
-      least = off;
+    if (off < nearest) {
+      nearest = off;
       owner = static_cast<int> (j);
     }
   }
@@ -171,13 +171,13 @@ ColourBlend::farthest (const RangeImage &image, const Work &work, float width_m)
 
 /* One of the two passes of a chamfer distance transform over the points that are kept. */
 void
-ColourBlend::spread (Images images, std::size_t i, int most, bool down)
+ColourBlend::spread (Images images, std::size_t i, int max_distance, bool down)
 {
   const RangeImage &image = images[i];
   const Work &work = works_[i];
   const int width = image.depth.width, way = down ? -1 : 1;
-  const int first = std::max (0, work.first - most / 2),
-            last = std::min (image.depth.height - 1, work.last + most / 2);
+  const int first = std::max (0, work.first - max_distance / 2),
+            last = std::min (image.depth.height - 1, work.last + max_distance / 2);
   const float same = cameras_.of[static_cast<std::size_t> (image.view_id)].max_difference;
   for (int k = 0; k <= last - first; k++) {
     const int y = down ? first + k : last - k;
@@ -187,7 +187,7 @@ ColourBlend::spread (Images images, std::size_t i, int most, bool down)
                         *other = k > 0 ? image.depth.row (y + way) : depth;
     const auto offer = [&] (Seam &seam, const Seam &near, int step, int apart) {
       const int distance = near.distance + step;
-      if (distance < seam.distance && distance <= most &&
+      if (distance < seam.distance && distance <= max_distance &&
           static_cast<float> (std::abs (apart)) <= same)
         seam = {static_cast<std::uint8_t> (distance), near.other};
     };
@@ -198,7 +198,7 @@ ColourBlend::spread (Images images, std::size_t i, int most, bool down)
       const int left = std::max (x - 1, 0), right = std::min (x + 1, width - 1),
                 before = down ? left : right;
       Seam &seam = here[x];
-      /* Far from all seams, which most are. */
+      /* Far from all seams, as most pixels are. */
       if ((there[left].distance & there[x].distance & there[right].distance &
               here[before].distance) == kFar)
         continue;
@@ -212,7 +212,7 @@ ColourBlend::spread (Images images, std::size_t i, int most, bool down)
 
 /* The pixels within the width, and their shares. */
 void
-ColourBlend::find_near (Images images, std::size_t i, int most, float width_m)
+ColourBlend::find_near (Images images, std::size_t i, int max_distance, float width_m)
 {
   const RangeImage &image = images[i];
   Work &work = works_[i];
@@ -220,8 +220,8 @@ ColourBlend::find_near (Images images, std::size_t i, int most, float width_m)
       width_m * cameras_.of[static_cast<std::size_t> (image.view_id)].pixels_per_metre;
   work.near.clear ();
   work.near.reserve (begin_[i + 1] - begin_[i]); /* as many as there can be, once */
-  const int last = std::min (image.depth.height - 1, work.last + most / 2);
-  for (int y = std::max (0, work.first - most / 2); y <= last; y++) {
+  const int last = std::min (image.depth.height - 1, work.last + max_distance / 2);
+  for (int y = std::max (0, work.first - max_distance / 2); y <= last; y++) {
     const Seam *seams =
         seams_.data () + begin_[i] + static_cast<std::size_t> (y) * image.depth.width;
     for (int x = 0; x < image.depth.width; x++) {
@@ -382,10 +382,10 @@ ColourBlend::work (Images images, double width_m, int threads)
     find_seams (images, i);
     if (works_[i].last < 0)
       return;
-    const int most = farthest (images[i], works_[i], width);
-    spread (images, i, most, true);
-    spread (images, i, most, false);
-    find_near (images, i, most, width);
+    const int max_distance = farthest (images[i], works_[i], width);
+    spread (images, i, max_distance, true);
+    spread (images, i, max_distance, false);
+    find_near (images, i, max_distance, width);
     if (works_[i].near.empty ())
       return;
     compare (images, i);

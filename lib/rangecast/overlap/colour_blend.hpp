@@ -74,8 +74,8 @@ private:
   [[nodiscard]] int owner_of (Images images, std::size_t i, int x, int y) const;
   [[nodiscard]] int seam_at (Images images, std::size_t i, int x, int y) const;
   [[nodiscard]] int farthest (const RangeImage &image, const Work &work, float width_m) const;
-  void spread (Images images, std::size_t i, int most, bool down);
-  void find_near (Images images, std::size_t i, int most, float width_m);
+  void spread (Images images, std::size_t i, int max_distance, bool down);
+  void find_near (Images images, std::size_t i, int max_distance, float width_m);
   void compare (Images images, std::size_t i);
   bool seen_by (
       Images images, std::size_t j, const float point[3], Colour &colour, float &trust) const;

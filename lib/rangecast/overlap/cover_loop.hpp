@@ -128,16 +128,17 @@ template <typename L> struct RedundantPoints::CoverLoop {
       corners[2][i] = lower[0];
       corners[3][i] = lower[beside];
     }
-    F least = corners[0], most = corners[0];
+    F nearest = corners[0], farthest = corners[0];
     for (int k = 1; k < 4; k++) {
-      least = corners[k] < least ? corners[k] : least;
-      most = corners[k] > most ? corners[k] : most;
+      nearest = corners[k] < nearest ? corners[k] : nearest;
+      farthest = corners[k] > farthest ? corners[k] : farthest;
     }
     const F above = corners[0] + right_share * (corners[1] - corners[0]),
             below = corners[2] + right_share * (corners[3] - corners[2]);
     F off = z - (above + down_share * (below - above));
     L::make_positive (off);
-    on_surface = seen & (least > 0) & (off <= kTolerance * (z * per_focal + (most - least)));
+    on_surface =
+        seen & (nearest > 0) & (off <= kTolerance * (z * per_focal + (farthest - nearest)));
   }
 
   /* Bounding box of a pixel and the triangles around it, in the other image's plane. */

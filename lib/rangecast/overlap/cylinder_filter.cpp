@@ -144,7 +144,7 @@ CylinderFilter::choose_slots (const std::array<Axis, kMaxClusters> &measured)
     taken |= 1u << slot;
   };
   for (int pair = 0; pair < cluster_count_; pair++) {
-    double least = kFar;
+    double nearest = kFar;
     int best_cluster = -1, best_slot = -1;
     for (int cluster = 0; cluster < cluster_count_; cluster++)
       for (int slot = 0; slot < kMaxClusters; slot++) {
@@ -152,8 +152,8 @@ CylinderFilter::choose_slots (const std::array<Axis, kMaxClusters> &measured)
           continue;
         const double distance =
             norm (trackers_[slot].axis ().position - measured[cluster].position);
-        if (distance < least)
-          least = distance, best_cluster = cluster, best_slot = slot;
+        if (distance < nearest)
+          nearest = distance, best_cluster = cluster, best_slot = slot;
       }
     if (best_cluster >= 0)
       assign (best_cluster, best_slot);

@@ -75,11 +75,12 @@ RedundantPoints::make_surface (const RangeImage &image, BytePlane &surface) cons
     const std::uint16_t *upper = image.depth.row (y), *lower = image.depth.row (y + 1);
     std::uint8_t *to = surface.row (y);
     for (int x = 0; x + 1 < image.depth.width; x++) {
-      const std::uint32_t least = std::min (
+      const std::uint32_t nearest = std::min (
                               std::min (upper[x], upper[x + 1]), std::min (lower[x], lower[x + 1])),
-                          most = std::max (
+                          farthest = std::max (
                               std::max (upper[x], upper[x + 1]), std::max (lower[x], lower[x + 1]));
-      to[x] = least != kInvalidDepth && most - least <= least * kStep >> 16 ? kSurface : 0;
+      to[x] =
+          nearest != kInvalidDepth && farthest - nearest <= nearest * kStep >> 16 ? kSurface : 0;
     }
   }
 }

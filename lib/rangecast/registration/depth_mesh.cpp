@@ -12,7 +12,7 @@ namespace {
 constexpr float kStep = 0.03f;
 /* Maximum size of a triangle in the other image, pixels: a rig that magnifies more is wrong, and
  * each triangle would cost the time of a whole image. */
-constexpr float kWidest = 64;
+constexpr float kMaxTriangleSide = 64;
 constexpr float kNearest = 0.01f; /* metres from the other camera */
 
 using Corner = cv::Vec3f;
@@ -31,7 +31,7 @@ struct Span {
 bool
 fits (float low, float high)
 {
-  return high - low <= kWidest && low > -1e6f && high < 1e6f;
+  return high - low <= kMaxTriangleSide && low > -1e6f && high < 1e6f;
 }
 
 /* Fills a front-facing triangle; 1/z is linear in the image. */

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "../geometry/point_cloud.hpp"
+#include "../opencv/image.hpp"
 
 namespace rangecast {
 namespace {
@@ -36,13 +37,6 @@ pinhole_of (const View &camera)
   view.right.reset ();
   view.third.reset ();
   return view;
-}
-
-cv::Mat
-mat_of (ImageView<const Rgbx> picture)
-{
-  return {picture.height, picture.width, CV_8UC4, const_cast<Rgbx *> (picture.data),
-      static_cast<std::size_t> (picture.stride)};
 }
 
 } // namespace
@@ -151,12 +145,12 @@ Registration::sample (ImageView<const Rgbx> colour, const cv::Vec3f &point, Rgbx
 void
 Registration::undistort_colour (ImageView<const Rgbx> colour, const RangeImage &image) const
 {
-  cv::Mat out = mat_of (image.colour);
+  cv::Mat out = opencv_image (image.colour);
   if (outside_.empty ()) {
-    mat_of (colour).copyTo (out);
+    opencv_image (colour).copyTo (out);
     return;
   }
-  cv::remap (mat_of (colour), out, maps_[0], maps_[1], cv::INTER_LINEAR);
+  cv::remap (opencv_image (colour), out, maps_[0], maps_[1], cv::INTER_LINEAR);
   cv::Mat (image.depth.height, image.depth.width, CV_16U, image.depth.data,
       static_cast<std::size_t> (image.depth.stride))
       .setTo (kInvalidDepth, outside_);

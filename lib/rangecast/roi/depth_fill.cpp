@@ -77,12 +77,12 @@ std::uint16_t
 likeliest (const RangeImage &image, int x, int y)
 {
   std::uint16_t depth = kInvalidDepth;
-  std::size_t least = SIZE_MAX;
+  std::size_t smallest = SIZE_MAX;
   for_neighbours (image, x, y, [&] (int u, int v) {
     const std::uint16_t d = image.depth.at (u, v);
     const std::size_t difference = unlike (image.colour.at (u, v), image.colour.at (x, y));
-    if (d != kInvalidDepth && difference < least) {
-      least = difference;
+    if (d != kInvalidDepth && difference < smallest) {
+      smallest = difference;
       depth = d;
     }
   });

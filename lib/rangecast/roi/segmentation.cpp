@@ -385,18 +385,18 @@ Segmenter::remove_small (cv::Mat &mask, int min_area, int keep)
   areas_.clear ();
   for (int i = 1; i < count; i++)
     areas_.push_back (stats_.at<int> (i, cv::CC_STAT_AREA));
-  int least = min_area;
+  int min_kept = min_area;
   if (keep > 0 && keep < static_cast<int> (areas_.size ())) {
     std::nth_element (areas_.begin (), areas_.begin () + keep - 1, areas_.end (), std::greater ());
-    least = std::max (least, areas_[static_cast<std::size_t> (keep - 1)]);
+    min_kept = std::max (min_kept, areas_[static_cast<std::size_t> (keep - 1)]);
   }
-  if (std::ranges::none_of (areas_, [least] (int area) { return area < least; }))
+  if (std::ranges::none_of (areas_, [min_kept] (int area) { return area < min_kept; }))
     return;
   for (int y = 0; y < mask.rows; y++) {
     std::uint8_t *row = mask.ptr (y);
     const int *label = labels_.ptr<int> (y);
     for (int x = 0; x < mask.cols; x++)
-      if (row[x] && stats_.at<int> (label[x], cv::CC_STAT_AREA) < least)
+      if (row[x] && stats_.at<int> (label[x], cv::CC_STAT_AREA) < min_kept)
         row[x] = 0;
   }
 }

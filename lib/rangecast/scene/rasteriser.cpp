@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kSubpixels = 256;
 /* Corners farther out than this do not fit the fixed-point arithmetic (64 bit products). */
-constexpr float kFarthest = 1 << 20;
+constexpr float kMaxPosition = 1 << 20;
 
 } // namespace
 
@@ -213,7 +213,7 @@ Rasteriser::draw (
     const std::vector<RasterVertex> &vertices, const Mesh &mesh, ImageView<Rgbx> colour)
 {
   const auto usable = [] (const RasterVertex &v) {
-    return v.inverse_depth > 0 && std::abs (v.x) < kFarthest && std::abs (v.y) < kFarthest;
+    return v.inverse_depth > 0 && std::abs (v.x) < kMaxPosition && std::abs (v.y) < kMaxPosition;
   };
   const bool plain = mesh.colours.empty () && mesh.alpha_cutoff == 0 &&
                      mesh.wrap_u == TextureWrap::kClamp && mesh.wrap_v == TextureWrap::kClamp;

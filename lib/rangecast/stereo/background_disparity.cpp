@@ -39,21 +39,21 @@ guess_row (std::int16_t *row, int width)
 /* Marks pixels without disparity next to the background as hidden from one camera. */
 void
 BackgroundDisparity::mark_hidden (
-    const std::int16_t *d, const std::uint8_t *grey, int y, int least, int far)
+    const std::int16_t *d, const std::uint8_t *grey, int y, int min, int far)
 {
   auto known = known_.ptr<std::int16_t> (y);
   auto picture = picture_.ptr<std::uint8_t> (y);
   const int width = known_.cols;
   const auto is_background = [&] (int x) {
-    return x >= 0 && x < width && d[x] >= least && d[x] < far;
+    return x >= 0 && x < width && d[x] >= min && d[x] < far;
   };
   for (int x = 0; x < width;) {
-    if (d[x] >= least) {
+    if (d[x] >= min) {
       x++;
       continue;
     }
     const int begin = x;
-    while (x < width && d[x] < least)
+    while (x < width && d[x] < min)
       x++;
     if (!is_background (begin - 1) && !is_background (x))
       continue;
@@ -66,7 +66,7 @@ BackgroundDisparity::mark_hidden (
 }
 
 void
-BackgroundDisparity::remember (const cv::Mat &grey, const cv::Mat &disparity, int least, int far)
+BackgroundDisparity::remember (const cv::Mat &grey, const cv::Mat &disparity, int min, int far)
 {
   if (known_.size () != grey.size ()) {
     known_.create (grey.size (), CV_16S);
@@ -79,12 +79,12 @@ BackgroundDisparity::remember (const cv::Mat &grey, const cv::Mat &disparity, in
     auto known = known_.ptr<std::int16_t> (y);
     auto picture = picture_.ptr<std::uint8_t> (y);
     for (int x = 0; x < grey.cols; x++)
-      if (d[x] >= least && d[x] < far) {
+      if (d[x] >= min && d[x] < far) {
         known[x] = d[x];
         picture[x] = g[x];
       } else if (d[x] >= far && known[x] == kHidden)
         known[x] = kUnknown;
-    mark_hidden (d, g, y, least, far);
+    mark_hidden (d, g, y, min, far);
   }
   known_.copyTo (likely_);
   for (int y = 0; y < grey.rows; y++)
@@ -93,7 +93,7 @@ BackgroundDisparity::remember (const cv::Mat &grey, const cv::Mat &disparity, in
 
 void
 BackgroundDisparity::extend (
-    const cv::Point &at, int least, int far, const Tiles &tiles, cv::Mat &disparity) const
+    const cv::Point &at, int min, int far, const Tiles &tiles, cv::Mat &disparity) const
 {
   constexpr std::int16_t kNothing = 32767;
   tiles.each ([&] (const cv::Rect &tile, std::size_t) {
@@ -106,17 +106,17 @@ BackgroundDisparity::extend (
         return inside && back[x] > kHidden ? back[x] : kNothing;
       };
       for (int x = tile.x; x < tile.br ().x;) {
-        if (d[x] >= least) {
+        if (d[x] >= min) {
           x++;
           continue;
         }
         const int begin = x;
-        while (x < tile.br ().x && d[x] < least)
+        while (x < tile.br ().x && d[x] < min)
           x++;
         const std::int16_t farther = std::min (begin > tile.x ? d[begin - 1] : beside (begin - 1),
             x < tile.br ().x ? d[x] : beside (x));
-        if (farther >= least && farther < far)
-          std::fill (d + begin, d + x, static_cast<std::int16_t> (least));
+        if (farther >= min && farther < far)
+          std::fill (d + begin, d + x, static_cast<std::int16_t> (min));
       }
     }
   });
@@ -126,10 +126,10 @@ BackgroundDisparity::extend (
  * disparity  of the size of job.left */
 void
 BackgroundDisparity::compare (const Job &job, const cv::Rect &tile, const cv::Mat &disparity,
-    int least, Memory &m, Plane &unlike) const
+    int min, Memory &m, Plane &unlike) const
 {
   const int x0 = tile.x - kRadius, y0 = tile.y - kRadius;
-  const auto lowest = static_cast<std::int16_t> (least);
+  const auto lowest = static_cast<std::int16_t> (min);
   m.pixels.set_size (tile.width + 2 * kRadius, tile.height + 2 * kRadius);
   const int width = m.pixels.width (), begin = std::max (0, -x0),
             end = std::min (width, disparity.cols - x0);
@@ -169,15 +169,15 @@ BackgroundDisparity::restore_row (
                fits = back[x] != kUnknown && other[x] <= kNoiseSum + contrast[x] / 2;
     if (still && seen[x] == kHidden)
       d[x] = static_cast<std::int16_t> (job.none);
-    else if (still || (fits && (d[x] < job.least || other[x] + kNoise * kArea < own[x]))) {
+    else if (still || (fits && (d[x] < job.min || other[x] + kNoise * kArea < own[x]))) {
       d[x] = back[x];
       m.claims[there (x)] = std::min (m.claims[there (x)], other[x]);
-    } else if (d[x] < job.least)
+    } else if (d[x] < job.min)
       d[x] = static_cast<std::int16_t> (job.none);
   }
   /* A right pixel that matches the background better cannot match something else as well. */
   for (int x = 0; x < width; x++)
-    if (d[x] >= job.least && m.claims[there (x)] < own[x])
+    if (d[x] >= job.min && m.claims[there (x)] < own[x])
       d[x] = static_cast<std::int16_t> (job.none);
 }
 
@@ -189,7 +189,7 @@ BackgroundDisparity::restore_tile (
   cut_grey (job.left, tile, 2 * kRadius, m.grey);
   differ_from_mean<kRadius> (m.grey, m.pixels, m.sums, m.columns);
   sum_windows<kRadius> (m.pixels, m.contrast, m.columns);
-  compare (job, tile, disparity, job.least, m, m.own);
+  compare (job, tile, disparity, job.min, m, m.own);
   compare (job, tile, likely_ (part), kHidden + 1, m, m.other);
   cut_grey (picture_ (part), tile, kRadius, m.before);
   m.pixels.set_size (m.before.width (), m.before.height ());
@@ -209,10 +209,10 @@ BackgroundDisparity::restore_tile (
 
 void
 BackgroundDisparity::restore (const cv::Mat &left, const cv::Mat &right, int right_x,
-    const cv::Point &at, int least, int none, const Tiles &tiles, const cv::Mat &disparity,
+    const cv::Point &at, int min, int none, const Tiles &tiles, const cv::Mat &disparity,
     cv::Mat &to)
 {
-  const Job job = {left, right, right_x, at, least, none};
+  const Job job = {left, right, right_x, at, min, none};
   memory_.reserve (tiles.workers ());
   tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
     restore_tile (job, tile, disparity, memory_.of (worker), to);

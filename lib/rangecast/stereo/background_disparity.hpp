@@ -20,25 +20,24 @@ public:
   [[nodiscard]] bool empty () const { return known_.empty (); }
 
   /** @param grey       the whole left image
-   *  @param disparity  its disparities; background from `least` to below `far`
+   *  @param disparity  its disparities; background from `min` to below `far`
    *  Keeps what was known where something else is now; where nothing is known, guesses from the
    * rest of the row. */
-  void remember (const cv::Mat &grey, const cv::Mat &disparity, int least, int far);
+  void remember (const cv::Mat &grey, const cv::Mat &disparity, int min, int far);
 
   /** Replaces disparities by the background's where that matches the images better, and removes
    * them next to the background where there was none and the image has not changed: the right
    * camera does not see these pixels.
    *  @param left, right  the same rows; column `right_x` of `right` is column 0 of `left`
    *  @param at           position of `left` in the whole image
-   *  @param none         written where `disparity` stays below `least`
+   *  @param none         written where `disparity` stays below `min`
    *  @param[out] to      as `disparity`, not the same memory; written in `tiles` */
   void restore (const cv::Mat &left, const cv::Mat &right, int right_x, const cv::Point &at,
-      int least, int none, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to);
+      int min, int none, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to);
 
-  /** Sets the farthest disparity, `least`, for pixels without disparity next to the background in
+  /** Sets the farthest disparity, `min`, for pixels without disparity next to the background in
    * their row: one camera does not see them. */
-  void extend (
-      const cv::Point &at, int least, int far, const Tiles &tiles, cv::Mat &disparity) const;
+  void extend (const cv::Point &at, int min, int far, const Tiles &tiles, cv::Mat &disparity) const;
 
 private:
   /* Scratch memory of one thread for one tile: pixels, and sums over patches. */
@@ -52,16 +51,16 @@ private:
     const cv::Mat &left, &right;
     int right_x;
     cv::Point at;
-    int least, none;
+    int min, none;
   };
-  void compare (const Job &job, const cv::Rect &tile, const cv::Mat &disparity, int least,
+  void compare (const Job &job, const cv::Rect &tile, const cv::Mat &disparity, int min,
       Memory &memory, Plane &unlike) const;
   void restore_tile (const Job &job, const cv::Rect &tile, const cv::Mat &disparity, Memory &memory,
       cv::Mat &to) const;
   void restore_row (const Job &job, int x0, int y, int i, int width, Memory &memory,
       std::int16_t *disparity) const;
   void mark_hidden (
-      const std::int16_t *disparity, const std::uint8_t *grey, int y, int least, int far);
+      const std::int16_t *disparity, const std::uint8_t *grey, int y, int min, int far);
 
   cv::Mat known_;   /* CV_16S; kUnknown; kHidden: had no disparity */
   cv::Mat likely_;  /* the same with guesses from the row */

@@ -53,10 +53,10 @@ average_whole_blocks (const cv::Mat &picture, std::vector<std::uint16_t> &sums, 
 }
 
 bool
-differ (const cv::Vec4b &a, const cv::Vec4b &b, int most)
+differ (const cv::Vec4b &a, const cv::Vec4b &b, int max_difference)
 {
   for (int c = 0; c < 3; c++)
-    if (std::abs (a[c] - b[c]) > most)
+    if (std::abs (a[c] - b[c]) > max_difference)
       return true;
   return false;
 }

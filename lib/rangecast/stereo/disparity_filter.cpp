@@ -46,7 +46,7 @@ copy_with_border (
 /* Sums over patches: number of pixels with disparity, signed and absolute difference between both
  * images, and contrast of the left one. */
 void
-DisparityFilter::compare_patches (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
+DisparityFilter::compare_patches (const cv::Mat &left, const cv::Mat &right, int right_x, int min,
     const cv::Rect &tile, const cv::Mat &disparity, Memory &m) const
 {
   cut_grey (left, tile, 2 * kPatchRadius, m.grey);
@@ -68,7 +68,7 @@ DisparityFilter::compare_patches (const cv::Mat &left, const cv::Mat &right, int
       look_up (d + begin, end - begin, right.ptr<std::uint8_t> (row), right.cols,
           x0 + begin + right_x, size);
       for (int x = begin; x < end; x++) {
-        valid[x] = d[x] >= least;
+        valid[x] = d[x] >= min;
         difference[x] = std::int16_t (valid[x] ? l[x] - size[x - begin] : 0);
       }
     }
@@ -83,13 +83,13 @@ DisparityFilter::compare_patches (const cv::Mat &left, const cv::Mat &right, int
 
 void
 DisparityFilter::clear_unlike (const cv::Mat &left, const cv::Mat &right, int right_x,
-    double tolerance, int least, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to)
+    double tolerance, int min, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to)
 {
   const int share = int (256 * tolerance);
   memory_.reserve (tiles.workers ());
   tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
     Memory &m = memory_.of (worker);
-    compare_patches (left, right, right_x, least, tile, disparity, m);
+    compare_patches (left, right, right_x, min, tile, disparity, m);
     for (int y = 0; y < tile.height; y++) {
       const std::int16_t *counts = m.counts.row (y), *differences = m.differences.row (y),
                          *sizes = m.sizes.row (y), *contrasts = m.contrasts.row (y);
@@ -97,26 +97,26 @@ DisparityFilter::clear_unlike (const cv::Mat &left, const cv::Mat &right, int ri
       auto out = to.ptr<std::int16_t> (tile.y + y) + tile.x;
       for (int x = 0; x < tile.width; x++) {
         const int unlike = kPatchArea * (sizes[x] - std::abs (int (differences[x])) / 2),
-                  most = (share * contrasts[x] / 256 + kNoise * kPatchArea) * counts[x];
-        out[x] = unlike > most ? std::int16_t (least - 16) : from[x];
+                  max = (share * contrasts[x] / 256 + kNoise * kPatchArea) * counts[x];
+        out[x] = unlike > max ? std::int16_t (min - 16) : from[x];
       }
     }
   });
 }
 
 void
-DisparityFilter::clear_hidden (int least, const Tiles &tiles, cv::Mat &disparity)
+DisparityFilter::clear_hidden (int min, const Tiles &tiles, cv::Mat &disparity)
 {
   constexpr int kTolerance = 24; /* 1/16 pixel */
-  const auto none = static_cast<std::int16_t> (least - 16);
+  const auto none = static_cast<std::int16_t> (min - 16);
   memory_.reserve (tiles.workers ());
   tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
     std::vector<std::int16_t> &nearest = memory_.of (worker).nearest;
     for (int y = tile.y; y < tile.br ().y; y++) {
       auto d = disparity.ptr<std::int16_t> (y) + tile.x;
-      int low = 32767, high = least;
+      int low = 32767, high = min;
       for (int x = 0; x < tile.width; x++) {
-        low = std::min<int> (low, d[x] >= least ? d[x] : 32767);
+        low = std::min<int> (low, d[x] >= min ? d[x] : 32767);
         high = std::max<int> (high, d[x]);
       }
       if (low > high)
@@ -125,27 +125,27 @@ DisparityFilter::clear_hidden (int least, const Tiles &tiles, cv::Mat &disparity
       nearest.assign (std::size_t (tile.width + first - ((low + 8) >> 4)), none);
       const auto there = [&] (int x) { return std::size_t (x + first - ((d[x] + 8) >> 4)); };
       for (int x = 0; x < tile.width; x++)
-        if (d[x] >= least)
+        if (d[x] >= min)
           nearest[there (x)] = std::max (nearest[there (x)], d[x]);
       for (int x = 0; x < tile.width; x++)
-        if (d[x] >= least && d[x] + kTolerance < nearest[there (x)])
+        if (d[x] >= min && d[x] + kTolerance < nearest[there (x)])
           d[x] = none;
     }
   });
 }
 
 void
-DisparityFilter::clear_flying (double step, int support, int offset, int least, const Tiles &tiles,
+DisparityFilter::clear_flying (double step, int support, int offset, int min, const Tiles &tiles,
     const cv::Mat &disparity, cv::Mat &to)
 {
   const auto share = static_cast<std::uint16_t> (std::min (65535.0, 65536 * step));
-  const auto none = static_cast<std::int16_t> (least - 16);
+  const auto none = static_cast<std::int16_t> (min - 16);
   memory_.reserve (tiles.workers ());
   tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
     Plane &copy = memory_.of (worker).grey;
     constexpr int kLanes = cv::v_int16x8::nlanes;
     copy_with_border (disparity, tile, kLanes, none, copy);
-    const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (least)),
+    const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (min)),
                         zero = cv::v_setzero_s16 (), nothing = cv::v_setall_s16 (none),
                         shift = cv::v_setall_s16 (static_cast<short> (offset)),
                         /* counts are negative and include the pixel itself */
@@ -154,15 +154,14 @@ DisparityFilter::clear_flying (double step, int support, int offset, int least, 
       auto out = to.ptr<std::int16_t> (tile.y + y) + tile.x;
       for (int x = 0; x < tile.width; x += kLanes) {
         const cv::v_int16x8 d = cv::v_load (copy.row (y + 1) + x + 1);
-        const cv::v_uint16x8 most = cv::v_max (cv::v_setall_u16 (8),
+        const cv::v_uint16x8 max = cv::v_max (cv::v_setall_u16 (8),
             cv::v_mul_hi (
                 cv::v_reinterpret_as_u16 (cv::v_max (d + shift, zero)), cv::v_setall_u16 (share)));
         cv::v_int16x8 n = zero;
         for (int v = y; v < y + 3; v++)
           for (int u = x; u < x + 3; u++) {
             const cv::v_int16x8 other = cv::v_load (copy.row (v) + u);
-            n = n +
-                ((other >= valid) & cv::v_reinterpret_as_s16 (cv::v_absdiff (other, d) <= most));
+            n = n + ((other >= valid) & cv::v_reinterpret_as_s16 (cv::v_absdiff (other, d) <= max));
           }
         const cv::v_int16x8 result = cv::v_select (n < enough, d, nothing);
         if (x + kLanes <= tile.width)
@@ -181,15 +180,15 @@ DisparityFilter::clear_flying (double step, int support, int offset, int least, 
 
 void
 DisparityFilter::clear_doubled_of_row (const std::uint8_t *left, const std::uint8_t *right,
-    int right_width, int right_x, int least, int width, Memory &m, std::int16_t *d)
+    int right_width, int right_x, int min, int width, Memory &m, std::int16_t *d)
 {
   constexpr int kNarrow = 16, kWide = 48; /* pixels */
   m.surfaces.clear ();
   for (int x = 0; x < width;) {
     const int begin = x++;
-    while (x < width && d[begin] >= least && d[x] >= least && std::abs (d[x] - d[x - 1]) <= 16)
+    while (x < width && d[begin] >= min && d[x] >= min && std::abs (d[x] - d[x - 1]) <= 16)
       x++;
-    if (d[begin] >= least && (x - begin <= kNarrow || x - begin >= kWide))
+    if (d[begin] >= min && (x - begin <= kNarrow || x - begin >= kWide))
       m.surfaces.push_back ({begin, x});
   }
   const auto there = [&] (int x) {
@@ -208,19 +207,19 @@ DisparityFilter::clear_doubled_of_row (const std::uint8_t *left, const std::uint
     for (int x = begin; x < end; x++)
       doubled += seen[there (x)] < d[x] - 32;
     if (2 * doubled >= end - begin)
-      std::fill (d + begin, d + end, std::int16_t (least - 16));
+      std::fill (d + begin, d + end, std::int16_t (min - 16));
   }
 }
 
 void
-DisparityFilter::clear_doubled (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
+DisparityFilter::clear_doubled (const cv::Mat &left, const cv::Mat &right, int right_x, int min,
     const Tiles &tiles, cv::Mat &disparity)
 {
   memory_.reserve (tiles.workers ());
   tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
     for (int y = tile.y; y < tile.br ().y; y++)
       clear_doubled_of_row (left.ptr<std::uint8_t> (y) + tile.x, right.ptr<std::uint8_t> (y),
-          right.cols, right_x + tile.x, least, tile.width, memory_.of (worker),
+          right.cols, right_x + tile.x, min, tile.width, memory_.of (worker),
           disparity.ptr<std::int16_t> (y) + tile.x);
   });
 }
@@ -260,15 +259,15 @@ DisparityFilter::join_rows (const std::int16_t *upper, const std::int16_t *lower
 
 /* Finds the runs of one row, from x0 to x1. */
 void
-DisparityFilter::find_runs (const std::int16_t *d, int x0, int x1, int range, int least)
+DisparityFilter::find_runs (const std::int16_t *d, int x0, int x1, int range, int min)
 {
   for (int x = x0; x < x1;) {
-    if (d[x] < least) {
+    if (d[x] < min) {
       x++;
       continue;
     }
     const int begin = x++;
-    while (x < x1 && d[x] >= least && std::abs (d[x] - d[x - 1]) <= range)
+    while (x < x1 && d[x] >= min && std::abs (d[x] - d[x - 1]) <= range)
       x++;
     runs_.push_back ({begin, x, int (runs_.size ()), x - begin});
   }
@@ -276,7 +275,7 @@ DisparityFilter::find_runs (const std::int16_t *d, int x0, int x1, int range, in
 
 void
 DisparityFilter::clear_specks (
-    int window, int range, int least, int nearest, const Tiles &tiles, cv::Mat &disparity)
+    int window, int range, int min, int nearest, const Tiles &tiles, cv::Mat &disparity)
 {
   runs_.clear ();
   first_runs_.assign (std::size_t (disparity.rows) + 1, 0);
@@ -300,7 +299,7 @@ DisparityFilter::clear_specks (
       auto row = disparity.ptr<std::int16_t> (y);
       for (std::size_t i = first_runs_[std::size_t (y)]; i < first_runs_[std::size_t (y) + 1]; i++)
         if (runs_[std::size_t (find_root (int (i)))].size <= window)
-          std::fill (row + runs_[i].x0, row + runs_[i].x1, std::int16_t (least - 16));
+          std::fill (row + runs_[i].x0, row + runs_[i].x1, std::int16_t (min - 16));
     }
 }
 
@@ -339,14 +338,14 @@ fill_gap (const cv::Vec4b *colour, std::ptrdiff_t colour_step, std::int16_t *dis
 
 void
 DisparityFilter::fill_gaps (
-    const cv::Mat &colour, int width, int least, const Tiles &tiles, cv::Mat &disparity)
+    const cv::Mat &colour, int width, int min, const Tiles &tiles, cv::Mat &disparity)
 {
   tiles.each ([&] (const cv::Rect &tile, std::size_t) {
     for (int y = tile.y; y < tile.br ().y; y++) {
       auto d = disparity.ptr<std::int16_t> (y);
       int last = -1; /* with a disparity */
       for (int x = tile.x; x < tile.br ().x; x++) {
-        if (d[x] < least)
+        if (d[x] < min)
           continue;
         if (last >= 0 && x - last > 1 && x - last - 1 <= width)
           fill_gap (colour.ptr<cv::Vec4b> (y), 1, d, 1, last, x);
@@ -366,7 +365,7 @@ DisparityFilter::fill_gaps (
           for (int y = part.y; y < part.br ().y; y++) {
             const auto d = disparity.ptr<std::int16_t> (y);
             for (int x = std::max (begin, part.x); x < std::min (end, part.br ().x); x++) {
-              if (d[x] < least)
+              if (d[x] < min)
                 continue;
               int &last = last_rows_[std::size_t (x)];
               if (last >= 0 && y - last > 1 && y - last - 1 <= width)

@@ -11,10 +11,10 @@
 
 namespace rangecast {
 
-/** Clears wrong disparities. Disparities are CV_16S in 1/16 pixel, left x minus right x; below
- * `least` = none; cleared ones become least - 16. Greys are CV_8U, rectified, of the disparities'
- * size. Only pixels in `tiles` are read and written; there must be no disparities around them.
- * Reuses its memory between images. */
+/** Clears wrong disparities. Disparities are CV_16S in 1/16 pixel, left x minus right x; values
+ * below `min` mean none; cleared ones become min - 16. Greys are CV_8U, rectified, of the
+ * disparities' size. Only pixels in `tiles` are read and written; there must be no disparities
+ * around them. Reuses its memory between images. */
 class DisparityFilter {
 public:
   /** Clears pixels whose patches of 7 x 7 pixels differ between both images: the mean absolute
@@ -24,32 +24,32 @@ public:
    *  @param right  of the same height; its column `right_x` corresponds to column 0 of `left`
    *  @param[out] to  of the same size, not the same memory */
   void clear_unlike (const cv::Mat &left, const cv::Mat &right, int right_x, double tolerance,
-      int least, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to);
+      int min, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to);
 
   /** Clears pixels that are occluded in the right image: of all pixels that map to one right pixel,
    * those more than 1.5 pixels of disparity behind the nearest one. */
-  void clear_hidden (int least, const Tiles &tiles, cv::Mat &disparity);
+  void clear_hidden (int min, const Tiles &tiles, cv::Mat &disparity);
 
   /** Clears flying pixels: fewer than `support` of the eight neighbours have a disparity within
    * `step` (a fraction of disparity + offset, i.e. of depth) or 0.5 pixel.
    *  @param[out] to  of the same size, not the same memory */
-  void clear_flying (double step, int support, int offset, int least, const Tiles &tiles,
+  void clear_flying (double step, int support, int offset, int min, const Tiles &tiles,
       const cv::Mat &disparity, cv::Mat &to);
 
   /** Clears components of up to `window` pixels, in which four-connected neighbours differ by at
    * most `range` (1/16 pixel), like cv::filterSpeckles().
-   *  @param nearest  at least `least`; farther pixels are ignored */
+   *  @param nearest  at least `min`; farther pixels are ignored */
   void clear_specks (
-      int window, int range, int least, int nearest, const Tiles &tiles, cv::Mat &disparity);
+      int window, int range, int min, int nearest, const Tiles &tiles, cv::Mat &disparity);
 
   /** Fills gaps of up to `width` pixels in a row or column between disparities that differ by at
    * most one pixel, if the colours are approximately between those of the ends. */
   void fill_gaps (
-      const cv::Mat &colour, int width, int least, const Tiles &tiles, cv::Mat &disparity);
+      const cv::Mat &colour, int width, int min, const Tiles &tiles, cv::Mat &disparity);
 
   /** Clears narrow surfaces whose right pixels also match, in disparity and grey level, a wide
    * surface farther away: false matches of a repetitive pattern whose true match is occluded. */
-  void clear_doubled (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
+  void clear_doubled (const cv::Mat &left, const cv::Mat &right, int right_x, int min,
       const Tiles &tiles, cv::Mat &disparity);
 
 private:
@@ -65,14 +65,14 @@ private:
     int x0, x1;     /* columns, without x1 */
     int root, size; /* index of a run of the same component; its pixels, in the root run */
   };
-  void compare_patches (const cv::Mat &left, const cv::Mat &right, int right_x, int least,
+  void compare_patches (const cv::Mat &left, const cv::Mat &right, int right_x, int min,
       const cv::Rect &tile, const cv::Mat &disparity, Memory &memory) const;
-  void find_runs (const std::int16_t *row, int x0, int x1, int range, int least);
+  void find_runs (const std::int16_t *row, int x0, int x1, int range, int min);
   void join_rows (const std::int16_t *upper, const std::int16_t *lower, std::size_t a,
       std::size_t a_end, std::size_t b_end, int range);
   [[nodiscard]] int find_root (int run);
   static void clear_doubled_of_row (const std::uint8_t *left, const std::uint8_t *right,
-      int right_width, int right_x, int least, int width, Memory &memory, std::int16_t *disparity);
+      int right_width, int right_x, int min, int width, Memory &memory, std::int16_t *disparity);
 
   WorkerMemory<Memory> memory_;
   std::vector<Run> runs_;

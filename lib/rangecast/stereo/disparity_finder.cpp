@@ -140,52 +140,50 @@ void
 DisparityFinder::filter (const cv::Mat &left)
 {
   const MatchSettings &m = settings_.match;
-  const int least = 16 * min_disparity_;
+  const int min = 16 * min_disparity_;
   const int offset = static_cast<int> (std::lround (16 * pair_.offset));
   const int right_x = matcher_->reach ();
   const cv::Mat grey = window_[0](cv::Rect (right_x, 0, core_at_.width, core_at_.height)),
                 colour = left (core_at_);
   const bool limited = matcher_ != &all_;
-  const int nearest = limited ? std::max (least, far_) : least; /* of interest */
+  const int nearest = limited ? std::max (min, far_) : min; /* of interest */
   if (limited)
     restore_background (grey, right_x);
   if (settings_.patch_tolerance > 0) {
     filter_.clear_unlike (
-        grey, window_[1], right_x, settings_.patch_tolerance, least, tiles_, core_, next_);
+        grey, window_[1], right_x, settings_.patch_tolerance, min, tiles_, core_, next_);
     cv::swap (core_, next_);
   }
-  filter_.clear_hidden (least, tiles_, core_);
+  filter_.clear_hidden (min, tiles_, core_);
   constexpr int kSupport = 4; /* of eight neighbours; at a straight edge there are five */
   if (settings_.flying_pixel_step > 0) {
-    filter_.clear_flying (
-        settings_.flying_pixel_step, kSupport, offset, least, tiles_, core_, next_);
+    filter_.clear_flying (settings_.flying_pixel_step, kSupport, offset, min, tiles_, core_, next_);
     cv::swap (core_, next_);
   }
   if (m.speckle_window_size > 0)
-    filter_.clear_specks (
-        m.speckle_window_size, 16 * m.speckle_range, least, nearest, tiles_, core_);
+    filter_.clear_specks (m.speckle_window_size, 16 * m.speckle_range, min, nearest, tiles_, core_);
   if (settings_.gap_width > 0)
-    filter_.fill_gaps (colour, settings_.gap_width, least, tiles_, core_);
+    filter_.fill_gaps (colour, settings_.gap_width, min, tiles_, core_);
   if (settings_.silhouette_radius > 0) {
     SilhouetteFilter::Settings rims = {
-        settings_.silhouette_radius, settings_.flying_pixel_step, offset, least, nearest};
+        settings_.silhouette_radius, settings_.flying_pixel_step, offset, min, nearest};
     silhouettes_.apply (rims, colour, tiles_, core_, next_);
     cv::swap (core_, next_);
     if (limited && !background_.empty ()) {
-      background_.extend (core_at_.tl (), least, far_, tiles_, core_);
+      background_.extend (core_at_.tl (), min, far_, tiles_, core_);
       rims.only_beyond = true;
-      rims.look_near = least;
+      rims.look_near = min;
       silhouettes_.apply (rims, colour, tiles_, core_, next_);
       cv::swap (core_, next_);
     }
   }
   if (!limited)
-    filter_.clear_doubled (grey, window_[1], right_x, least, tiles_, core_);
+    filter_.clear_doubled (grey, window_[1], right_x, min, tiles_, core_);
   if (settings_.refine > 0)
-    refiner_.apply ({grey, window_[1], colour, right_x, std::max (least, far_), settings_.refine},
-        tiles_, core_);
+    refiner_.apply (
+        {grey, window_[1], colour, right_x, std::max (min, far_), settings_.refine}, tiles_, core_);
   if (!limited && core_.cols == pair_.width && core_.rows == pair_.height)
-    background_.remember (grey, core_, least, far_);
+    background_.remember (grey, core_, min, far_);
 }
 
 /* Converts OpenCV's disparities of the window to disparity_. The farthest one means none: see
@@ -194,7 +192,7 @@ void
 DisparityFinder::write_disparity (const Roi &roi)
 {
   const int x0 = roi.x - core_at_.x, y0 = roi.y - core_at_.y;
-  const int least = 16 * min_disparity_;
+  const int min = 16 * min_disparity_;
   const int offset = static_cast<int> (std::lround (16 * pair_.offset));
   disparity_.create (roi.height, roi.width, CV_16U);
   for (int y = 0; y < roi.height; y++) {
@@ -204,7 +202,7 @@ DisparityFinder::write_disparity (const Roi &roi)
       const int d = from[x] + offset;
       const int there = 16 * (roi.x + x) - from[x]; /* must not be in the border */
       const bool seen = there >= 0 && there <= 16 * (pair_.width - 1);
-      to[x] = from[x] > least && d > 0 && seen ? static_cast<std::uint16_t> (d) : 0;
+      to[x] = from[x] > min && d > 0 && seen ? static_cast<std::uint16_t> (d) : 0;
     }
   }
 }

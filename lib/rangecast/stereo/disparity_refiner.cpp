@@ -211,8 +211,8 @@ DisparityRefiner::members_of (int x, int y) const
     int near = 0;
     for (int part = 0; part < kLanes; part += 4) {
       const Floats d = cv::v_load (now_.ptr<float> (y + v) + x - kPlane + part),
-                   most = cv::v_load_aligned (kMaxAt[std::abs (v)] + part);
-      near |= cv::v_signmask ((cv::v_abs (d - centre) <= most) & (d > zero)) << part;
+                   max = cv::v_load_aligned (kMaxAt[std::abs (v)] + part);
+      near |= cv::v_signmask ((cv::v_abs (d - centre) <= max) & (d > zero)) << part;
     }
     members |= Members (bits & near & 127) << (8 * (v + kPlane));
   }

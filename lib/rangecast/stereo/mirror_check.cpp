@@ -19,10 +19,10 @@ constexpr double kMuch = 0.04, kTimes = 2;
 /* Fraction of pixels in front of the cameras minus those beyond infinity. The same disparity range
  * is searched on both sides, so that random matches cancel. */
 double
-balance (const MirrorCheck::Pair &pair, double infinity, double most)
+balance (const MirrorCheck::Pair &pair, double infinity, double max)
 {
   const double scale = std::min (1.0, double (kWidth) / pair.left.cols);
-  const int reach = std::clamp (int (std::ceil ((most - infinity) * scale / 8)) * 8, 16, kWidth);
+  const int reach = std::clamp (int (std::ceil ((max - infinity) * scale / 8)) * 8, 16, kWidth);
   const int zero = int (std::lround (infinity * scale)), margin = reach + std::abs (zero);
   cv::Mat wide[2], disparity;
   for (int i = 0; i < 2; i++) {
@@ -40,9 +40,9 @@ balance (const MirrorCheck::Pair &pair, double infinity, double most)
   matcher->setSpeckleRange (2);
   matcher->compute (wide[0], wide[1], disparity);
   const cv::Mat inside = disparity.colRange (margin, disparity.cols - margin);
-  const int least = matcher->getMinDisparity ();
+  const int min = matcher->getMinDisparity ();
   const int front = cv::countNonZero (inside > 16 * (zero + 1));
-  const int behind = cv::countNonZero ((inside >= 16 * least) & (inside < 16 * (zero - 1)));
+  const int behind = cv::countNonZero ((inside >= 16 * min) & (inside < 16 * (zero - 1)));
   return (front - behind) / double (inside.total ());
 }
 
@@ -58,10 +58,10 @@ MirrorCheck::is_due ()
 }
 
 void
-MirrorCheck::evaluate (const Pair &as_is, const Pair &exchanged, double infinity, double most)
+MirrorCheck::evaluate (const Pair &as_is, const Pair &exchanged, double infinity, double max)
 {
-  const double normal = balance (as_is, infinity, most),
-               mirrored = balance (exchanged, infinity, most);
+  const double normal = balance (as_is, infinity, max),
+               mirrored = balance (exchanged, infinity, max);
   mirrored_ = mirrored > kMuch && mirrored > kTimes * normal;
   decided_ = mirrored_ || (normal > kMuch && normal > kTimes * mirrored);
 }

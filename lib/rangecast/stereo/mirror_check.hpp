@@ -25,8 +25,8 @@ public:
   /** @param as_is      rectified in the given order
    *  @param exchanged  the same images, exchanged and then rectified
    *  @param infinity   disparity of infinity, pixels
-   *  @param most       maximum disparity to search, pixels */
-  void evaluate (const Pair &as_is, const Pair &exchanged, double infinity, double most);
+   *  @param max        maximum disparity to search, pixels */
+  void evaluate (const Pair &as_is, const Pair &exchanged, double infinity, double max);
 
 private:
   int seen_ = 0, next_ = 0;

@@ -137,14 +137,14 @@ step (const std::uint8_t *__restrict cost, const std::uint8_t *__restrict before
 {
   const int n = kCount > 0 ? kCount : disparities;
   const auto far = std::uint8_t (lowest + jump);
-  std::uint8_t least = 255;
+  std::uint8_t min = 255;
   for (int d = 0; d < n; d++) {
     const auto beside = std::uint8_t (lesser (before[d - 1], before[d + 1]) + kStep);
     const auto value = std::uint8_t (cost[d] + lesser (lesser (before[d], far), beside) - lowest);
     now[d] = value;
-    least = lesser (least, value);
+    min = lesser (min, value);
   }
-  return least;
+  return min;
 }
 
 } // namespace
@@ -241,22 +241,22 @@ SemiGlobalMatcher::choose (
   const int n = kCount > 0 ? kCount : disparities_;
   std::uint16_t *__restrict sums = m.sums.data ();
   const std::uint8_t *__restrict across = &across_[cell], *__restrict down = &down_[cell];
-  std::uint16_t least = UINT16_MAX;
+  std::uint16_t min_cost = UINT16_MAX;
   for (int d = 0; d < n; d++) {
     sums[d] = std::uint16_t (across[d] + down[d] + up[d]);
-    least = lesser (least, sums[d]);
+    min_cost = lesser (min_cost, sums[d]);
   }
   auto place = std::uint16_t (n);
   for (int d = 0; d < n; d++)
-    place = lesser (place, sums[d] == least ? std::uint16_t (d) : std::uint16_t (n));
+    place = lesser (place, sums[d] == min_cost ? std::uint16_t (d) : std::uint16_t (n));
   const int best = place;
-  Match match = {kAmbiguous, std::int16_t (best + stripe.min_disparity), least};
+  Match match = {kAmbiguous, std::int16_t (best + stripe.min_disparity), min_cost};
   if (settings_.uniqueness_ratio > 0 && !is_unique<kCount> (sums, best, disparities_))
     return match;
   match.disparity = std::int16_t (16 * match.whole);
   if (best > 0 && best < n - 1) {
     const int nearer = sums[best + 1], farther = sums[best - 1];
-    const int bend = greater (nearer + farther - 2 * least, 1);
+    const int bend = greater (nearer + farther - 2 * min_cost, 1);
     match.disparity =
         std::int16_t (match.disparity + ((farther - nearer) * 16 + bend) / (2 * bend));
   }
@@ -317,10 +317,11 @@ SemiGlobalMatcher::check_row (const Stripe &stripe, int y, Memory &m, cv::Mat &d
     m.right_sums[there] = matches[x].sum;
     m.right[there] = matches[x].whole;
   }
-  const int most = settings_.left_right_max_difference;
+  const int max_difference = settings_.left_right_max_difference;
   for (int x = 0; x < stripe.columns; x++)
     if (matches[x].disparity != kAmbiguous &&
-        (most < 0 || std::abs (m.right[partner_of (x)] - matches[x].whole) <= most))
+        (max_difference < 0 ||
+            std::abs (m.right[partner_of (x)] - matches[x].whole) <= max_difference))
       out[stripe.x0 + x] = matches[x].disparity;
 }
 

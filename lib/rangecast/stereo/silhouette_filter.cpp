@@ -113,7 +113,7 @@ SilhouetteFilter::for_window (
   static constexpr std::uint8_t kInside[2 * kLanes] = {
       255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255};
   const cv::v_uint8x16 r = cv::v_setall_u8 (own[0]), g = cv::v_setall_u8 (own[1]),
-                       b = cv::v_setall_u8 (own[2]), most = cv::v_setall_u8 (kLike);
+                       b = cv::v_setall_u8 (own[2]), max = cv::v_setall_u8 (kLike);
   const int x0 = x / 2 - radius / 2 + pad_, y0 = y / 2 - radius / 2 + pad_;
   for (int u = 0; u < radius; u += kLanes) {
     const cv::v_uint8x16 inside = cv::v_load (kInside + kLanes - std::min (kLanes, radius - u));
@@ -126,7 +126,7 @@ SilhouetteFilter::for_window (
                                     cv::v_absdiff (cv::v_load (&colours_[2][at]), b) +
                                     cv::v_load (&colours_[3][at]);
       cv::v_uint16x8 low, high;
-      cv::v_expand ((most - unlike) & inside, low, high);
+      cv::v_expand ((max - unlike) & inside, low, high);
       const std::int16_t *depth = samples_.row (v) + x0 + u;
       count (cv::v_reinterpret_as_s16 (low), cv::v_load (depth));
       if (radius - u > kLanes / 2)
@@ -138,13 +138,13 @@ SilhouetteFilter::for_window (
 template <bool kCountNone>
 SilhouetteFilter::Votes
 SilhouetteFilter::vote (
-    const Settings &settings, const cv::Vec4b &own, int x, int y, int d, int most) const
+    const Settings &settings, const cv::Vec4b &own, int x, int y, int d, int max) const
 {
-  const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (settings.least)),
+  const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (settings.min)),
                       low = cv::v_max (
                           valid, cv::v_setall_s16 (static_cast<short> (
-                                     settings.only_beyond ? settings.nearest : d - most))),
-                      high = cv::v_setall_s16 (static_cast<short> (std::min (d + most, 32767)));
+                                     settings.only_beyond ? settings.nearest : d - max))),
+                      high = cv::v_setall_s16 (static_cast<short> (std::min (d + max, 32767)));
   cv::v_int16x8 all = cv::v_setzero_s16 (), none = all, below = all, above = all;
   for_window (own, x, y, settings.radius, [&] (const cv::v_int16x8 &w, const cv::v_int16x8 &depth) {
     all = all + w;
@@ -162,11 +162,11 @@ SilhouetteFilter::vote (
   return votes;
 }
 
-/* Mean disparity of the similar samples around a pixel, or `least` - 1. */
+/* Mean disparity of the similar samples around a pixel, or `min` - 1. */
 int
 SilhouetteFilter::likely (const Settings &settings, const cv::Vec4b &own, int x, int y) const
 {
-  const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (settings.least)),
+  const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (settings.min)),
                       one = cv::v_setall_s16 (1);
   cv::v_int32x4 sum = cv::v_setzero_s32 (), weights = sum;
   for_window (own, x, y, settings.radius, [&] (const cv::v_int16x8 &w, const cv::v_int16x8 &depth) {
@@ -175,7 +175,7 @@ SilhouetteFilter::likely (const Settings &settings, const cv::Vec4b &own, int x,
     weights = weights + cv::v_dotprod (counting, one);
   });
   const int total = cv::v_reduce_sum (weights);
-  return total < kEnough ? settings.least - 1 : cv::v_reduce_sum (sum) / total;
+  return total < kEnough ? settings.min - 1 : cv::v_reduce_sum (sum) / total;
 }
 
 void
@@ -183,7 +183,7 @@ SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, con
     const cv::Mat &disparity, Memory &m, cv::Mat &to) const
 {
   const int share = static_cast<int> (65536 * settings.step), reach = settings.radius * 2 / 3,
-            least = settings.least;
+            min = settings.min;
   const auto tolerance = [&] (int d) { return std::max (16, (d + settings.offset) * share >> 16); };
   cut (disparity, tile, reach, m.around);
   choose_in_windows (m.around, 2 * reach + 1, m.line, m.lowest,
@@ -197,22 +197,22 @@ SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, con
     const std::int16_t *lowest = m.lowest.row (y), *highest = m.highest.row (y);
     for (int x = 0; x < tile.width; x++) {
       out[x] = from[x];
-      const bool valid = from[x] >= least;
-      if (highest[x] < std::max (least, settings.nearest) ||
+      const bool valid = from[x] >= min;
+      if (highest[x] < std::max (min, settings.nearest) ||
           (valid && (from[x] < settings.nearest || lowest[x] >= from[x] - tolerance (from[x]) ||
                         (settings.only_beyond && lowest[x] > settings.look_near))))
         continue; /* inside a surface, or nothing near */
       const int d = valid ? from[x] : likely (settings, pixels[x], tile.x + x, tile.y + y);
-      if (d < std::max (least, settings.nearest))
+      if (d < std::max (min, settings.nearest))
         continue;
       const cv::Vec4b &own = pixels[x];
-      const int at_x = tile.x + x, at_y = tile.y + y, most = tolerance (d);
+      const int at_x = tile.x + x, at_y = tile.y + y, max = tolerance (d);
       const Votes votes = valid && !settings.only_beyond
-                              ? vote<false> (settings, own, at_x, at_y, d, most)
-                              : vote<true> (settings, own, at_x, at_y, d, most);
+                              ? vote<false> (settings, own, at_x, at_y, d, max)
+                              : vote<true> (settings, own, at_x, at_y, d, max);
 
       if (valid && votes.far > votes.same)
-        out[x] = static_cast<std::int16_t> (least - 16);
+        out[x] = static_cast<std::int16_t> (min - 16);
       else if (!valid && votes.same > 4 * (votes.near + votes.far) && votes.same > votes.none)
         out[x] = static_cast<std::int16_t> (d);
     }

@@ -20,7 +20,7 @@ public:
     int radius = 8;   ///< pixels, > 0
     double step = 0;  ///< maximum relative depth difference within a surface
     int offset = 0;   ///< 1/16 pixel, to be added to disparities
-    int least = 0;    ///< 1/16 pixel; less = none; cleared ones become least - 16
+    int min = 0;      ///< lowest valid disparity, 1/16 pixel; cleared ones become min - 16
     int nearest = -1; ///< farther pixels are not processed, but count as farther
     /** Clear only pixels that are similar to pixels farther than `nearest`. */
     bool only_beyond = false;
@@ -48,7 +48,7 @@ private:
   void for_window (const cv::Vec4b &own, int x, int y, int radius, const Count &count) const;
   template <bool kCountNone>
   [[nodiscard]] Votes vote (
-      const Settings &settings, const cv::Vec4b &own, int x, int y, int d, int most) const;
+      const Settings &settings, const cv::Vec4b &own, int x, int y, int d, int max) const;
   [[nodiscard]] int likely (const Settings &settings, const cv::Vec4b &own, int x, int y) const;
   void apply_to (const Settings &settings, const cv::Mat &colour, const cv::Rect &tile,
       const cv::Mat &disparity, Memory &memory, cv::Mat &to) const;

@@ -5,19 +5,10 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "../opencv/image.hpp"
 #include "histogram_range.hpp"
 
 namespace rangecast {
-namespace {
-
-cv::Mat
-as_mat (ImageView<const Rgbx> picture)
-{
-  return cv::Mat (picture.height, picture.width, CV_8UC4, const_cast<Rgbx *> (picture.data),
-      static_cast<std::size_t> (picture.stride));
-}
-
-} // namespace
 
 Status
 StereoDepth::set (const View &view, const StereoSettings &settings, bool with_third)
@@ -68,7 +59,7 @@ StereoDepth::rectify (
       return {StatusCode::kBadSize, "stereo: an image does not have the view's size"};
   try {
     for (int i = 0; i < 2; i++) {
-      raw_[i] = pictures_[i] = as_mat (i ? right : left);
+      raw_[i] = pictures_[i] = opencv_image (i ? right : left);
       if (!rectifier_.is_identity ()) {
         rectifier_.rectify (i, raw_[i], rectified_[i]);
         pictures_[i] = rectified_[i];
@@ -76,7 +67,7 @@ StereoDepth::rectify (
       matched_[i] = settings_.average > 1 ? still_[i].add (pictures_[i]) : pictures_[i];
     }
     if (has_third_)
-      third_.rectify (raw_[0], as_mat (third));
+      third_.rectify (raw_[0], opencv_image (third));
     changes_.update (pictures_[0]);
   } catch (const cv::Exception &) {
     return {StatusCode::kNoSpace, "stereo: OpenCV failed to rectify"};

@@ -60,9 +60,9 @@ StillAverage::find_motion ()
   const auto quarter = changes_.begin () + std::ptrdiff_t (changes_.size () / 4);
   std::ranges::nth_element (changes_, quarter);
   const float noise = std::min (*quarter, kMaxNoise);
-  const float most_change = 0.3f + 1.4f * noise, most_drift = 0.3f + 4 * 1.25f * noise / kBlock;
+  const float max_change = 0.3f + 1.4f * noise, max_drift = 0.3f + 4 * 1.25f * noise / kBlock;
   for (Block &block : blocks_)
-    block.moves = block.change > most_change || block.drift > most_drift;
+    block.moves = block.change > max_change || block.drift > max_drift;
   const auto moves = [&] (int bx, int by) {
     for (int y = std::max (0, by - 1); y <= std::min (rows_ - 1, by + 1); y++)
       for (int x = std::max (0, bx - 1); x <= std::min (columns_ - 1, bx + 1); x++)

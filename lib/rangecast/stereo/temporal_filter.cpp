@@ -93,8 +93,8 @@ TemporalFilter::average (const RangeImage &image)
       if (z <= 0 || moves)
         continue;
       /* A jump in a single image where nothing else moves is wrong: limit its effect. */
-      const float most = kJump * z * z / focal_baseline_;
-      held[x] = held[x] > 0 ? held[x] + weight_ * std::clamp (z - held[x], -most, most) : z;
+      const float max_step = kJump * z * z / focal_baseline_;
+      held[x] = held[x] > 0 ? held[x] + weight_ * std::clamp (z - held[x], -max_step, max_step) : z;
       depth[x] = static_cast<std::uint16_t> (std::lround (held[x]));
     }
   }
@@ -116,12 +116,12 @@ TemporalFilter::apply (const RangeImage &image)
     compare_block (image, bx, by, block);
     changes_.push_back (block.change);
   });
-  const float most = 1 + 1.5f * noise ();
+  const float max_change = 1 + 1.5f * noise ();
   each ([&] (int, int, Block &block) {
     const float both = block.drift * block.drift_before > 0
                            ? std::min (std::abs (block.drift), std::abs (block.drift_before))
                            : 0;
-    block.moves = block.change > most;
+    block.moves = block.change > max_change;
     block.drifts = both > kDrift;
   });
   average (image);

@@ -69,9 +69,9 @@ ThirdPair::place (const View &view, const View &range_view)
   cv::Vec2d low, high;
   if (!bounds ({0, 0, range_view.width, range_view.height}, low, high))
     return bad_third (view, "looks elsewhere");
-  const int most = 2 * std::max (view.width, view.height);
+  const int max_length = 2 * std::max (view.width, view.height);
   const auto length = [&] (int i) {
-    return static_cast<int> (std::lround (std::min<double> (most - 1, high[i] - low[i]))) + 1;
+    return static_cast<int> (std::lround (std::min<double> (max_length - 1, high[i] - low[i]))) + 1;
   };
   pair_ = {length (0), length (1), fx * baseline_m_, 0};
   rectified_camera_ = {fx, 0, -low[0], 0, fx, -low[1], 0, 0, 1};
@@ -151,7 +151,7 @@ ThirdPair::set (
   precision_ = pair_.focal_baseline / focal_baseline;
   const DepthFactors there = depth_factors ({0, 0, range_view.width, range_view.height});
   if (Status s = finder_.set (
-          pair_, settings, range_view.near_m * there.least, range_view.far_m * there.most);
+          pair_, settings, range_view.near_m * there.min, range_view.far_m * there.max);
       !s.ok ())
     return bad_third (view, s.message ().c_str ());
   return {};
@@ -185,7 +185,7 @@ ThirdPair::depth_factors (const Roi &roi) const
   for (int x : {roi.x, roi.x + roi.width - 1})
     for (int y : {roi.y, roi.y + roi.height - 1}) {
       const double factor = factor_.at<float> (y, x) * precision_;
-      factors = {std::min (factors.least, factor), std::max (factors.most, factor)};
+      factors = {std::min (factors.min, factor), std::max (factors.max, factor)};
     }
   return factors;
 }
@@ -200,8 +200,8 @@ ThirdPair::find (const Roi &roi, double near_m, double far_m)
     return {};
   }
   const DepthFactors factors = depth_factors (roi);
-  const Status status = finder_.find (
-      pictures_[0], pictures_[1], there, near_m * factors.least, far_m * factors.most);
+  const Status status =
+      finder_.find (pictures_[0], pictures_[1], there, near_m * factors.min, far_m * factors.max);
   if (!status.ok ())
     return status;
   for (int y = 0; y < roi.height; y++) {

@@ -36,7 +36,7 @@ public:
 
 private:
   struct DepthFactors {
-    double least = 1, most = 1; /* ratio of depth in the rectified image and in the range view */
+    double min = 1, max = 1; /* ratio of depth in the rectified image and in the range view */
   };
   Status choose_axes (const View &view);
   Status place (const View &view, const View &range_view);

@@ -14,7 +14,7 @@ namespace {
 /* Chamfer distances: 3 for a step to the side, 4 for a diagonal one (G. Borgefors, "Distance
  * transformations in digital images", CVGIP 34, 1986). */
 constexpr int kSide = 3, kDiagonal = 4;
-constexpr int kFarthest = kSide * kFeatherPixels;
+constexpr int kMaxDistance = kSide * kFeatherPixels;
 
 /* A view sees through a point if it sees something farther by this, metres. */
 constexpr double kClearance = 0.01;
@@ -144,7 +144,7 @@ private:
     for (int x = 0; x < width_; x++) {
       const bool inside = x > 0 && y > 0 && has (x, y, kValid | kJoinsRight | kJoinsBelow) &&
                           has (x - 1, y, kJoinsRight) && has (x, y - 1, kJoinsBelow);
-      to_.weight[place (x, y)] = static_cast<std::uint8_t> (inside               ? kFarthest
+      to_.weight[place (x, y)] = static_cast<std::uint8_t> (inside               ? kMaxDistance
                                                             : has (x, y, kValid) ? kSide
                                                                                  : 0);
     }
@@ -168,8 +168,8 @@ private:
         sweep (x, y, 1);
   }
 
-  /* Means of what is within the code's threshold round pixels that it copied, along rows, then
-   * along columns. */
+  /* Replaces copied pixels by the mean of the surrounding pixels within the code's threshold,
+   * first along rows, then along columns. */
   void smooth_copies ()
   {
     bool any = false;
@@ -243,7 +243,7 @@ private:
     return {mean (r), mean (g), mean (b), at->x};
   }
 
-  /* Of one pixel and those beside it. */
+  /* From a pixel to its two neighbours along one axis. */
   struct Steps {
     int before, after;         /* of the depth */
     int has_before, has_after; /* 1: joined */
@@ -293,7 +293,7 @@ private:
       const float ray = ray_y + u * u * fx2;
       const float squared = z * z / ((nx * nx + ny * ny + nz * nz) * ray + 1e-6f);
       const int distance = weight[x];
-      const float share = static_cast<float> (distance) * (1.f / kFarthest);
+      const float share = static_cast<float> (distance) * (1.f / kMaxDistance);
       const auto root = static_cast<int> (255 * std::sqrt (share * squared) + 0.5f);
       const int min = distance > 0 ? 1 : 0, max = root > 255 ? 255 : root;
       weight[x] = static_cast<std::uint8_t> (max > min ? max : min);

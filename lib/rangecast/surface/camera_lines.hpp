@@ -13,22 +13,22 @@ namespace rangecast {
 /** One end of a line, as OpenGL takes it. */
 struct LineVertex {
   float x, y, z;                 ///< world, metres
-  std::uint8_t red, green, blue; ///< of the whole line, as both ends have the same
+  std::uint8_t red, green, blue; ///< the same at both ends
   std::uint8_t unused = 0;
 };
 
-/** A colour that can be told from those near by in the list, and its English name. */
+/** A colour, distinct from its neighbours in the list, and its English name. */
 struct LineColour {
   std::uint8_t red, green, blue;
   std::string_view name;
 };
 
-/** Of the view that is `index`th in its rig; they repeat. */
+/** Colour of the `index`-th view of a rig; the list of colours repeats. */
 LineColour camera_colour (std::size_t index);
 
 /** Appends the lines, two vertices each, that show where a view's camera stands and what it sees:
- *  a pyramid from the camera to its picture's corners at the near distance, with a roof over the
- *  picture's top edge, and darker the rest of the frustum up to the far distance. */
+ *  a pyramid from the camera to its picture's corners at the near distance, with a triangle on the
+ *  picture's top edge; and, darker, the rest of the frustum up to the far distance. */
 void append_camera_lines (
     const View &view, const LineColour &colour, std::vector<LineVertex> &lines);
 

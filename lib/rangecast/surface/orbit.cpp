@@ -113,7 +113,7 @@ clip_distances (
     nearest = std::min (nearest, depth);
     farthest = std::max (farthest, depth);
   }
-  if (farthest <= 0) /* nothing, or nothing that is before the camera */
+  if (farthest <= 0) /* nothing is in front of the camera */
     return {distance_m / 50, distance_m * 20};
   const double far_m = kRoom * farthest + room_m;
   return {std::max (nearest / kRoom, far_m / kMaxFarToNear), far_m};

@@ -24,8 +24,8 @@ struct SceneFrame {
 /** Several views: the target is the point of the first view's axis that is nearest to where all
  *  optical axes meet, up is the world's y. One view (or axes that are parallel): the target lies on
  *  the first view's axis at the harmonic mean of near and far, up is that camera's own. The first
- *  view is the one with the lowest view-id. So the orbit begins with the first view's own picture,
- *  but upright if there are several views and the first is rolled. */
+ *  view is the one with the lowest view-id. So the orbit begins at the first view's own picture,
+ *  turned upright if there are several views and the first is rolled. */
 SceneFrame scene_frame (const Rig &rig);
 
 /** Position of an orbiting camera. */
@@ -66,7 +66,7 @@ struct Eye {
  *                 distance of the nearest, the far plane at twice that of the farthest; empty: at
  *                 1/50 and 20 times the target's. The near plane is no nearer than 1/2000 of the
  *                 far one's distance, where a depth buffer would be too coarse
- *  @param room_m  by which the far plane is farther still: for what is drawn behind its place */
+ *  @param room_m  added to the far plane's distance, for what is drawn behind its true position */
 OrbitMatrices orbit_matrices (const SceneFrame &scene, const Orbit &orbit, double aspect,
     bool flip_y, const Eye &eye = {}, std::span<const Vec3> hull = {}, double room_m = 0);
 
@@ -82,8 +82,8 @@ struct PicturePart {
 Mat4 in_part (const Mat4 &clip_from_world, const PicturePart &part);
 
 /** The pixels of part of a framebuffer of width x height pixels that a hull covers, and two more on
- *  each side; rows are counted as clip coordinates go. The whole part if some of the hull is not
- *  before the camera. */
+ *  each side; row 0 is at y = -1 in clip coordinates. The whole part if some of the hull
+ *  is not in front of the camera. */
 Roi covered_part (const Mat4 &clip_from_world, std::span<const Vec3> hull, int width, int height,
     const Roi &part);
 

@@ -10,7 +10,7 @@ namespace {
 constexpr double kFill = 0.85;   /* of the picture's width or height */
 constexpr double kNoise = 0.002; /* share of the points beyond each edge */
 
-/* What all values but the share kNoise are no greater than. */
+/* The value that all but the share kNoise of the values do not exceed. */
 template <typename Value>
 double
 edge (std::span<const Vec3> points, std::vector<double> &values, const Value &value)
@@ -23,7 +23,7 @@ edge (std::span<const Vec3> points, std::vector<double> &values, const Value &va
   return *at;
 }
 
-/* What two opposite sides of the frustum ask of the camera's place along one axis of the picture.
+/* What two opposite sides of the frustum require of the camera's place along one image axis.
  */
 struct Sides {
   double middle;   /* along that axis */
@@ -65,7 +65,7 @@ fitted_frame (
     const double after = reach (axis, slope), before = reach (-1.0 * axis, slope);
     return Sides{(after - before) / 2, (after + before) / (2 * slope)};
   };
-  /* From farther away than sides ask for, the same with less slope is in the middle. */
+  /* From farther away than the sides require, the same with less slope is in the middle. */
   const auto centred = [&] (Vec3 axis, double slope, double distance) {
     double low = 0;
     for (int i = 0; i < 12; i++) {
@@ -87,7 +87,7 @@ fitted_frame (
 }
 
 bool
-is_about_same (const SceneFrame &a, const SceneFrame &b, double fov_deg)
+is_similar (const SceneFrame &a, const SceneFrame &b, double fov_deg)
 {
   constexpr double kSame = 0.1;
   const double height = 2 * std::tan (fov_deg * M_PI / 360) * a.distance_m;

@@ -23,8 +23,8 @@ any (decltype (PixelLanes{} < PixelLanes{}) test)
 
 /* 1 / n */
 constexpr auto kShares = [] {
-  std::array<float, kLongestPiece + 1> shares{};
-  for (int n = 1; n <= kLongestPiece; n++)
+  std::array<float, kMaxPieceLength + 1> shares{};
+  for (int n = 1; n <= kMaxPieceLength; n++)
     shares[static_cast<std::size_t> (n)] = 1 / float (n);
   return shares;
 }();
@@ -131,8 +131,8 @@ private:
     std::uint16_t depth = kInvalidDepth; /* of the pixel */
   };
 
-  /* A farther surface goes on behind a nearer one; the other way round shards would stand up from
-   * surfaces seen at a grazing angle, whose rows are far apart in depth. */
+  /* A farther surface goes on behind a nearer one; the other way round, slivers would
+   * stick out of surfaces seen at a grazing angle, whose rows are far apart in depth. */
   [[nodiscard]] Lower lower_of (int x) const
   {
     const int last = std::min (height_ - 1, row_ + 1 + settings_.max_gap);
@@ -207,8 +207,8 @@ private:
        * be a copy, which the neighbour code put there for something near. */
       const PixelLanes &shares = copy ? copy_tolerance_ : tolerance_;
       const PixelLanes off = {shares[0] * float (depth[x]), shares[1], shares[2], shares[3]};
-      if (x - first > kLongestPiece || !near (depth[first], depth[x]) ||
-          !cone.extend (here, x - first, off) || weight_steps (first, x, y)) {
+      if (x - first > kMaxPieceLength || !near (depth[first], depth[x]) ||
+          !cone.extend (here, x - first, off) || has_weight_step (first, x, y)) {
         kept[x - 1] = true;
         cone.begin (before);
         cone.extend (here, 1, off);
@@ -221,7 +221,7 @@ private:
   }
 
   /* Whether weights within a piece are far from what they are at its first pixel. */
-  [[nodiscard]] bool weight_steps (int first, int x, int y) const
+  [[nodiscard]] bool has_weight_step (int first, int x, int y) const
   {
     constexpr int kFar = 80; /* of 255 */
     const auto weight = [&] (int at) {
@@ -372,13 +372,13 @@ private:
       }
   }
 
-  /* Whether a depth is before the surface of a pixel of this row. */
+  /* Whether a depth is in front of the surface of a pixel of this row. */
   [[nodiscard]] bool is_hiding (int depth, int x) const
   {
     return depth != kInvalidDepth && depth < depth_[x] && !is_level (depth_[x], depth);
   }
 
-  /* Whether both sides of what hides a surface are that surface. */
+  /* Whether the depths on both sides of an occluder are of one surface. */
   [[nodiscard]] bool is_level (int a, int b) const
   {
     return std::min (a, b) != kInvalidDepth &&
@@ -400,7 +400,7 @@ private:
   {
     if (row_ + 1 >= height_ || joins_pixel_right (x, row_) || !joins_pixel_below (x))
       return;
-    const int last = std::min (width_ - 1, x + 1 + kWidestHidden);
+    const int last = std::min (width_ - 1, x + 1 + kMaxHiddenLength);
     int n = x + 1;
     while (n <= last && is_hiding (depth_[n], x))
       n++;
@@ -413,7 +413,7 @@ private:
   {
     if (row_ + 1 >= height_ || !joins_pixel_right (x, row_) || joins_pixel_below (x))
       return;
-    const int last = std::min (height_ - 1, row_ + 1 + kWidestHidden);
+    const int last = std::min (height_ - 1, row_ + 1 + kMaxHiddenLength);
     int y = row_ + 1;
     while (y <= last && is_hiding (image_.depth.at (x, y), x))
       y++;

@@ -58,9 +58,9 @@ strip_offset (StripPlace place)
   return 0.25f * (static_cast<float> (place) - 3);
 }
 /** Greatest number of pixels in a row that one piece replaces. */
-inline constexpr int kLongestPiece = 32;
+inline constexpr int kMaxPieceLength = 32;
 /** Greatest number of pixels, in a row or a column, behind which a hidden surface is bridged. */
-inline constexpr int kWidestHidden = 8;
+inline constexpr int kMaxHiddenLength = 8;
 /** Greatest side of an image that is drawn, pixels. */
 inline constexpr int kMaxStripSide = 8192;
 
@@ -90,12 +90,12 @@ struct StripResult {
  *  triangles are all counter-clockwise in the picture (y down).
  *
  *  Of the pixels inside a band those are left out that lie on straight lines, in depth and colour,
- *  between others of their row; a line has at most kLongestPiece pixels, all near its first one.
+ *  between others of their row; a line has at most kMaxPieceLength pixels, all near its first one.
  *  The bands above and below a row leave out the same ones, so that no crack opens there. Between
  *  pixels that stay no step is larger than depth_step allows.
  *
  *  kBlend: as kStrips, with the planes' colours, and surfaces that end where the planes say. What
- * at most kWidestHidden nearer pixels hide of a surface is bridged behind them (kBehind).
+ * at most kMaxHiddenLength nearer pixels hide of a surface is bridged behind them (kBehind).
  *
  *  kRectangles: four vertices a pixel, joined likewise. kPoints: one vertex a pixel.
  *  @param image      at most kMaxStripSide wide and high; larger parts are not drawn
@@ -105,12 +105,12 @@ struct StripResult {
 void build_strips (const ConstRangeImage &image, const StripSettings &settings,
     std::vector<StripVertex> &to, StripResult &result, const BlendPlanes *planes = nullptr);
 
-/** A vertex of mode kBlend with all that is drawn of it. */
+/** A vertex of mode kBlend with all its attributes. */
 struct BlendVertex {
   std::int16_t x, y;    ///< quarters of a pixel; (0, 0) is the centre of the ROI's first pixel
   std::uint16_t depth;  ///< depth units
   std::uint16_t unused; ///< 0
-  Rgbx colour;          ///< x is the square root of the weight, 255 = 1; 0: as little as there is
+  Rgbx colour;          ///< x is the square root of the weight, 255 = 1; 0: the minimum weight
 };
 
 /** Makes vertices of those that build_strips() made in mode kBlend.

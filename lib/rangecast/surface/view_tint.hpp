@@ -8,10 +8,10 @@
 
 namespace rangecast {
 
-/** A copy of a picture in shades of one colour: the hue says which camera it is of, brightness and
- *  so what is to be seen stay. Half of each value is the colour's at the pixel's brightness, half
- *  the colour's own, so that dark clothes have a hue, too.
- *  @param[out] memory  of the copy; keeps what it has
+/** A copy of a picture in shades of one colour: the hue identifies the camera, and brightness is
+ *  kept. Half of each value is the colour's at the pixel's brightness, half the colour's own, so
+ *  that dark clothes have a hue, too.
+ *  @param[out] memory  of the copy; keeps its capacity
  *  @return the copy, of the same size, valid as long as `memory` is left alone */
 ImageView<Rgbx> tinted (
     const ImageView<const Rgbx> &picture, const LineColour &colour, std::vector<Rgbx> &memory);

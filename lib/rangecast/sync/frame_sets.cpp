@@ -30,7 +30,7 @@ FrameSets::put (int camera, std::int64_t key, Frame frame)
 }
 
 void
-FrameSets::take_head (int camera, Set &set)
+FrameSets::pop_head (int camera, Set &set)
 {
   Lane &lane = lanes_[camera];
   const Waiting &waiting = lane.ring[lane.first];
@@ -47,7 +47,7 @@ FrameSets::next (Set &set)
   int longest = 0, oldest = 0;
   bool all = true;
   const auto drop = [&] (int camera) {
-    take_head (camera, set);
+    pop_head (camera, set);
     lanes_[camera].dropped += set.frames[camera] != nullptr;
     return Step::kDrop;
   };
@@ -72,7 +72,7 @@ FrameSets::next (Set &set)
     return drop (oldest);
   bool lost = false;
   for (int c = 0; c < cameras_; c++) {
-    take_head (c, set);
+    pop_head (c, set);
     lost |= set.frames[c] == nullptr;
   }
   for (int c = 0; lost && c < cameras_; c++)
@@ -81,13 +81,13 @@ FrameSets::next (Set &set)
 }
 
 FrameSets::Step
-FrameSets::take_rest (Set &set)
+FrameSets::drain (Set &set)
 {
   set = {};
   Step step = Step::kWait;
   for (int c = 0; c < cameras_; c++)
     if (lanes_[c].count > 0) {
-      take_head (c, set);
+      pop_head (c, set);
       step = Step::kDrop;
     }
   return step;

@@ -40,7 +40,7 @@ public:
   void set_tolerance (std::int64_t tolerance) { tolerance_ = tolerance; }
   /** Returns waiting frames to the caller. To be repeated until it returns kWait instead of kDrop.
    */
-  Step take_rest (Set &set);
+  Step drain (Set &set);
 
   /** Frames dropped so far, without lost ones (null). */
   [[nodiscard]] std::uint64_t dropped (int camera) const { return lanes_[camera].dropped; }
@@ -65,7 +65,7 @@ private:
   {
     return lanes_[camera].ring[lanes_[camera].first];
   }
-  void take_head (int camera, Set &set);
+  void pop_head (int camera, Set &set);
 
   std::array<Lane, kMaxCameras> lanes_{};
   int cameras_ = 2, waiting_ = kMaxWaiting;

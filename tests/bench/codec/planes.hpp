@@ -39,7 +39,7 @@ std::unique_ptr<PlaneCode> make_rvl ();
 /** RVL's bytes packed once more by zstd at its fastest level; nothing in a build without it. */
 std::unique_ptr<PlaneCode> make_rvl_zstd ();
 /** libjpeg-turbo, 4:2:0, its accurate DCT: 1 to 3 % slower than the fast one and 0.3 to 1 dB
- * better.
+ *  better.
  *  @param quality  1 to 100 */
 std::unique_ptr<PlaneCode> make_jpeg (int quality);
 enum class PngLevel {

@@ -23,7 +23,7 @@ void print_head ();
 void print_row (const RenderRow &row);
 
 /** Writes an array of objects, one a row: scene, mode, depth, angle_deg, vertices, triangles,
- * bytes, ms, holes, spill, psnr_db, ssim, ssim_all, edge_px, edge95_px, seam, bad.
+ *  bytes, ms, holes, spill, psnr_db, ssim, ssim_all, edge_px, edge95_px, seam, bad.
  *  @return kNotFound if the file cannot be written */
 rangecast::Status write_json (const std::string &path, const std::vector<RenderRow> &rows);
 

@@ -14,9 +14,9 @@ struct Shot {
 };
 
 /** How near pictures come to the truth: each figure is the mean over the pictures. Truth and
- * picture are both laid over mid-grey by their own coverage. Places that no camera sees count for
- * nothing, nor does what lies within 4 pixels of them. "Inside" is where both have the figure, 3
- * pixels and more from either outline and from unseen places. */
+ *  picture are both laid over mid-grey by their own coverage. Places that no camera sees count for
+ *  nothing, nor does what lies within 4 pixels of them. "Inside" is where both have the figure, 3
+ *  pixels and more from either outline and from unseen places. */
 class Score {
 public:
   /** @param rgba  CV_8UC4 of the truth's size, alpha as coverage; drawn where that is at least half

@@ -20,7 +20,7 @@
 namespace rangecast::testing {
 
 /** Whether the loopback interface answers at 127.0.0.1 to 127.0.0.`n`, each of which can then have
- * a camera: they all use the same port. */
+ *  a camera: they all use the same port. */
 inline bool
 name_loopback_addresses (int n)
 {

@@ -2,13 +2,19 @@
 /* What of the layer over Aravis needs no camera: features strings, action commands, frame numbers,
  * permissions of USB devices. */
 #include "camera/aravis/action_command.hpp"
+#include "camera/aravis/camera.hpp"
 #include "camera/aravis/discovery.hpp"
 #include "camera/aravis/features.hpp"
 #include "camera/aravis/frame_counter.hpp"
 #include "camera/aravis/receive_buffer.hpp"
+#include "camera/aravis/teardown_queue.hpp"
 #include "camera/aravis/user_name.hpp"
+#include <atomic>
+#include <cerrno>
+#include <dlfcn.h>
 #include <filesystem>
 #include <fstream>
+#include <pthread.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -363,6 +369,61 @@ GST_START_TEST (test_usb_camera_without_permission_is_found_once)
 }
 GST_END_TEST;
 
+/* ---- teardown ---- */
+
+static std::atomic<bool> no_threads = false;
+
+/* In place of the C library's: fails where a test says so. */
+extern "C" int
+pthread_create (
+    pthread_t *thread, const pthread_attr_t *attributes, void *(*start) (void *), void *data)
+{
+  using Create = decltype (&pthread_create);
+  static const auto create = reinterpret_cast<Create> (dlsym (RTLD_NEXT, "pthread_create"));
+  return no_threads ? EAGAIN : create (thread, attributes, start, data);
+}
+
+static void
+allow_threads ()
+{
+  no_threads = false;
+}
+
+GST_START_TEST (test_teardown_runs_in_a_thread_of_its_own)
+{
+  GThread *here = g_thread_self (), *there = nullptr;
+  auto held = std::make_shared<int> (1);
+  std::vector<int> ran;
+  {
+    TeardownQueue queue;
+    fail_unless (queue.error () == nullptr);
+    queue.run ([&there, held] { there = g_thread_self (); }, true);
+    fail_unless (queue.wait (TeardownQueue::kMaxWait));
+    fail_unless (there && there != here);
+    assert_equals_int (held.use_count (), 1);
+    for (const int number : {1, 2, 3})
+      queue.run ([&ran, number] { ran.push_back (number); }, false);
+    fail_unless (queue.wait (TeardownQueue::kMaxWait));
+  }
+  fail_unless (ran == std::vector<int> ({1, 2, 3}));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_camera_without_a_teardown_thread_is_refused)
+{
+  g_thread_pool_set_max_unused_threads (0);
+  g_thread_pool_stop_unused_threads ();
+  while (g_thread_pool_get_num_unused_threads () > 0)
+    g_usleep (1000);
+  no_threads = true;
+  std::unique_ptr<Camera> camera;
+  const CameraStatus status = Camera::open ("Fake-1", camera);
+  fail_unless (!status.ok () && !camera);
+  fail_unless (status.message ().find ("the thread that releases the camera") != std::string::npos,
+      "%s", status.message ().c_str ());
+}
+GST_END_TEST;
+
 static Suite *
 cameraparts_suite ()
 {
@@ -386,6 +447,12 @@ cameraparts_suite ()
   tcase_add_test (tc, test_user_name_is_asked_for_with_the_bytes_of_the_standard);
   tcase_add_test (tc, test_user_name_is_taken_from_answers_of_the_standard_alone);
   tcase_add_test (tc, test_usb_camera_without_permission_is_found_once);
+  tcase_add_test (tc, test_teardown_runs_in_a_thread_of_its_own);
+
+  TCase *no_thread = tcase_create ("without threads");
+  tcase_add_checked_fixture (no_thread, nullptr, allow_threads);
+  suite_add_tcase (suite, no_thread);
+  tcase_add_test (no_thread, test_camera_without_a_teardown_thread_is_refused);
   return suite;
 }
 

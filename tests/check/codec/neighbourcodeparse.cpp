@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
+
 #include "parse-check.hpp"
 
 using namespace rangecast;
@@ -54,33 +56,66 @@ GST_START_TEST (test_every_truncated_prefix_keeps_the_whole_access_units_before_
 }
 GST_END_TEST;
 
-/* Warnings of a stream that lacks its last bytes. */
-static int
-warnings_of_stream (const Recording &recording, gsize missing)
+/* Warnings of a stream that ends after these bytes; in `errors` how many errors there were. */
+static std::vector<std::string>
+warnings_of_stream (std::span<const guint8> bytes, int *errors = nullptr)
 {
   GstHarness *h = new_parser ();
-  int n = 0;
+  std::vector<std::string> texts;
   {
-    ErrorCounter errors (h);
-    push_bytes (h, std::span (recording.bytes).first (recording.bytes.size () - missing), 5000);
+    ErrorCounter counter (h);
+    push_bytes (h, bytes, 5000);
     gst_harness_push_event (h, gst_event_new_eos ());
-    while (GstMessage *message = gst_bus_pop_filtered (errors.bus, GST_MESSAGE_WARNING)) {
+    while (GstMessage *message = gst_bus_pop_filtered (
+               counter.bus, GstMessageType (GST_MESSAGE_WARNING | GST_MESSAGE_ERROR))) {
+      GError *error = nullptr;
+      if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_WARNING) {
+        gst_message_parse_warning (message, &error, nullptr);
+        texts.emplace_back (error->message);
+        g_error_free (error);
+      } else if (errors) {
+        ++*errors;
+      }
       gst_message_unref (message);
-      n++;
     }
   }
   auto parsed = pull_all (h);
   unref_all (parsed);
   gst_harness_teardown (h);
-  return n;
+  return texts;
 }
 
 GST_START_TEST (test_stream_that_ends_within_an_access_unit_is_one_warning)
 {
   const Recording recording;
-  fail_unless_equals_int (warnings_of_stream (recording, 0), 0);
-  fail_unless_equals_int (warnings_of_stream (recording, 1), 1);
-  fail_unless_equals_int (warnings_of_stream (recording, 500), 1);
+  const std::span<const guint8> bytes (recording.bytes);
+  const gsize begin = recording.offsets[9];
+  fail_unless_equals_int (warnings_of_stream (bytes).size (), 0);
+  fail_unless_equals_int (warnings_of_stream (bytes.first (begin)).size (), 0);
+  for (gsize got : {gsize{4}, gsize{27}, gsize{28}, gsize{29}, bytes.size () - begin - 500,
+           bytes.size () - begin - 1}) {
+    const auto texts = warnings_of_stream (bytes.first (begin + got));
+    const bool header = got < kStreamPrefixSize;
+    const std::string expected =
+        "The stream ends at byte " + std::to_string (begin + got) + ", within the access unit " +
+        (header ? "header " : "") + "at byte " + std::to_string (begin) + ": expected " +
+        std::to_string (header ? kStreamPrefixSize : bytes.size () - begin) + " bytes, got " +
+        std::to_string (got);
+    fail_unless_equals_int (texts.size (), 1);
+    fail_unless (texts[0] == expected, "%s", texts[0].c_str ());
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_stream_that_ends_before_its_first_slice_is_one_error_and_no_warning)
+{
+  const Recording recording (1, 16);
+  for (gsize size : {1, 10, 28, 40, 100}) {
+    int errors = 0;
+    const auto texts = warnings_of_stream (std::span (recording.bytes).first (size), &errors);
+    fail_unless_equals_int (texts.size (), 0);
+    fail_unless_equals_int (errors, 1);
+  }
 }
 GST_END_TEST;
 
@@ -749,6 +784,7 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_rubbish_before_and_between_costs_nothing_else);
   tcase_add_test (tc, test_every_truncated_prefix_keeps_the_whole_access_units_before_it);
   tcase_add_test (tc, test_stream_that_ends_within_an_access_unit_is_one_warning);
+  tcase_add_test (tc, test_stream_that_ends_before_its_first_slice_is_one_error_and_no_warning);
   tcase_add_test (tc, test_trailing_bytes_cost_nothing);
   tcase_add_test (tc, test_size_field_that_lies_costs_no_later_access_unit);
   tcase_add_test (tc, test_every_flipped_bit_costs_its_own_access_unit_only);

@@ -105,7 +105,7 @@ render (GstHarness *h, GstBuffer *frame_set, int width = 320)
 }
 
 /** A wall through the origin that two cameras see, 40 degrees apart, in red and in green; what the
- * first one sees is rough. */
+ *  first one sees is rough. */
 inline GstBuffer *
 wall_of_two (const Rig &rig)
 {

@@ -35,7 +35,7 @@ struct StreamResult {
 /* An encoder that makes what it is told, or less. */
 struct SimulatedStream {
   CongestionControl control;
-  double fps = 15, most_bits_per_s = 20e6, start_s = 0;
+  double fps = 15, max_bits_per_s = 20e6, start_s = 0;
   double jitter_share = 0.1;                   /* of the size of frame sets */
   double clock_s = 1000;                       /* the receiver's less the sender's */
   bool reports_only = false;                   /* RTCP receiver reports every second */
@@ -51,11 +51,11 @@ public:
   std::vector<SimulatedStream> streams;
   double now_s = 0;
 
-  explicit LinkSimulation (int n = 1, double most_bits_per_s = 20e6) : streams (std::size_t (n))
+  explicit LinkSimulation (int n = 1, double max_bits_per_s = 20e6) : streams (std::size_t (n))
   {
     for (std::size_t i = 0; i < streams.size (); i++) {
-      streams[i].most_bits_per_s = most_bits_per_s;
-      streams[i].control.configure ({100e3, most_bits_per_s});
+      streams[i].max_bits_per_s = max_bits_per_s;
+      streams[i].control.configure ({100e3, max_bits_per_s});
       streams[i].start_s = 0.013 * double (i);
     }
   }
@@ -121,10 +121,10 @@ private:
   {
     SimulatedStream &s = streams[i];
     at (now_s + 1 / s.fps, [this, i] { send (i); });
-    s.control.tick (s.most_bits_per_s, ns (now_s));
+    s.control.tick (s.max_bits_per_s, ns (now_s));
     const double rate = s.control.bits_per_s ();
     const double noise = 1 + s.jitter_share * std::normal_distribution<double> () (random_);
-    double bytes = std::min (rate > 0 ? rate : 1e12, s.most_bits_per_s) / 8 / s.fps * noise;
+    double bytes = std::min (rate > 0 ? rate : 1e12, s.max_bits_per_s) / 8 / s.fps * noise;
     std::vector<PacketReport> reports;
     double last_arrival = now_s;
     for (; bytes > 0; bytes -= 1200) {

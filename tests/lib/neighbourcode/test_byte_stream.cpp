@@ -117,6 +117,20 @@ TEST (ByteStream, LostBytesEndAtTheNextStartCode)
   EXPECT_EQ (next_part (bytes, false).length, size);
 }
 
+TEST (ByteStream, TruncatedEndHasTheSizeThatItShouldHave)
+{
+  const auto whole = make_access_unit (5);
+  for (std::size_t size = 1; size <= whole.size (); size++) {
+    const std::vector<std::uint8_t> cut (whole.begin (), whole.begin () + std::ptrdiff_t (size));
+    const std::size_t expected = size < kStartCode.size ()  ? 0
+                                 : size < kStreamPrefixSize ? kStreamPrefixSize
+                                 : size < whole.size ()     ? whole.size ()
+                                                            : 0;
+    EXPECT_EQ (next_part (cut, true).expected, expected) << size;
+    EXPECT_EQ (next_part (cut, false).expected, 0u) << size;
+  }
+}
+
 TEST (ByteStream, AnyBytesAreUsedUpOrAskForMore)
 {
   std::mt19937 random (1);

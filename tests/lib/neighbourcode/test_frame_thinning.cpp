@@ -10,13 +10,13 @@ static constexpr std::uint64_t kInterval = 1'000'000'000 / 30;
 
 /* Which of n frame sets are kept, from frame set `first` on. */
 static std::vector<int>
-kept (FrameThinning &thinning, int first, int n, double bits_per_s, double least_bits,
-    double least_fps = 1)
+kept (FrameThinning &thinning, int first, int n, double bits_per_s, double min_bits,
+    double min_fps = 1)
 {
   std::vector<int> numbers;
   for (int i = first; i < first + n; i++)
     if (thinning.keep (
-            {std::uint64_t (i) * kInterval + 3000, kInterval, bits_per_s, least_bits, least_fps}))
+            {std::uint64_t (i) * kInterval + 3000, kInterval, bits_per_s, min_bits, min_fps}))
       numbers.push_back (i);
   return numbers;
 }
@@ -31,10 +31,10 @@ TEST (FrameThinning, keeps_all_where_there_is_enough)
 
 TEST (FrameThinning, keeps_every_second_or_third_evenly)
 {
-  for (const auto &[least_bits, n] : {std::pair{1.5e5, 2}, {2.5e5, 3}, {9.5e5, 10}}) {
+  for (const auto &[min_bits, n] : {std::pair{1.5e5, 2}, {2.5e5, 3}, {9.5e5, 10}}) {
     FrameThinning thinning;
-    kept (thinning, 0, 30, 3e6, least_bits);
-    const auto numbers = kept (thinning, 30, 120, 3e6, least_bits);
+    kept (thinning, 0, 30, 3e6, min_bits);
+    const auto numbers = kept (thinning, 30, 120, 3e6, min_bits);
     ASSERT_GE (numbers.size (), 120u / unsigned (n) - 1);
     for (std::size_t i = 1; i < numbers.size (); i++)
       EXPECT_EQ (numbers[i] - numbers[i - 1], n);
@@ -82,7 +82,7 @@ TEST (FrameThinning, never_fewer_than_the_least_frame_rate)
   FrameThinning thinning;
   kept (thinning, 0, 60, 1e3, 1e6, 5);
   EXPECT_EQ (kept (thinning, 60, 300, 1e3, 1e6, 5).size (), 50u);
-  EXPECT_EQ (kept (thinning, 360, 30, 1e3, 1e6, 30).size (), 30u) << "a new least rate";
+  EXPECT_EQ (kept (thinning, 360, 30, 1e3, 1e6, 30).size (), 30u) << "a new minimum rate";
 }
 
 TEST (FrameThinning, lost_frame_sets_cost_no_others)

@@ -434,7 +434,7 @@ TEST_F (Slices, stray_with_another_roi_that_comes_first_costs_nothing_but_itself
   Decoded decoded = decode_exact (decoder, joined (sent));
   EXPECT_EQ (decoded.result.slices, units.size ());
   EXPECT_EQ (decoded.result.bad_slices, 1u);
-  ASSERT_TRUE (decoded.pictures[0].roi == pictures[0].roi);
+  ASSERT_EQ (decoded.pictures[0].roi, pictures[0].roi);
   expect_rows (decoded.pictures[0], pictures[0]);
 }
 

@@ -28,7 +28,9 @@ expect_same (Picture &a, Picture &b)
       ASSERT_EQ (a.depth.view ().at (x, y), b.depth.view ().at (x, y)) << x << " " << y;
       const Rgbx p = a.colour.view ().at (x, y), q = b.colour.view ().at (x, y);
       if (a.depth.view ().at (x, y)) {
-        ASSERT_TRUE (p.r == q.r && p.g == q.g && p.b == q.b) << x << " " << y;
+        ASSERT_EQ (p.r, q.r) << x << " " << y;
+        ASSERT_EQ (p.g, q.g) << x << " " << y;
+        ASSERT_EQ (p.b, q.b) << x << " " << y;
       }
     }
 }

@@ -363,11 +363,15 @@ private:
         const std::uint16_t d = decoded.depth (x, y);
         const Rgbx c = decoded.colour (x, y);
         if (!own) {
-          ASSERT_TRUE (d == 0xabcd && c.r == 0xef && c.x == 0xef) << x << ", " << y;
+          ASSERT_EQ (d, 0xabcd) << x << ", " << y;
+          ASSERT_EQ (c.r, 0xef) << x << ", " << y;
+          ASSERT_EQ (c.x, 0xef) << x << ", " << y;
         } else if (good) {
           const Shown &e = (*expected)[std::size_t (row * header.columns + column)];
-          ASSERT_TRUE (d == e.depth && c.r == e.colour.r && c.g == e.colour.g && c.b == e.colour.b)
-              << x << ", " << y;
+          ASSERT_EQ (d, e.depth) << x << ", " << y;
+          ASSERT_EQ (c.r, e.colour.r) << x << ", " << y;
+          ASSERT_EQ (c.g, e.colour.g) << x << ", " << y;
+          ASSERT_EQ (c.b, e.colour.b) << x << ", " << y;
           valid += d != 0;
         }
       }

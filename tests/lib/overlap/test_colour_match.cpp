@@ -149,7 +149,7 @@ TEST (ColourBalance, cameras_that_disagree_are_made_to_agree)
 }
 
 /** The largest of all pairs' and channels' mean differences over what both see, levels. Exact
- * depth, so a point of one view is looked up in the other one. */
+ *  depth, so a point of one view is looked up in the other one. */
 double
 worst_mean_difference (Frame &frame)
 {

@@ -388,11 +388,15 @@ expect_sane (const Rig &rig, const std::function<std::uint16_t (int view, int u,
       for (int v = 0; v < rig.views[i].height; v++)
         for (int u = 0; u < rig.views[i].width; u++) {
           const int now = frame.depth[i].view ().at (u, v);
-          ASSERT_TRUE (now == 0 || now == depth_at (int (i), u, v));
+          if (now != 0) {
+            ASSERT_EQ (now, depth_at (int (i), u, v));
+          }
         }
     }
     EXPECT_EQ (result.points_out, left);
-    EXPECT_TRUE (points == 0 || left > 0);
+    if (points > 0) {
+      EXPECT_GT (left, 0u);
+    }
     for (double number : {result.axis.position.x, result.axis.position.y, result.axis.position.z})
       EXPECT_TRUE (std::isfinite (number));
     EXPECT_NEAR (norm (result.axis.direction), 1, 1e-9);

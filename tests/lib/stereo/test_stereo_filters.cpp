@@ -232,7 +232,7 @@ judge_plainly (const SilhouetteFilter::Settings &s, const cv::Mat &colour, const
     int x, int y)
 {
   const int own = disparity.at<std::int16_t> (y, x), reach = s.radius * 2 / 3;
-  const bool valid = own >= s.least;
+  const bool valid = own >= s.min;
   const auto tolerance = [&] (int d) {
     return std::max (16, (d + s.offset) * int (65536 * s.step) >> 16);
   };
@@ -240,7 +240,7 @@ judge_plainly (const SilhouetteFilter::Settings &s, const cv::Mat &colour, const
   double lowest, highest;
   cv::minMaxLoc (disparity (cv::Rect (x - reach, y - reach, 2 * reach + 1, 2 * reach + 1) & all),
       &lowest, &highest);
-  if (highest < std::max (s.least, s.nearest) ||
+  if (highest < std::max (s.min, s.nearest) ||
       (valid && (own < s.nearest || lowest >= own - tolerance (own))))
     return own;
   const auto each = [&] (auto &&work) {
@@ -255,22 +255,22 @@ judge_plainly (const SilhouetteFilter::Settings &s, const cv::Mat &colour, const
   };
   int d = own, sum = 0, weights = 0;
   each ([&] (int weight, int depth) {
-    if (depth >= s.least)
+    if (depth >= s.min)
       sum += weight * depth, weights += weight;
   });
   if (!valid)
-    d = weights < 160 ? s.least - 1 : sum / weights;
-  if (d < std::max (s.least, s.nearest))
+    d = weights < 160 ? s.min - 1 : sum / weights;
+  if (d < std::max (s.min, s.nearest))
     return own;
   int same = 0, near = 0, far = 0, none = 0;
   each ([&] (int weight, int depth) {
-    (depth < s.least                ? none
+    (depth < s.min                  ? none
         : depth > d + tolerance (d) ? near
         : depth < d - tolerance (d) ? far
                                     : same) += weight;
   });
   if (valid)
-    return far + none > same ? s.least - 16 : own;
+    return far + none > same ? s.min - 16 : own;
   return same > 4 * (near + far) && same > none ? d : own;
 }
 

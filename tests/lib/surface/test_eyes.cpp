@@ -257,12 +257,12 @@ TEST (Fit, a_tenth_is_about_the_same)
   SceneFrame a, b;
   a.distance_m = 1;
   b.distance_m = 1.09;
-  EXPECT_TRUE (is_about_same (a, b, 45));
+  EXPECT_TRUE (is_similar (a, b, 45));
   b.distance_m = 1.11;
-  EXPECT_FALSE (is_about_same (a, b, 45));
+  EXPECT_FALSE (is_similar (a, b, 45));
   b = a;
   b.target.x = 0.07; /* the picture is 0.83 m high there */
-  EXPECT_TRUE (is_about_same (a, b, 45));
+  EXPECT_TRUE (is_similar (a, b, 45));
   b.target.x = 0.1;
-  EXPECT_FALSE (is_about_same (a, b, 45));
+  EXPECT_FALSE (is_similar (a, b, 45));
 }

@@ -155,7 +155,8 @@ expect_valid_pixels_drawn (const std::vector<std::string> &rows, const std::vect
 {
   std::vector<bool> drawn (600);
   for (const Vertex &p : v) {
-    ASSERT_TRUE (p.x < 30 && p.y < 20);
+    ASSERT_LT (p.x, 30);
+    ASSERT_LT (p.y, 20);
     drawn[30 * p.y + p.x] = true;
   }
   for (int i = 0; i < 600; i++)
@@ -328,7 +329,7 @@ TEST (Strips, pixels_left_out_are_near_the_line_between_those_that_stay)
   EXPECT_LT (columns.size (), 300u);
   for (auto it = columns.begin (); std::next (it) != columns.end (); ++it) {
     const int a = *it, b = *std::next (it);
-    EXPECT_LE (b - a, kLongestPiece);
+    EXPECT_LE (b - a, kMaxPieceLength);
     for (int x = a + 1; x < b; x++) {
       const double t = double (x - a) / (b - a);
       EXPECT_NEAR (depth[a] + t * (depth[b] - depth[a]), depth[x], kMergeDepth * depth[x] + 0.1);

@@ -95,7 +95,8 @@ struct FakeCamera {
   {
     fire ();
     const auto found = answer ();
-    EXPECT_TRUE (found.known && found.trigger == trigger) << when << ": trigger " << trigger;
+    EXPECT_TRUE (found.known) << when << ": trigger " << trigger;
+    EXPECT_EQ (found.trigger, trigger) << when;
     trigger++;
   }
 };
@@ -301,7 +302,7 @@ TEST (FrameSets, what_waits_for_a_dead_camera_is_bounded)
     most = std::max (most, held);
   }
   EXPECT_LE (most, 8);
-  while (sets.take_rest (set) == FrameSets::Step::kDrop)
+  while (sets.drain (set) == FrameSets::Step::kDrop)
     held--;
   EXPECT_EQ (held, 0);
 }
@@ -382,7 +383,7 @@ TEST (FrameSets, random_losses_never_mix_keys)
     for (const auto &of_camera : sent)
       all += static_cast<int> (of_camera.size ());
     EXPECT_EQ (found, complete);
-    while (sets.take_rest (set) == FrameSets::Step::kDrop)
+    while (sets.drain (set) == FrameSets::Step::kDrop)
       for (FrameSets::Frame rest : set.frames)
         if (rest)
           out.insert (reinterpret_cast<std::intptr_t> (rest));

@@ -90,6 +90,10 @@ next_part (Bytes bytes, bool at_end)
     return part;
   if (!begins_access_unit (bytes, header)) {
     part.rubbish = find_access_unit (bytes, 1, bytes.size (), !at_end);
+    if (at_end && part.rubbish == bytes.size () && bytes.size () < kStreamPrefixSize &&
+        bytes.size () >= kStartCode.size () &&
+        std::equal (kStartCode.begin (), kStartCode.end (), bytes.begin ()))
+      part.expected = kStreamPrefixSize;
     if (part.rubbish == bytes.size () && !at_end) /* they may end with a part of a start code */
       part.rubbish -= std::min (bytes.size () - 1, kStartCode.size () - 1);
     return part;
@@ -114,6 +118,8 @@ next_part (Bytes bytes, bool at_end)
     part.length = declared;
   else
     part.length = inner;
+  if (at_end && part.length == bytes.size () && bytes.size () < declared)
+    part.expected = declared;
   return part;
 }
 

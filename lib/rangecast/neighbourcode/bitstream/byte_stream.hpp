@@ -26,6 +26,9 @@ struct StreamPart {
   std::size_t length = 0;  ///< bytes of the access unit, prefix included
   std::size_t wanted = 0;  ///< bytes needed, from the same beginning, to call next_part() again
   AccessUnitHeader header; ///< of the access unit
+  /** Bytes that the last part should have from the same beginning, if the stream ends within an
+   *  access unit or its header; else 0. */
+  std::size_t expected = 0;
 };
 
 /** Separates access units from rubbish. An access unit has the size that its header declares if the

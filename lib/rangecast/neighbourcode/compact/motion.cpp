@@ -142,7 +142,7 @@ MotionSearch::MotionSearch ()
 
 /* Every second pixel of every second row, or all pixels of small blocks. */
 void
-MotionSearch::take_samples (const Pictures &pictures, const Area &area)
+MotionSearch::collect_samples (const Pictures &pictures, const Area &area)
 {
   const ConstRangeImage &image = pictures.image;
   const ColourQuantiser &colour = pictures.colour;
@@ -294,7 +294,7 @@ MotionSearch::find (const Pictures &pictures, Components threshold, const Area &
   depth_weight_ = weight (threshold[0]);
   /* Squares of R, G and B added up are about 3 Y^2 + Co^2 / 2 + 3 Cg^2 / 4. */
   colour_weights_ = FloatComponents{0, 3, 0.5f, 0.75f} * weight (threshold[1]);
-  take_samples (pictures, area);
+  collect_samples (pictures, area);
   const auto all = float (samples_.size ());
   const float price = all / 64; /* of a motion, in errors: it costs bits */
   const MotionScale &scale = pictures.scale;

@@ -134,7 +134,7 @@ private:
     std::int32_t depth; /* own minus the other's */
     float colour_error; /* squared, in units of the threshold */
   };
-  void take_samples (const Pictures &pictures, const Area &area);
+  void collect_samples (const Pictures &pictures, const Area &area);
   void pair_up (const Pictures &pictures, const Area &area, const BlockMotion &m);
   [[nodiscard]] std::int32_t median_depth ();
   [[nodiscard]] float error_of (const MotionScale &scale, const BlockMotion &m) const;

@@ -42,8 +42,8 @@ constexpr int kMaxHalvings = 10;
  * above the minimum stops the increase. Reports older than kFreshNs do not count. */
 constexpr double kRoundTripQueue = 0.1, kJitter = 0.03;
 constexpr std::uint64_t kFreshNs = 15'000 * kMs, kReportIntervalNs = 400 * kMs;
-constexpr std::uint64_t kLongestLossNs = 2'000 * kMs;
-constexpr double kLongestElapsed = 6;
+constexpr std::uint64_t kMaxLossSpanNs = 2'000 * kMs;
+constexpr double kMaxElapsed = 6;
 /* Loss beyond the usual that stops the increase. */
 constexpr double kReportedLoss = 0.02;
 
@@ -57,7 +57,7 @@ seconds (std::uint64_t ns)
 bool
 is_enough (double packets, double lost, std::uint64_t span_ns)
 {
-  if (span_ns >= kLongestLossNs)
+  if (span_ns >= kMaxLossSpanNs)
     return packets > 0;
   return packets >= kMinPackets && (lost < 0.5 || lost > 2.5 || packets >= kManyPackets);
 }
@@ -77,14 +77,14 @@ CongestionControl::configure (const CongestionSettings &settings)
 double
 CongestionControl::limited (double bits_per_s) const
 {
-  const double rate = std::max (bits_per_s, settings_.least_bits_per_s);
-  return settings_.most_bits_per_s > 0 ? std::min (rate, settings_.most_bits_per_s) : rate;
+  const double rate = std::max (bits_per_s, settings_.min_bits_per_s);
+  return settings_.max_bits_per_s > 0 ? std::min (rate, settings_.max_bits_per_s) : rate;
 }
 
 double
 CongestionControl::bits_per_s () const
 {
-  return rate_ > 0 ? rate_ : settings_.most_bits_per_s;
+  return rate_ > 0 ? rate_ : settings_.max_bits_per_s;
 }
 
 void
@@ -295,7 +295,7 @@ void
 CongestionControl::evaluate_receivers (double sent_bits_per_s, std::uint64_t now_ns)
 {
   const double elapsed =
-      evaluated_ns_ == 0 ? 0 : std::min (seconds (now_ns - evaluated_ns_), kLongestElapsed);
+      evaluated_ns_ == 0 ? 0 : std::min (seconds (now_ns - evaluated_ns_), kMaxElapsed);
   const Worst worst = find_worst (now_ns);
   queue_s_ = worst.queue_s;
   evaluated_ns_ = now_ns;

@@ -19,8 +19,8 @@ struct ReceiverReport {
 };
 
 struct CongestionSettings {
-  double least_bits_per_s = 200'000; ///< never below, unless `most` is
-  double most_bits_per_s = 0;        ///< never above; 0: no limit
+  double min_bits_per_s = 200'000; ///< never below, unless max_bits_per_s is
+  double max_bits_per_s = 0;       ///< never above; 0: no limit
 
   friend bool operator== (const CongestionSettings &, const CongestionSettings &) = default;
 };
@@ -36,7 +36,7 @@ struct CongestionSettings {
  *  beyond the *usual*, which remains when less is sent, counts (LossEvaluator).
  *
  *  The rate counts the bytes of PacketReport: payload only, if these exclude headers. Until the
- * first sign of congestion it is most_bits_per_s, or no limit. Nothing is allocated. Not
+ * first sign of congestion it is max_bits_per_s, or no limit. Nothing is allocated. Not
  * thread-safe. */
 class CongestionControl {
 public:

@@ -41,10 +41,9 @@ void
 FrameThinning::adjust (const ThinningInput &in, double elapsed_s)
 {
   const double fps = 1e9 / static_cast<double> (interval_ns_);
-  const int max = in.least_fps > 0
-                      ? static_cast<int> (std::clamp (fps / in.least_fps, 1.0, double (kMax)))
-                      : kMax;
-  const double share = in.bits_per_s > 0 ? in.least_bits * fps / in.bits_per_s : 0;
+  const int max =
+      in.min_fps > 0 ? static_cast<int> (std::clamp (fps / in.min_fps, 1.0, double (kMax))) : kMax;
+  const double share = in.bits_per_s > 0 ? in.min_bits * fps / in.bits_per_s : 0;
   const auto one_of = [&] (double x) {
     return static_cast<int> (std::ceil (std::clamp (x, 1.0, double (max))));
   };

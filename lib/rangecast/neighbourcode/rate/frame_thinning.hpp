@@ -10,8 +10,8 @@ struct ThinningInput {
   std::uint64_t time_ns = 0;     ///< of the frame set's capture
   std::uint64_t interval_ns = 0; ///< between frame sets, from the caps
   double bits_per_s = 0;         ///< available rate; 0: no limit
-  double least_bits = 0;         ///< of a frame set at the worst quality; 0: not known
-  double least_fps = 1;          ///< least number of frame sets a second to keep
+  double min_bits = 0;           ///< size of a frame set at the worst quality; 0: unknown
+  double min_fps = 1;            ///< minimum number of frame sets per second to keep
 };
 
 /** Drops whole frame sets when the worst quality still exceeds the rate: one of n is kept, evenly.

@@ -18,7 +18,7 @@ constexpr double kMaxForRefreshes = 0.9, kMaxSpread = 1.6;
 constexpr double kMemoryOfModel = 0.3, kMemoryOfInterval = 0.5;
 
 /* A longer pause, in seconds or intervals, is a discontinuity: nothing is saved during it. */
-constexpr double kLongestPause = 2, kMaxIntervals = 4;
+constexpr double kMaxPause = 2, kMaxIntervals = 4;
 
 /* A target that differs by a greater share begins a new account; a smaller change is congestion
  * control following the network. */
@@ -159,8 +159,7 @@ RateControl::next (std::uint64_t time_ns, std::uint64_t pixels)
 {
   const double elapsed =
       has_time_ ? 1e-9 * static_cast<double> (static_cast<std::int64_t> (time_ns - time_ns_)) : -1;
-  const bool continues =
-      elapsed > 0 && elapsed < std::max (kLongestPause, kMaxIntervals * interval_s_);
+  const bool continues = elapsed > 0 && elapsed < std::max (kMaxPause, kMaxIntervals * interval_s_);
   elapsed_s_ = continues ? elapsed : interval_s_;
   if (continues)
     interval_s_ += gain (elapsed, kMemoryOfInterval) * (elapsed - interval_s_);
@@ -205,7 +204,7 @@ RateControl::learn (double bits)
 }
 
 double
-RateControl::least_bits () const
+RateControl::min_bits () const
 {
   return frames_ > 0 ? points_ * std::exp (a_ - b_ * max_x_) : 0;
 }

@@ -65,7 +65,7 @@ public:
   [[nodiscard]] double coarseness () const { return x_; }
 
   /** Predicted size of the latest frame set at the worst thresholds, bits; 0 before the first. */
-  [[nodiscard]] double least_bits () const;
+  [[nodiscard]] double min_bits () const;
 
 private:
   [[nodiscard]] double threshold_at (int best, int worst, double x) const;

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# What setup.sh, env.sh and the application example say before everything is installed and built.
+
+build=${RANGECAST_BUILD:-$source_dir/build}
+
+# A tree with setup.sh whose build has three parts: meson only writes build.ninja, and all packages count as installed. The third
+# part fails if $FAIL is set.
+make_tree () {
+  mkdir -p tree/bin
+  cp "$source_dir/setup.sh" tree
+  cat >tree/build.ninja <<'END'
+rule compile
+  command = echo "$out: a warning" && test -z "$$FAIL" && touch $out
+  description = Compiling $out
+build part1: compile
+build part2: compile
+build part3: compile part2
+build demo: phony part1 part2
+build all: phony part1 part2 part3
+END
+  printf '#!/bin/sh\nmkdir -p build\ncp build.ninja build\n' >tree/bin/meson
+  printf '#!/bin/sh\necho installed\n' >tree/bin/dpkg-query
+  chmod +x tree/bin/*
+}
+
+run_setup () { PATH=$PWD/tree/bin:$PATH tree/setup.sh "$@"; }
+export -f run_setup
+
+test_setup_says_that_it_builds () {
+  make_tree
+  FAIL=1 expect_error "part1: a warning" run_setup
+  FAIL=1 expect_error "tree/build/setup.log" run_setup
+  run_setup --demo >setup.txt
+  grep -q "building.*build/setup.log" setup.txt || fail "$(cat setup.txt)"
+  ! grep -q "a warning" setup.txt || fail "the compiler's output: $(cat setup.txt)"
+  grep -q "part2: a warning" tree/build/setup.log || fail "$(cat tree/build/setup.log)"
+  [ -e tree/build/part2 ] && [ ! -e tree/build/part3 ] || fail "not the target demo"
+  run_setup --demo >setup.txt
+  [ ! -s setup.txt ] || fail "nothing to build: $(cat setup.txt)"
+  rm tree/build/part1
+  NINJA_STATUS=x PATH=$PWD/tree/bin:$PATH script -qec tree/setup.sh /dev/null >terminal.txt
+  grep -q "2 of 2" terminal.txt || fail "no progress in a terminal: $(cat terminal.txt)"
+}
+
+test_demo_builds_no_more_than_it_needs () {
+  [ -f "$build/build.ninja" ] || skip "not a build folder"
+  ninja -C "$build" -t query demo >demo.txt
+  grep -q "codec/libgstneighbourcode.so" demo.txt || fail "$(cat demo.txt)"
+  grep -q "pipelines/rangecast-run" demo.txt || fail "$(cat demo.txt)"
+  ! grep -E "gst/camera|gst/calibration|tests/" demo.txt || fail "$(cat demo.txt)"
+}
+
+test_env_says_that_the_build_is_missing_or_incomplete () {
+  local say="source tree/pipelines/env.sh" file
+  mkdir tree
+  ln -s "$pipelines" tree/pipelines
+  unset GST_PLUGIN_PATH
+  export GST_REGISTRY=$PWD/registry.bin
+  ! gst-inspect-1.0 --exists neighbourcodeenc || skip "an installed gst-rangecast"
+  bash -c "$say" 2>said.txt
+  [ "$(wc -l <said.txt)" = 1 ] && grep -q "neither built nor installed.*setup.sh" said.txt || fail "$(cat said.txt)"
+  mkdir -p tree/build/gst/codec
+  bash -c "$say" 2>said.txt
+  [ "$(wc -l <said.txt)" = 1 ] && grep -q "incomplete.*setup.sh" said.txt || fail "$(cat said.txt)"
+  for file in "$build"/gst/*/*.so "$build/pipelines/rangecast-run"; do
+    mkdir -p "$(dirname "tree/build/${file#"$build"}")"
+    ln -s "$file" "tree/build/${file#"$build"}"
+  done
+  bash -c "$say" 2>said.txt
+  [ ! -s said.txt ] || fail "a complete build: $(cat said.txt)"
+}
+
+test_python_example_says_what_it_needs () {
+  mkdir gi # a PyGObject without typelibs, then none
+  echo 'def require_version (name, version): raise ValueError ("Namespace %s not available" % name)' >gi/__init__.py
+  local text
+  for text in "Namespace Gst not available" "No module named"; do
+    PYTHONPATH=$PWD expect_error "$text" /usr/bin/python3 "$pipelines/examples/count-points.py" recording.rcnc
+    ! PYTHONPATH=$PWD /usr/bin/python3 "$pipelines/examples/count-points.py" recording.rcnc 2>said.txt || fail "no error"
+    [ "$(wc -l <said.txt)" = 1 ] && grep -q "setup.sh" said.txt || fail "$(cat said.txt)"
+    echo 'raise ModuleNotFoundError ("No module named gi")' >gi/__init__.py
+  done
+}
