@@ -334,7 +334,7 @@ MotionSearch::find (const Pictures &pictures, Components threshold, const Area &
   fit_plane (scale, best);
   least = error_of (scale, best);
   pair_up (pictures, area, left);
-  if (error_of (scale, left) - 2 * price < least)
+  if (is_sound (left, scale) && error_of (scale, left) - 2 * price < least)
     best = left;
   /* Partitions may share a block: the one with its first pixel records its motion. */
   const auto begins = [] (int at, int of_roi) { return at % kMotionBlock == 0 || at == of_roi; };
