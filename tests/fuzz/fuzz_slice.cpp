@@ -152,7 +152,9 @@ fill_earlier (const Ask &ask, SliceHeader header, ReferencePlane &plane)
   for (int y = 0; y < header.roi.height; y++)
     for (int x = 0; x < header.roi.width; x++) {
       random = random * 1664525u + 1013904223u;
-      const std::uint64_t pixel = earlier_pixel (header, random >> 3 ^ random << 13);
+      const bool empty = header.profile != Profile::kPlain && (random >> 8 & 15) == 0;
+      const std::uint64_t pixel =
+          empty ? kEmptyPixel : earlier_pixel (header, random >> 3 ^ random << 13);
       if (random >> 26 >= static_cast<std::uint32_t> (ask.earlier >> 2)) /* else unknown */
         plane.keep (header.roi.x + x, header.roi.y + y, {&pixel, 1});
     }

@@ -383,8 +383,9 @@ TEST_P (Robust, a_unit_of_a_future_version_or_of_absurd_size_loses_what_follows_
     std::uint8_t first_byte;
     std::uint16_t size;
   };
-  for (const Case &one : {Case{2 << 4 | 1, 8}, {15 << 4, 8}, {1 << 4 | 1, 0}, {1 << 4 | 1, 3},
-           {1 << 4 | 1, 65535}, {1 << 4 | 9, 60000}})
+  constexpr int kNext = kBitstreamVersion + 1;
+  for (const Case &one : {Case{kNext << 4 | 1, 8}, {15 << 4, 8}, {kBitstreamVersion << 4 | 1, 0}, {kBitstreamVersion << 4 | 1, 3},
+           {kBitstreamVersion << 4 | 1, 65535}, {kBitstreamVersion << 4 | 9, 60000}})
     for (std::size_t at = 0; at <= sets[1].units.size (); at++) {
       Units units = sets[1].units;
       units.insert (units.begin () + std::ptrdiff_t (at),

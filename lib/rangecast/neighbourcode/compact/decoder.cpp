@@ -228,8 +228,8 @@ CompactDecoder::load_earlier (
     }
   }
   if (reference.before)
-    fetch_displaced (
-        *reference.before, full_x, full_y, motions_, scale, 0, kMaxImageSide, earlier_codes_);
+    fetch_displaced (*reference.before, full_x, full_y, motions_, scale, -kMaxImageSide,
+        2 * kMaxImageSide, earlier_codes_);
   std::ranges::fill (row_.earlier (), std::uint8_t{0});
   return true;
 }

@@ -112,7 +112,8 @@ fetch_displaced (const ReferencePlane &plane, int x, int y, std::span<const Bloc
       std::ranges::fill (part, kNoPixel);
     else
       for_this_cpu ([&] { fetch_part (plane, x, y, m, scale, part); });
-    if (m.dz != 0 || m.slope_x != 0 || m.slope_y != 0)
+    /* A mixture may exceed the greatest depth because differences are modulo 2^16. */
+    if (m != BlockMotion{m.dx & ~3, m.dy & ~3})
       for (int i = 0; i < next - x; i++) {
         PixelCode &code = part[static_cast<std::size_t> (i)];
         const auto depth = static_cast<std::int32_t> (code & 0xffff) +
