@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 #include <random>
 #include <rangecast/base/cpu.hpp>
-#include <rangecast/neighbourcode/compact/motion.hpp>
+#include <rangecast/geometry/range_image.hpp>
+#include <rangecast/neighbourcode/compact/decoder.hpp>
+#include <rangecast/neighbourcode/compact/packed_code.hpp>
 
 using namespace rangecast;
 
@@ -116,6 +118,58 @@ TEST_F (Motion, pixels_are_those_of_the_specification)
   limit_cpu (cpu_supports ());
 }
 
+/* Differences of depths are modulo 2^16: where the codes at both ends of the range lie side by
+ * side, their mixture is beyond one of them. */
+TEST_F (Motion, depths_at_both_ends_of_the_range_count_as_near_and_are_clamped)
+{
+  SliceHeader header;
+  header.profile = Profile::kEntropy;
+  header.roi = {0, 0, 2, 1};
+  struct Case {
+    int left, right, last, wanted;
+  };
+  for (const CpuLevel level : {CpuLevel::kScalar, cpu_supports ()}) {
+    limit_cpu (level);
+    for (const Case &c : {Case{65000, 0, 65000, 65000}, {65500, 100, 65535, 32},
+             {100, 65500, 65535, 32}, {0, 65000, 65000, 65000}}) {
+      plane.begin (header);
+      const PixelCode row[] = {pack_components (Components{c.left, 10, 0, 0}),
+          pack_components (Components{c.right, 20, 0, 0})};
+      plane.keep (0, 0, row);
+      PixelCode pixel = 0;
+      const BlockMotion half = {2, 0, 0, 0, 0};
+      fetch_displaced (plane, 0, 0, {&half, 1}, MotionScale (300, c.last), 0, 1, {&pixel, 1});
+      EXPECT_EQ (components_of (pixel)[0], c.wanted) << c.left << " " << c.right;
+      EXPECT_EQ (components_of (pixel)[1], 15);
+    }
+  }
+  limit_cpu (cpu_supports ());
+}
+
+TEST_F (Motion, rows_and_columns_outside_of_the_earlier_ROI_are_empty_not_missing)
+{
+  SliceHeader header;
+  header.profile = Profile::kEntropy;
+  header.roi = {0, 0, 1, 1};
+  plane.begin (header);
+  const PixelCode one = pack_components (Components{900, 10, -20, 30});
+  plane.keep (0, 0, {&one, 1});
+  for (const CpuLevel level : {CpuLevel::kScalar, cpu_supports ()}) {
+    limit_cpu (level);
+    for (int dy = -3; dy <= 3; dy++)
+      for (int dx = -3; dx <= 3; dx++) {
+        const BlockMotion m = {dx, dy, 0, 0, 0};
+        PixelCode pixel = 0;
+        fetch_displaced (
+            plane, 0, 0, {&m, 1}, scale, -kMaxImageSide, 2 * kMaxImageSide, {&pixel, 1});
+        const auto nearest_is_inside = [] (int d) { return d >= -2 && d < 2; };
+        EXPECT_EQ (pixel, nearest_is_inside (dx) && nearest_is_inside (dy) ? one : kNoPixel)
+            << dx << " " << dy;
+      }
+  }
+  limit_cpu (cpu_supports ());
+}
+
 TEST_F (Motion, nothing_is_known_of_a_frame_set_that_is_not_held)
 {
   plane.reset ();
@@ -136,6 +190,84 @@ TEST (MotionLimits, greater_numbers_than_a_reader_accepts_are_not_sound)
       bad.*member += bad.*member > 0 ? 1 : -1;
       EXPECT_FALSE (is_sound (bad, scale));
     }
+}
+
+/* The decisions of a slice without key whose pixels are all invalid, of one row in one block. */
+class EntropyBytes : public EntropyCode<RangeEncoder> {
+public:
+  EntropyBytes (std::uint8_t *to, EntropyModel &model) : EntropyCode (RangeEncoder (to), model) {}
+  std::size_t finish () { return coder_.finish (); }
+};
+
+std::vector<std::uint8_t>
+body_with (Profile profile, int depth_step, const BlockMotion &m)
+{
+  const bool packed = profile == Profile::kPacked;
+  std::vector<std::uint8_t> body = {
+      static_cast<std::uint8_t> (depth_step), static_cast<std::uint8_t> (depth_step >> 8), 1, 1};
+  body.resize (packed ? 6 : 4);
+  std::vector<std::uint8_t> data (200);
+  EntropyModel model = kInitialDeltaModel;
+  BlockMotion motion = m;
+  std::int32_t later = 0;
+  if (packed) {
+    PackedWriter writer (data.data (), model, model, {{}, false});
+    writer.motion ({}, motion);
+    writer.run (false, later);
+    data.resize (writer.finish ());
+  } else {
+    EntropyBytes writer (data.data (), model);
+    EXPECT_TRUE (writer.motion ({}, motion));
+    EXPECT_TRUE (writer.run (false, later));
+    data.resize (writer.finish ());
+  }
+  body.insert (body.end (), data.begin (), data.end ());
+  body.shrink_to_fit ();
+  return body;
+}
+
+TEST (MotionLimits, a_slice_with_a_motion_that_is_not_sound_is_damaged)
+{
+  View view;
+  view.width = 8;
+  view.height = 1;
+  DepthQuantiser depth;
+  ASSERT_TRUE (depth.set (view, 16, DepthScale::kLinear).ok ());
+  const ColourQuantiser colour (8);
+  SliceHeader header;
+  header.key = false;
+  header.reference_distance = 1;
+  header.depth_bits = 16;
+  header.colour_bits = 8;
+  header.roi = {0, 0, 8, 1};
+  header.rows = 1;
+  header.columns = 8;
+  Image<std::uint16_t> depths (8, 1);
+  Image<Rgbx> colours (8, 1);
+  const RangeImage image = {0, header.roi, depths.view (), colours.view (), 0};
+  const MotionScale scale (80, depth.codes () - 1);
+  CompactDecoder decoder;
+  for (const Profile profile : {Profile::kPacked, Profile::kEntropy}) {
+    header.profile = profile;
+    const auto is_good = [&] (const BlockMotion &m) {
+      DecodedPixels decoded;
+      return decoder.decode (
+          body_with (profile, 80, m), header, {depth, colour}, {}, image, decoded);
+    };
+    EXPECT_TRUE (is_good ({}));
+    const BlockMotion good[] = {{127, -127, 6553, 63, -63}, {-127, 127, -6553, -63, 63}};
+    for (const BlockMotion &m : good) {
+      ASSERT_TRUE (is_sound (m, scale));
+      EXPECT_TRUE (is_good (m));
+      for (const auto member : kMotionMembers) {
+        BlockMotion bad = m;
+        bad.*member += bad.*member > 0 ? 1 : -1;
+        EXPECT_FALSE (is_good (bad)) << "profile " << int (profile);
+        bad.*member *= 16;
+        EXPECT_FALSE (is_good (bad)) << "profile " << int (profile);
+      }
+    }
+  }
 }
 
 } // namespace

@@ -384,8 +384,9 @@ TEST_P (Robust, a_unit_of_a_future_version_or_of_absurd_size_loses_what_follows_
     std::uint16_t size;
   };
   constexpr int kNext = kBitstreamVersion + 1;
-  for (const Case &one : {Case{kNext << 4 | 1, 8}, {15 << 4, 8}, {kBitstreamVersion << 4 | 1, 0}, {kBitstreamVersion << 4 | 1, 3},
-           {kBitstreamVersion << 4 | 1, 65535}, {kBitstreamVersion << 4 | 9, 60000}})
+  for (const Case &one : {Case{kNext << 4 | 1, 8}, {15 << 4, 8}, {kBitstreamVersion << 4 | 1, 0},
+           {kBitstreamVersion << 4 | 1, 3}, {kBitstreamVersion << 4 | 1, 65535},
+           {kBitstreamVersion << 4 | 9, 60000}})
     for (std::size_t at = 0; at <= sets[1].units.size (); at++) {
       Units units = sets[1].units;
       units.insert (units.begin () + std::ptrdiff_t (at),
