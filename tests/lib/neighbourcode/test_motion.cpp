@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Pixels of an earlier frame set between its pixels. */
+#include "../test-support.hpp"
+
 #include <algorithm>
 #include <gtest/gtest.h>
 #include <random>
 #include <rangecast/base/cpu.hpp>
-#include <rangecast/geometry/range_image.hpp>
 #include <rangecast/neighbourcode/compact/decoder.hpp>
 #include <rangecast/neighbourcode/compact/packed_code.hpp>
 
 using namespace rangecast;
+using namespace rangecast::testing;
 
 namespace {
 
@@ -16,7 +18,7 @@ constexpr Roi kRoi = {20, 9, 50, 37}; /* does not begin at a block */
 constexpr int kFirstY = 10, kEndY = 44;
 
 /* Two smooth surfaces, one 300 codes nearer, with holes and pixels that were not received. */
-class Motion : public testing::Test {
+class Motion : public ::testing::Test {
 protected:
   void SetUp () override
   {
