@@ -14,15 +14,20 @@ constexpr int kMaxWait = 32;
  * thresholds ask, and would be smaller otherwise. */
 constexpr double kDoubt = 0.85;
 
-/* Slices may cross bands that touch and are coded alike. */
+/* Slices may cross bands that touch and are coded alike, unless the lower one was refreshed after
+ * the upper one: pixels depend on those above, so damage that is older than the lower band would
+ * enter it again. */
 void
 append (const RowBand &band, std::vector<RowBand> &to)
 {
-  if (!to.empty () && to.back ().first_row + to.back ().rows == band.first_row &&
-      to.back ().key == band.key)
-    to.back ().rows += band.rows;
-  else
+  RowBand *const above = to.empty () ? nullptr : &to.back ();
+  if (above && above->first_row + above->rows == band.first_row && above->key == band.key &&
+      above->refreshed >= band.refreshed) {
+    above->rows += band.rows;
+    above->refreshed = band.refreshed;
+  } else {
     to.push_back (band);
+  }
 }
 
 } // namespace
@@ -47,7 +52,7 @@ ReferenceChoice::sort (std::span<const RowBand> bands, std::vector<RowBand> &fin
     } else if (known.state != State::kPaysNot) {
       append (band, fine);
     } else {
-      append ({band.first_row, band.rows, true, band.index}, coarse);
+      append ({band.first_row, band.rows, true, band.index, 0}, coarse);
     }
   }
 }
