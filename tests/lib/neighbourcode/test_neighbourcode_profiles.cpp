@@ -373,7 +373,7 @@ TEST_P (Profiles, slices_with_references_are_the_same_with_code_for_every_cpu)
     }
     std::size_t references = 0;
     for (int frame = 0; frame < 6; frame++) {
-      Picture picture (0, {10 + 3 * frame, 20 + frame, 151, 133}, 1, 20);
+      Picture picture (0, {10 + frame, 20, 151, 133}, 1, 10);
       for (int y = 0; y < 133; y++)
         for (int x = 0; x < 151; x++)
           if (std::uint16_t &depth = picture.depth.view ().at (x, y))
