@@ -36,7 +36,7 @@ packages=(
   # language bindings of libgstrange
   libgirepository1.0-dev python3-gst-1.0 python3-numpy
   # benchmarks
-  libturbojpeg0-dev libzstd-dev libpng-dev libdraco-dev
+  libturbojpeg0-dev libzstd-dev libpng-dev libdraco-dev libavcodec-dev
   # tests
   libgtest-dev iproute2 openssl opencv-doc valgrind xvfb xauth xdotool aravis-tools aravis-tools-cli umockdev libumockdev-dev
 )

@@ -16,11 +16,18 @@ PACKED, ENTROPY = 1, 2
 MAX_OVERRUN = 16
 BLOCK = 16  # rows and columns that share motion
 Numbers = tuple[int, ...]  # Z, Y, Co, Cg
-Motion = tuple[int, ...]  # dx, dy, dz
+Motion = tuple[int, ...]  # dx, dy, dz, sx, sy
 
 
 class Damage(Exception):
     """The slice breaks a rule of the page."""
+
+
+class Unknown:
+    """Stands for the numbers of a valid pixel that depends on one that did not arrive, and for a missing one of an earlier frame set."""
+
+
+UNKNOWN = Unknown()
 
 
 def table(name: str) -> list[str]:
@@ -73,7 +80,7 @@ class Earlier(NamedTuple):
 
     x: int  # place of the slice's first pixel in the view's full image
     y: int
-    pixel: Callable[[int, int], Optional[Numbers]]  # of a place in the full image; None: not known
+    pixel: Callable[[int, int], Union[Numbers, Unknown, None]]  # of a place in the full image; UNKNOWN: missing, None: empty
 
 
 def is_earlier(pixel: Place) -> bool:
@@ -151,7 +158,7 @@ class PackedData:
     def motion(self, expected: Motion) -> Motion:
         if self.take(1):
             return expected
-        return tuple(v + self.signed_golomb(order) for v, order in zip(expected, (0, 0, 3)))
+        return tuple(v + self.signed_golomb(1) for v in expected)
 
     def choice(self, near: Neighbours) -> int:
         return self.symbol(CHOICES[near.kinds()])
@@ -305,6 +312,11 @@ def cut(value: int, least: int, most: int) -> int:
     return min(max(value, least), most)
 
 
+def signed(value: int) -> int:
+    """The number from -32768 to 32767 that equals this one modulo 2^16."""
+    return (value + 32768) % 65536 - 32768
+
+
 def read_runs(begin: int, end: int, above: list[bool], later: Callable[[bool], int]) -> list[bool]:
     """Runs of two kinds by turns, the first one of False, from `begin` to `end`: the kind of each column."""
     kinds: list[bool] = []
@@ -335,6 +347,8 @@ class CompactSlice:
             raise Damage("a step of 0")
         key = earlier is None
         self.data: Data = PackedData(body[4:], self.steps == (1, 1, 1, 1)) if profile == PACKED else EntropyData(body[4:], key)
+        self.unit = max(1, depth // 8)  # of dz, and eight times that of sx and sy
+        self.gap = min(4 * depth, 1023)
         self.columns = columns
         self.limits = ((0, last), (0, maximum), (-maximum, maximum), (-maximum, maximum))
         self.latest = Pixel((last // 2, maximum // 2, 0, 0), 0, True)
@@ -369,23 +383,44 @@ class CompactSlice:
 
     def read_motions(self, first_column: int) -> None:
         """Those of the next row of blocks."""
-        expected: Motion = (0, 0, 0)
+        expected: Motion = (0, 0, 0, 0, 0)
+        limits = (127, 127, 65535 // self.unit, 63, 63)
         self.motions = {}
         for block in range(first_column // BLOCK, (first_column + self.columns - 1) // BLOCK + 1):
             expected = self.data.motion(expected)
-            dx, dy, dz = expected
-            if abs(dx) > 31 or abs(dy) > 31 or abs(dz) > 65535:
+            if any(abs(number) > limit for number, limit in zip(expected, limits)):
                 raise Damage("motion")
             self.motions[block] = expected
 
     def earlier_pixel(self, earlier: Earlier, column: int, row: int) -> Pixel:
-        """One that equals a pixel of the earlier frame set but for its depth."""
+        """One that follows from the earlier frame set and the motion of its block alone."""
         x, y = earlier.x + column, earlier.y + row
-        dx, dy, dz = self.motions[x // BLOCK]
-        numbers = earlier.pixel(x + dx, y + dy)
+        dx, dy, dz, sx, sy = self.motions[x // BLOCK]
+        a, b = dx % 4, dy % 4
+        xs = [x + dx // 4, x + dx // 4 + min(a, 1)]
+        ys = [y + dy // 4, y + dy // 4 + min(b, 1)]
+        numbers = self.interpolated([earlier.pixel(u, v) for v in ys for u in xs], a, b)
         if numbers is None:
             return Pixel((0, 0, 0, 0), 1, False, is_earlier=True)
-        return Pixel((cut(numbers[0] + dz, *self.limits[0]), *numbers[1:]), 1, True, is_earlier=True)
+        plane = (8 * dz + sx * (x % BLOCK - 7) + sy * (y % BLOCK - 7)) * self.unit
+        return Pixel((cut(numbers[0] + (plane + 4) // 8, *self.limits[0]), *numbers[1:]), 1, True, is_earlier=True)
+
+    def interpolated(self, four: list[Union[Numbers, Unknown, None]], a: int, b: int) -> Optional[Numbers]:
+        """Between four pixels, in quarters of their distance; None: not known."""
+        if any(isinstance(pixel, Unknown) for pixel in four):
+            return None
+        known = [pixel for pixel in four if isinstance(pixel, tuple)]
+        if len(known) == 4 and all(abs(signed(pixel[0] - known[0][0])) <= self.gap for pixel in known):
+            weights = ((4 - a) * (4 - b), a * (4 - b), (4 - a) * b, a * b)
+            numbers = []
+            for i, first in enumerate(known[0]):
+                differences = [pixel[i] - first for pixel in known]
+                if i == 0:
+                    differences = [signed(difference) for difference in differences]
+                numbers.append(first + (sum(w * d for w, d in zip(weights, differences)) + 8) // 16)
+            return (numbers[0] % 65536, *numbers[1:])
+        nearest = four[(a >= 2) + 2 * (b >= 2)]
+        return nearest if isinstance(nearest, tuple) else None
 
     def pixel(self, near: Neighbours) -> Pixel:
         choice = self.data.choice(near) if any(near) else 5

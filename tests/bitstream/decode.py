@@ -21,8 +21,9 @@ from math import floor, hypot
 from typing import BinaryIO, Callable, Iterable, Iterator, NamedTuple, Union
 
 import compact
+from compact import UNKNOWN, Unknown
 
-VERSION = 1
+VERSION = 2
 PLAIN, PACKED, ENTROPY = 0, 1, 2
 SLICE, RIG_VIEW, ACCESS_UNIT = 1, 2, 3
 START_CODE = b"\x00RCU"
@@ -46,11 +47,6 @@ class Damaged(Exception):
     """A unit that a reader must not use. Costs that unit and nothing else."""
 
 
-class Unknown:
-    """Stands for the numbers of a valid pixel that depends on one that did not arrive."""
-
-
-UNKNOWN = Unknown()
 Pixel = Union[Numbers, Unknown, None]  # None: invalid
 
 
@@ -130,12 +126,16 @@ class Picture:
             at = (part.y + part.first_row + row) * self.view.width + part.x + part.first_column
             self.pixels[at : at + part.columns] = pixels[row * part.columns : (row + 1) * part.columns]
 
-    def known(self, x: int, y: int) -> Numbers | None:
-        """The numbers of the pixel at a place, if a later frame set can refer to it."""
-        if not (0 <= x < self.view.width and 0 <= y < self.view.height):
-            return None
-        pixel = self.pixels[y * self.view.width + x]
-        return None if isinstance(pixel, Unknown) else pixel
+    def lose_roi(self) -> None:
+        """Nothing of the ROI is there yet."""
+        for y in range(self.like.y, self.like.y + self.like.height):
+            at = y * self.view.width + self.like.x
+            self.pixels[at : at + self.like.width] = [UNKNOWN] * self.like.width
+
+    def at(self, x: int, y: int) -> Pixel:
+        """The pixel at a place for a later frame set; UNKNOWN: missing, None: empty."""
+        inside = 0 <= x < self.view.width and 0 <= y < self.view.height
+        return self.pixels[y * self.view.width + x] if inside else None
 
     def shown(self) -> tuple[array[int], bytearray]:
         """Depths in depth units, and colours."""
@@ -255,16 +255,17 @@ class Reader:
             if pixels_so_far > MOST_REPEATS * frequent.width * frequent.height and not part.too_short():
                 self.counts["damaged slices"] += 1
                 continue
-            pixels: list[Pixel] = [None] * (part.rows * part.columns)
+            lost = part.rows * part.columns
             try:
-                pixels = decode_slice(part, picture.view, self.known(part))
+                pixels = kept_pixels = decode_slice(part, picture.view, self.referred(part))
                 drawn.add(part.place())
             except Damaged:
                 self.counts["damaged slices"] += 1
+                pixels, kept_pixels = [None] * lost, [UNKNOWN] * lost
             if part.place() in drawn or not part.too_short():
                 picture.put(part, pixels)
                 if kept:
-                    kept.put(part, pixels)
+                    kept.put(part, kept_pixels)
         self.counts["unknown pixels"] += picture.pixels.count(UNKNOWN)
         return picture
 
@@ -279,16 +280,17 @@ class Reader:
                 return latest[0]
             latest = latest[1:]
         kept = Picture(picture.view, picture.like)
+        kept.lose_roi()
         self.earlier[picture.view.id] = [kept] + latest[:1]
         return kept
 
-    def known(self, part: Slice) -> Callable[[int, int], Numbers | None]:
-        """What is known, at each place of the view's image, of the frame set that a slice refers to."""
+    def referred(self, part: Slice) -> Callable[[int, int], Pixel]:
+        """The pixel at each place of the view's image in the frame set that a slice refers to; UNKNOWN: missing, None: empty."""
         others = [one for one in self.earlier.get(part.view, []) if one.like.frame != part.frame]
         number = (part.frame - part.distance) % (1 << 32)
         if others and others[0].like.frame == number and others[0].like.format() == part.format():
-            return others[0].known
-        return lambda x, y: None
+            return others[0].at
+        return lambda x, y: UNKNOWN
 
     def take_rig_view(self, flags: int, payload: bytes) -> None:
         """Collects the views of the rig and makes it the present one when all are there."""
@@ -380,13 +382,13 @@ def parse_slice(flags: int, payload: bytes) -> Slice:
     return part
 
 
-def decode_slice(part: Slice, view: View, known: Callable[[int, int], Numbers | None]) -> list[Pixel]:
+def decode_slice(part: Slice, view: View, earlier: Callable[[int, int], Pixel]) -> list[Pixel]:
     """The pixels of a slice, row by row."""
     if part.rows and view.far == view.near:
         raise Damaged("near and far are less than one depth unit apart")
     x, y = part.x + part.first_column, part.y + part.first_row
     if part.profile != PLAIN and part.rows:
-        return decode_compact_slice(part, view, None if not part.distance else compact.Earlier(x, y, known))
+        return decode_compact_slice(part, view, None if not part.distance else compact.Earlier(x, y, earlier))
     count, columns = part.rows * part.columns, part.columns
     symbols_size = (3 * count + 7) // 8
     if part.too_short():
@@ -407,7 +409,7 @@ def decode_slice(part: Slice, view: View, known: Callable[[int, int], Numbers | 
         elif symbol == FULL_PIXEL:
             pixels.append(next(full))
         elif symbol == SAME_AS_EARLIER and part.distance:
-            pixels.append(known(x + column, y + row) or UNKNOWN)
+            pixels.append(earlier(x + column, y + row) or UNKNOWN)
         elif symbol > INVALID:
             raise Damaged("reserved symbol")
         else:
@@ -498,7 +500,7 @@ def main() -> int:
         return 1
     print(", ".join(f"{count} {what}" for what, count in counts.items()))
     if not counts["access units"]:
-        print(f"decode.py: {sys.argv[1]}: no access unit, expected a neighbour code byte stream of version 1", file=sys.stderr)
+        print(f"decode.py: {sys.argv[1]}: no access unit, expected a neighbour code byte stream of version {VERSION}", file=sys.stderr)
         return 1
     return 0
 

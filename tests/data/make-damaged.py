@@ -13,7 +13,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "bitstream"))
 import compact  # its tables of prefix codes
 
 START_CODE = b"\x00RCU"
-SLICE, RIG_VIEW, ACCESS_UNIT = 0x11, 0x12, 0x13
+SLICE, RIG_VIEW, ACCESS_UNIT = 0x21, 0x22, 0x23
 
 
 def units_of(data: bytes) -> list[list[bytes]]:
@@ -193,7 +193,7 @@ def main() -> None:
     head = coarse[1][0]
     one = [unit for unit in coarse[1] if unit[0] == SLICE]
     two = [unit for unit in coarse[2] if unit[0] == SLICE]
-    unknown = bytes((0x19, 0xFF, 8, 0, 1, 2, 3, 4))
+    unknown = bytes((0x29, 0xFF, 8, 0, 1, 2, 3, 4))
     damaged = [
         # Rubbish, a start code that means nothing, and access units before the rig is known.
         b"rubbish" + START_CODE + b"no access unit behind it, but as many bytes",
@@ -219,7 +219,7 @@ def main() -> None:
         access_unit(head, [patched(unit, 1, 0) for unit in one]),
         *(access_unit(patched(head, 1, 0), units) for units in without_key(one)),
         # What follows a unit of another version, or one that is too short, cannot be read.
-        access_unit(head, two[:3] + [patched(unknown, 0, 0x29)] + two[3:]),
+        access_unit(head, two[:3] + [patched(unknown, 0, 0x39)] + two[3:]),
         access_unit(head, two[:5] + [patched(unknown, 2, 3)] + two[5:]),
         # Nothing but rig views is no frame set; a unit of unknown type makes one without views.
         access_unit(head, rig),

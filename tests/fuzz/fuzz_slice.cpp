@@ -152,7 +152,9 @@ fill_earlier (const Ask &ask, SliceHeader header, ReferencePlane &plane)
   for (int y = 0; y < header.roi.height; y++)
     for (int x = 0; x < header.roi.width; x++) {
       random = random * 1664525u + 1013904223u;
-      const std::uint64_t pixel = earlier_pixel (header, random >> 3 ^ random << 13);
+      const bool empty = header.profile != Profile::kPlain && (random >> 8 & 15) == 0;
+      const std::uint64_t pixel =
+          empty ? kEmptyPixel : earlier_pixel (header, random >> 3 ^ random << 13);
       if (random >> 26 >= static_cast<std::uint32_t> (ask.earlier >> 2)) /* else unknown */
         plane.keep (header.roi.x + x, header.roi.y + y, {&pixel, 1});
     }
@@ -204,14 +206,14 @@ check_picture (const SliceHeader &header, Picture &picture, bool with_older)
   for (int y = 0; y < header.roi.height; y++)
     for (int x = 0; x < header.roi.width; x++) {
       const std::size_t i = std::size_t (y) * width + std::size_t (x);
-      const bool known =
-          header.reference && kept_at (header, picture, x, y) != ReferencePlane::kNone;
+      const std::uint64_t at = header.reference ? kept_at (header, picture, x, y) : kNoPixel;
+      const bool is_empty = header.profile != Profile::kPlain && at == kEmptyPixel;
       if (y >= header.first_row && y < header.first_row + header.rows && x >= header.first_column &&
           x < header.first_column + header.columns) {
         valid += picture.depth[i] != kInvalidDepth;
-        kept += known;
+        kept += at != kNoPixel && !is_empty;
       } else {
-        expect (picture.depth[i] == kUntouched && !known &&
+        expect (picture.depth[i] == kUntouched && at == kNoPixel &&
                 same_colour (picture.colour[i], kUntouchedColour));
       }
     }

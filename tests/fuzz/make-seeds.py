@@ -264,7 +264,7 @@ def range_meta_seeds() -> list[bytes]:
 
 def caps_seeds(rigs: list[bytes]) -> list[bytes]:
     fields = "width=(int)80, height=(int)60, views=(int)%d, framerate=(fraction)30/1, rig=(buffer)%s"
-    media = ("video/x-range, format=(string)Z16_RGBx, ", "application/x-neighbour-code, version=(int)1, alignment=(string)slice, ")
+    media = ("video/x-range, format=(string)Z16_RGBx, ", "application/x-neighbour-code, version=(int)2, alignment=(string)slice, ")
     texts = [(media[i % 2] + fields % (1 + i // 2, rig.hex())).encode() for i, rig in enumerate(rigs)]
     texts += [b"ANY", b"video/x-range, width=[ 1, 80 ], alignment={ access-unit, slice }; application/x-neighbour-code(memory:GLMemory)"]
     numbers = struct.pack("<5i", 80, 60, 1, 30, 1)

@@ -163,7 +163,7 @@ ViewEncoder::cut (Band &band, int partitions)
   key.rows.key = true;
   const auto reserved = static_cast<std::size_t> (
       std::max (partitions, band.plan.rows.key ? 0 : partitions_of (key)));
-  const int rows = std::max (band.plan.rows.rows, settings_.temporal ? refresh_.band_rows () : 0);
+  const int rows = settings_.temporal ? header_.roi.height : band.plan.rows.rows; /* bands merge */
   if (band.partitions.size () < reserved)
     band.partitions.resize (reserved);
   for (std::size_t i = 0; i < reserved; i++) {
@@ -270,8 +270,8 @@ ViewEncoder::code (PartitionId id, PartitionEncoder &memory)
   const PlainSettings plain = {
       settings_.depth_threshold, settings_.colour_threshold, settings_.max_slice_size};
   if (settings_.profile != Profile::kPlain) {
-    const CompactPicture picture = {
-        image_, reference_, {depth_, colour_}, compact_settings (band.plan.fine), motions_};
+    const CompactPicture picture = {image_, reference_, {depth_, colour_},
+        compact_settings (band.plan.fine), motions_, refresh_.band_rows ()};
     if (!memory.compact.code_partition (
             picture, band.plan.rows, header, partition.bytes, partition.result))
       misfits.store (true, std::memory_order_relaxed);
@@ -351,8 +351,12 @@ ViewEncoder::record_bytes ()
 {
   std::size_t bytes = 0, pixels = 0;
   for (const Band &band : std::span (bands_).first (band_count_)) {
+    const RowBand &rows = band.plan.rows;
     if (band.plan.fine && band.plan.trial == Trial::kNone)
-      reference_choice_.record_coded (band.plan.rows, {bytes_of (band), pixels_of (band)});
+      for (const RowBand &part : rows_) /* of several bands, as if they were alike */
+        if (part.first_row >= rows.first_row && part.first_row < rows.first_row + rows.rows)
+          reference_choice_.record_coded ({part.first_row, part.rows, rows.key, part.index},
+              {bytes_of (band), pixels_of (band)});
     if (band.plan.rows.key)
       continue;
     bytes += bytes_of (band);

@@ -14,6 +14,22 @@ constexpr int kMaxWait = 32;
  * thresholds ask, and would be smaller otherwise. */
 constexpr double kDoubt = 0.85;
 
+/* Slices may cross bands that touch and are coded alike, unless the lower one was refreshed after
+ * the upper one: pixels depend on those above, so damage that is older than the lower band would
+ * enter it again. */
+void
+append (const RowBand &band, std::vector<RowBand> &to)
+{
+  RowBand *const above = to.empty () ? nullptr : &to.back ();
+  if (above && above->first_row + above->rows == band.first_row && above->key == band.key &&
+      above->refreshed >= band.refreshed) {
+    above->rows += band.rows;
+    above->refreshed = band.refreshed;
+  } else {
+    to.push_back (band);
+  }
+}
+
 } // namespace
 
 void
@@ -34,13 +50,9 @@ ReferenceChoice::sort (std::span<const RowBand> bands, std::vector<RowBand> &fin
       has_tried = has_tried || known.state != State::kUnknown;
       both.push_back (band);
     } else if (known.state != State::kPaysNot) {
-      fine.push_back (band);
-    } else if (!coarse.empty () &&
-               coarse.back ().first_row + coarse.back ().rows == band.first_row) {
-      coarse.back ().rows += band.rows;
+      append (band, fine);
     } else {
-      coarse.push_back (band);
-      coarse.back ().key = true;
+      append ({band.first_row, band.rows, true, band.index, 0}, coarse);
     }
   }
 }

@@ -26,7 +26,8 @@ public:
 
   /** Sorts the bands of a frame set. Clears the lists first.
    *  @param bands  as the refresh schedule wants them
-   *  @param[out] fine  those for which a reference pays: as the schedule wants them
+   *  @param[out] fine  those for which a reference pays: as the schedule wants them; those that
+   *  touch and are coded alike are made one
    *  @param[out] coarse  to be coded without reference, and no finer than need be, as later frame
    *  sets will hardly take their pixels; those that touch are made one
    *  @param[out] both  to be coded both ways, of which the smaller one counts: see record_trial()

@@ -74,6 +74,10 @@ std::unique_ptr<Codec> make_pair (DepthCode depth, ColourCode colour, int qualit
 /** A point cloud: sequential, positions of 11 bits in the box of the view's points, colour exact.
  */
 std::unique_ptr<Codec> make_draco (const rangecast::Rig &rig);
+/** Two video streams of each view: colour in 4:2:0, depth as hues in 4:4:4. x264, preset veryfast,
+ *  tune zerolatency, a key frame every 30.
+ *  @param colour_crf, depth_crf  constant rate factors, 0 (best) to 51 */
+std::unique_ptr<Codec> make_x264 (const rangecast::Rig &rig, int colour_crf, int depth_crf);
 /** @} */
 
 inline constexpr const char *kPeerName = "RVL + JPEG"; ///< what all are compared with

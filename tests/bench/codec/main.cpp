@@ -162,7 +162,7 @@ Status
 make_codecs (const Job &job, const Input &input, Codecs &codecs)
 {
   const Rig &rig = input.rig;
-  for (const std::string &name : add_peers (rig, codecs))
+  for (const std::string &name : add_peers (rig, input.sets.size () > 1, codecs))
     std::printf ("left out, not in this build: %s\n", name.c_str ());
   if (Status s = add_profiles (rig, input.sets.size () > 1, codecs); !s.ok ())
     return s;

@@ -26,6 +26,9 @@ constexpr EncoderSettings kFamilies[] = {
     {.profile = Profile::kEntropy, .choice = NeighbourChoice::kBest, .temporal = true},
 };
 constexpr double kDepthThresholdsMm[] = {0, 0.8, 1.6};
+/* Of x264, for colour and for depth. */
+constexpr std::pair<int, int> kRateFactors[] = {{17, 2}, {20, 2}, {20, 8}, {23, 2}, {23, 8},
+    {23, 14}, {26, 2}, {26, 8}, {26, 14}, {29, 8}, {29, 14}, {29, 20}, {32, 20}};
 constexpr int kColourThresholds[] = {4, 7, 9, 11, 13, 16, 20};
 
 /* Thresholds in codes for 16 bits, each once: where a code is a millimetre, some are the same. */
@@ -64,7 +67,7 @@ settings_of (const EncoderSettings &family, double code_mm)
 } // namespace
 
 std::vector<std::string>
-add_peers (const Rig &rig, Codecs &codecs)
+add_peers (const Rig &rig, bool sequence, Codecs &codecs)
 {
   std::vector<std::string> missing;
   const auto add = [&] (std::unique_ptr<Codec> codec, const char *name) {
@@ -89,6 +92,9 @@ add_peers (const Rig &rig, Codecs &codecs)
   for (const ColourCode colour : {ColourCode::kPngFast, ColourCode::kPng})
     add (make_pair (DepthCode::kRvl, colour, 0, true), png);
   add (make_draco (rig), "Draco (libdraco)");
+  if (sequence)
+    for (const auto &[colour, depth] : kRateFactors)
+      add (make_x264 (rig, colour, depth), "x264 (libavcodec)");
   return missing;
 }
 

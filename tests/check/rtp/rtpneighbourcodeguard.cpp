@@ -259,13 +259,13 @@ GST_START_TEST (test_another_version_is_told_once_and_does_not_pass)
   Guard guard;
   Sender newer = {.ssrc = 9, .address = "10.0.0.3"}, good;
   std::vector<guint8> unit = slice_unit ();
-  unit[0] = guint8 (2 << 4 | (unit[0] & 15));
+  unit[0] = guint8 (3 << 4 | (unit[0] & 15));
   for (int i = 0; i < 100; i++)
     fail_unless_equals_int (guard.send (newer, unit), 0);
   fail_unless_equals_int (guard.send_many (good, 10), 10);
   for (int i = 0; i < 100; i++)
     fail_unless_equals_int (guard.send (newer, unit), 0);
-  fail_unless_equals_int (guard.warnings ("version 2"), 1);
+  fail_unless_equals_int (guard.warnings ("version 3"), 1);
 }
 GST_END_TEST;
 
@@ -323,7 +323,7 @@ GST_START_TEST (test_another_version_beside_a_sender_is_told_though_most_of_it_i
   Guard guard;
   Sender good, newer = {.ssrc = 9, .address = "10.0.0.3"}, copy = {.address = "10.0.0.4"};
   std::vector<guint8> unit = slice_unit ();
-  unit[0] = guint8 (2 << 4 | (unit[0] & 15));
+  unit[0] = guint8 (3 << 4 | (unit[0] & 15));
   guard.send_many (good, 10);
   const auto play = [&] (Sender &sender) {
     for (int i = 0; i < 60; i++, guard.time += 50 * GST_MSECOND) {
@@ -338,10 +338,10 @@ GST_START_TEST (test_another_version_beside_a_sender_is_told_though_most_of_it_i
     fail_unless_equals_int (guard.send (good), 1);
     fail_unless_equals_int (guard.send (other, i % 2 ? unit : slice_unit ()), 0);
   }
-  fail_unless_equals_int (guard.warnings ("version 2"), 0);
+  fail_unless_equals_int (guard.warnings ("version 3"), 0);
   guard.time += 10 * GST_SECOND;
   play (newer);
-  fail_unless_equals_int (guard.warnings ("version 2"), 1);
+  fail_unless_equals_int (guard.warnings ("version 3"), 1);
 }
 GST_END_TEST;
 
@@ -426,7 +426,7 @@ GST_START_TEST (test_without_memory_the_sender_passes_and_strangers_do_not)
   const std::vector<guint8> sound = slice_unit (), unsound (20, 0x80);
   std::vector<guint8> damaged = slice_unit (), newer = slice_unit ();
   damaged[6] = 255; /* depth bits */
-  newer[0] = 0x20 | (newer[0] & 15);
+  newer[0] = 0x30 | (newer[0] & 15);
   const std::vector<guint8> *payloads[] = {&sound, &unsound, &damaged, &newer};
   int passed = 0;
   allocations_left = 0;

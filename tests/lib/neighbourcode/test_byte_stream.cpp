@@ -18,7 +18,7 @@ append_unit (std::vector<std::uint8_t> &to, std::uint8_t type, std::size_t size)
 {
   const std::size_t begin = to.size ();
   to.resize (begin + size, 0xab);
-  to[begin] = std::uint8_t (0x10 | type);
+  to[begin] = std::uint8_t (0x20 | type);
   to[begin + 1] = 0;
   to[begin + 2] = std::uint8_t (size & 255);
   to[begin + 3] = std::uint8_t (size >> 8);

@@ -222,7 +222,7 @@ TEST_F (Hostile, future_version_reserved_flag_and_unknown_profile_are_refused)
   auto unit = units_of (small_stream ())[0];
   SliceHeader header;
   auto bad = unit;
-  bad[0] = static_cast<std::uint8_t> (2 << 4 | 1);
+  bad[0] = static_cast<std::uint8_t> ((kBitstreamVersion + 1) << 4 | 1);
   EXPECT_EQ (read_slice_header (bad, header).code (), StatusCode::kUnsupported);
   for (int flag = 8; flag < 256; flag *= 2) {
     bad = unit;
@@ -246,7 +246,7 @@ TEST_F (Hostile, trailing_bytes_in_a_slice_are_damage)
 
 TEST_F (Hostile, unknown_unit_types_are_skipped)
 {
-  auto bytes = std::vector<std::uint8_t>{1 << 4 | 9, 0, 6, 0, 1, 2};
+  auto bytes = std::vector<std::uint8_t>{kBitstreamVersion << 4 | 9, 0, 6, 0, 1, 2};
   const auto stream = small_stream ();
   bytes.insert (bytes.end (), stream.begin (), stream.end ());
   const Decoded decoded = decode_exact (decoder, bytes);

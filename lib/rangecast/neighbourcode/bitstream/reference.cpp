@@ -59,20 +59,24 @@ ReferencePlane::keep (int x, int y, std::span<const std::uint64_t> pixels)
 }
 
 void
-ReferencePlane::fetch (int x, int y, std::span<std::uint64_t> to) const
+ReferencePlane::fetch (int x, int y, std::span<std::uint64_t> to, std::uint64_t outside) const
 {
   const Roi &roi = header_.roi;
   const int end = x + static_cast<int> (to.size ());
   const int left = std::clamp (roi.x, x, end), right = std::clamp (roi.x + roi.width, left, end);
-  if (!held_ || y < roi.y || y >= roi.y + roi.height || left == right) {
+  if (!held_) {
     std::ranges::fill (to, kNone);
     return;
   }
+  if (y < roi.y || y >= roi.y + roi.height || left == right) {
+    std::ranges::fill (to, outside);
+    return;
+  }
   const std::uint64_t *from = row (y - roi.y) + (left - roi.x);
-  std::fill_n (to.begin (), left - x, kNone);
+  std::fill_n (to.begin (), left - x, outside);
   std::transform (
       from, from + (right - left), to.begin () + (left - x), [] (std::uint64_t p) { return ~p; });
-  std::fill (to.begin () + (right - x), to.end (), kNone);
+  std::fill (to.begin () + (right - x), to.end (), outside);
 }
 
 void

@@ -9,10 +9,12 @@ namespace rangecast {
 void
 RefreshSchedule::reset (int view_height, int view_id)
 {
-  constexpr int kMin = 64, kBands = 4;
-  band_rows_ = std::max (kMin, (view_height + kBands - 1) / kBands);
+  constexpr int kMin = 64, kBands = 4, kMultiple = 16;
+  const int quarter = (view_height + kBands - 1) / kBands;
+  band_rows_ = std::max (kMin, (quarter + kMultiple - 1) / kMultiple * kMultiple);
   age_ns_.assign (static_cast<std::size_t> ((view_height + band_rows_ - 1) / band_rows_), 0);
-  last_time_ns_ = 0;
+  refreshed_.assign (age_ns_.size (), 0);
+  last_time_ns_ = count_ = 0;
   view_id_ = view_id;
 }
 
@@ -25,6 +27,7 @@ RefreshSchedule::plan (const Roi &roi, const Time &time, bool key, std::vector<R
       time.now_ns > last_time_ns_ ? time.now_ns - last_time_ns_ : time.interval_ns;
   last_time_ns_ = time.now_ns;
   const std::size_t count = age_ns_.size ();
+  count_++;
   for (std::size_t i = 0; i < count; i++) {
     std::uint64_t &age = age_ns_[i];
     age += elapsed;
@@ -40,8 +43,10 @@ RefreshSchedule::plan (const Roi &roi, const Time &time, bool key, std::vector<R
     }
     const int top = std::max (int (i) * band_rows_, roi.y) - roi.y;
     const int bottom = std::min ((int (i) + 1) * band_rows_, roi.y + roi.height) - roi.y;
+    if (refresh)
+      refreshed_[i] = count_;
     if (top < bottom)
-      bands.push_back ({top, bottom - top, refresh, i});
+      bands.push_back ({top, bottom - top, refresh, i, refreshed_[i]});
   }
 }
 

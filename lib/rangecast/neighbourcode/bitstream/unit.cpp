@@ -74,8 +74,8 @@ read_unit_header (std::span<const std::uint8_t> bytes, UnitHeader &header)
   header.flags = bytes[1];
   header.size = get<std::uint16_t> (&bytes[2]);
   if (header.version != kBitstreamVersion)
-    return {StatusCode::kUnsupported,
-        "unit: version " + std::to_string (header.version) + ", expected 1"};
+    return {StatusCode::kUnsupported, "unit: version " + std::to_string (header.version) +
+                                          ", expected " + std::to_string (kBitstreamVersion)};
   if (header.size < kUnitHeaderSize)
     return {StatusCode::kBadData, "unit: its size is less than its header"};
   if (header.size > bytes.size ())

@@ -14,7 +14,7 @@
 
 namespace rangecast {
 
-inline constexpr int kBitstreamVersion = 1;
+inline constexpr int kBitstreamVersion = 2;
 inline constexpr std::size_t kUnitHeaderSize = 4;
 inline constexpr std::size_t kSliceHeaderSize = 36; ///< of key slices, with the unit header
 inline constexpr std::size_t kMaxUnitSize = 65535;

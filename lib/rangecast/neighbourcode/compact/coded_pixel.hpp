@@ -38,6 +38,11 @@ enum PixelChoice : int {
 };
 inline constexpr int kChoices = 6;
 
+/** What each choice of a pixel would cost, bits: up to kTakeUpperRight alone, of kCorrect without
+ * the residual. Greater than any sum where a choice cannot be written. */
+using ChoiceBits = std::array<float, kChoices>;
+inline constexpr float kImpossible = 1e9f;
+
 /** Depth code and colour of a pixel as one number that can be compared: from bit 0 upwards, 16 bits
  *  each, depth, Y, Co, Cg. */
 using PixelCode = std::uint64_t;
@@ -80,6 +85,10 @@ clamped (Components c, Components min, Components max)
 /** The code of an invalid pixel, and of a valid one that refers to data that was not received. No
  *  other pixel has it, because Y is not negative. */
 inline constexpr PixelCode kNoPixel = ReferencePlane::kNone;
+
+/** An invalid pixel of an earlier frame set, as a ReferencePlane holds it. Unlike kNoPixel, a
+ * reader knows that there is none. */
+inline constexpr PixelCode kEmptyPixel = kNoPixel ^ 1 << 16;
 
 /** Magnitudes of a residual's components, at most 9 each, one a byte from the least significant; 0
  *  for copies. */

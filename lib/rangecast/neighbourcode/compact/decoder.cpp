@@ -218,18 +218,18 @@ CompactDecoder::load_earlier (
 {
   const int full_x = header.roi.x + header.first_column;
   const int full_y = header.roi.y + header.first_row + y;
+  const MotionScale scale (steps_[0], limits_.max[0]);
   if (y == 0 || full_y % kMotionBlock == 0) {
     BlockMotion expected;
     for (BlockMotion &m : motions_) {
-      if (!code.motion (expected, m) || std::abs (m.dx) > kMaxMotion ||
-          std::abs (m.dy) > kMaxMotion || std::abs (m.dz) > kMaxMotionDepth)
+      if (!code.motion (expected, m) || !is_sound (m, scale))
         return false;
       expected = m;
     }
   }
   if (reference.before)
-    fetch_displaced (*reference.before, full_x, full_y, motions_, limits_.max[0], 0, kMaxImageSide,
-        earlier_codes_);
+    fetch_displaced (*reference.before, full_x, full_y, motions_, scale, -kMaxImageSide,
+        2 * kMaxImageSide, earlier_codes_);
   std::ranges::fill (row_.earlier (), std::uint8_t{0});
   return true;
 }
@@ -241,10 +241,15 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
     DecodedPixels &decoded)
 {
   const auto columns = static_cast<std::size_t> (header.columns);
+  const auto most = static_cast<std::size_t> (header.roi.width); /* columns of other slices */
+  row_.reserve (most);
+  upper_.reserve (most);
   row_.reset (columns, 0);
   upper_.reset (columns, 0);
-  runs_.reserve (columns + 1);
+  runs_.reserve (most + 1);
   if constexpr (Delta) {
+    earlier_codes_.reserve (most);
+    motions_.reserve (most / kMotionBlock + 2);
     earlier_codes_.assign (columns, kNoPixel);
     motions_.assign (
         motion_blocks (header.roi.x + header.first_column, header.columns), BlockMotion{});
@@ -271,8 +276,8 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
     decoded.points += points - unknown;
     decoded.unknown += unknown;
     if (reference.now)
-      reference.now->keep (
-          header.roi.x + header.first_column, header.roi.y + image_row, {row_.codes (), columns});
+      reference.now->keep (header.roi.x + header.first_column, header.roi.y + image_row,
+          row_.as_reference (columns));
     std::swap (row_, upper_);
   }
   return code.at_clean_end ();

@@ -11,25 +11,10 @@ namespace {
 /* Upper bounds of what a pixel and a run add to a slice, in either code. */
 constexpr std::size_t kMaxBytesOfPixel = 512, kMaxBytesOfRun = 64;
 
-/* Costs for choice=best. Errors are squared, in units of the threshold. Bits are the averages of
- * choices and residuals in recordings; their price was found by experiment. */
+/* Price of a bit for choice=best; errors are squared, in units of the threshold. Found by
+ * experiment.
+ */
 constexpr float kPriceOfBit = 0.2f;
-constexpr float kBitsOfChoice[] = {0.7f, 3.5f, 2.5f, 3.5f};
-
-float
-bits_of (const Components &residual)
-{
-  constexpr float kBitsOfZero[] = {0.4f, 0.4f, 0.25f, 0.25f};
-  constexpr float kBitsOfSign[] = {2.5f, 2.5f, 3, 3};
-  float bits = 2.5f;
-  if (is_zero (residual))
-    return bits;
-  for (int i = 0; i < kComponents; i++) {
-    const auto size = static_cast<std::uint32_t> (std::abs (residual[i]));
-    bits += size == 0 ? kBitsOfZero[i] : kBitsOfSign[i] + 2 * float (std::bit_width (size) - 1);
-  }
-  return bits;
-}
 
 /* An EntropyCode with the interface of PackedWriter. */
 class EntropyWriter : public EntropyCode<RangeEncoder> {
@@ -134,10 +119,11 @@ CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand
 {
   const Roi &roi = header_.roi;
   const int first_x = roi.x + header_.first_column, end_x = first_x + columns_;
-  const int first_y = roi.y + y, band_y = roi.y + band.first_row, end_y = band_y + band.rows;
-  const int height = std::min ((first_y / kMotionBlock + 1) * kMotionBlock, end_y) - first_y;
+  const int first_y = roi.y + y, band_y = first_y / refresh_rows_ * refresh_rows_;
+  const int block_end = (first_y / kMotionBlock + 1) * kMotionBlock;
+  const int height = std::min (block_end, roi.y + band.first_row + band.rows) - first_y;
   const MotionSearch::Pictures pictures = {
-      image, quantisers_->depth, quantisers_->colour, *reference_.before, limits_};
+      image, quantisers_->depth, quantisers_->colour, *reference_.before, scale_};
   BlockMotion near_by[2];                   /* to the left, above */
   if (header_.first_column >= kMotionBlock) /* another partition's, of the last frame set */
     near_by[0] = motion_memory_->before (first_x - kMotionBlock, first_y);
@@ -146,20 +132,20 @@ CompactEncoder::find_motions (const ConstRangeImage &image, int y, const RowBand
     const int next = std::min ((x / kMotionBlock + 1) * kMotionBlock, end_x);
     near_by[1] = motions_[i];
     motions_[i] = search_.find (pictures, earlier_threshold_,
-        {x, first_y, next - x, height, band_y, end_y}, near_by, *motion_memory_);
+        {x, first_y, next - x, height, band_y, band_y + refresh_rows_}, near_by, *motion_memory_);
     near_by[0] = motions_[i];
   }
 }
 
 /* Finds the pixels that are within the thresholds of those of the earlier frame set. */
 void
-CompactEncoder::load_earlier (int y, const RowBand &band)
+CompactEncoder::load_earlier (int y)
 {
   const auto columns = static_cast<std::size_t> (columns_);
   const Roi &roi = header_.roi;
-  const int band_y = roi.y + band.first_row;
-  fetch_displaced (*reference_.before, roi.x + header_.first_column, roi.y + y, motions_,
-      limits_.max[0], band_y, band_y + band.rows, std::span (earlier_codes_).first (columns));
+  const int full_y = roi.y + y, band_y = full_y / refresh_rows_ * refresh_rows_;
+  fetch_displaced (*reference_.before, roi.x + header_.first_column, full_y, motions_, scale_,
+      band_y, band_y + refresh_rows_, std::span (earlier_codes_).first (columns));
   std::uint8_t *const earlier = row_.earlier ().data ();
   const std::uint8_t *const valid = row_.valid ().data ();
   for (std::size_t x = 0; x < columns; x++) {
@@ -213,10 +199,13 @@ CompactEncoder::make_full (PixelKey own, const Neighbours &n) const
   return {residual, pack_components (made), key_of (to_rgb (made, limits_))};
 }
 
-/* The neighbour of least cost (error and bits), or kPredict if the pixel in full costs less.
- * @param[out] full  the pixel in full */
-int
-CompactEncoder::best_choice (std::size_t x, const Neighbours &n, FullPixel &full)
+/* The choice of least cost (error and bits) among the pixels that are near enough: a neighbour, the
+ * earlier frame set's if `earlier`, or kPredict for the pixel in full.
+ * @param[out] full  the pixel in full, if that is the choice */
+template <class Code, bool Delta>
+inline int
+CompactEncoder::best_choice (
+    const Code &code, std::size_t x, const Neighbours &n, bool earlier, FullPixel &full)
 {
   const PixelKey own = own_[x];
   const auto error = [&] (PixelKey other) {
@@ -227,22 +216,70 @@ CompactEncoder::best_choice (std::size_t x, const Neighbours &n, FullPixel &full
     const std::int32_t z = d (0, 0xffff), r = d (32, 0xff), g = d (18, 0xff), b = d (50, 0xff);
     return depth_weight_ * float (z) * float (z) + colour_weight_ * float (r * r + g * g + b * b);
   };
-  full = make_full (own, n);
   int best = kPredict;
-  float min = error (full.key) + kPriceOfBit * bits_of (full.residual);
-  const PixelCode codes[] = {n.left.code, n.codes[-1], n.codes[0], n.codes[1]};
-  for (std::size_t i = 0; i < 4; i++) {
-    const PixelKey other = i == 0 ? row_.shown ()[x - 1] : upper_.shown ()[x + i - 2];
-    /* Profile entropy cannot name one that equals an earlier one. */
-    if (near_bits (own, other, bias_) != kNearMask ||
-        std::find (codes, codes + i, codes[i]) != codes + i)
+  float min = kImpossible, before = 0; /* costs: the least, and of what comes before each choice */
+  if constexpr (Delta && !Code::kEarlierInRuns) {
+    before = kPriceOfBit * code.earlier_bits (n, false);
+    if (earlier) {
+      min = error (earlier_keys_[x]) + kPriceOfBit * code.earlier_bits (n, true);
+      best = kTakeEarlier;
+      if (min <= before)
+        return best;
+    }
+  }
+  if (n.left.valid () && near_bits (own, row_.shown ()[x - 1], bias_) == kNearMask) {
+    const auto [yes, no] = code.left_bits (n);
+    if (const float sum = before + kPriceOfBit * yes + error (row_.shown ()[x - 1]); sum < min) {
+      best = kTakeLeft;
+      min = sum;
+    }
+    if (min <= before + kPriceOfBit * no) /* the least that any other can cost */
+      return best;
+  }
+  const ChoiceBits bits = code.template choice_bits<Delta> (n);
+  for (std::size_t i = kTakeUpperLeft; i <= kTakeUpperRight; i++) {
+    const float cost = before + kPriceOfBit * bits[i];
+    if (bits[i] >= kImpossible || cost >= min)
       continue;
-    const float sum = error (other) + kPriceOfBit * kBitsOfChoice[i];
-    if (sum < min) {
+    const PixelKey other = upper_.shown ()[x + i - kTakeUpper];
+    if (near_bits (own, other, bias_) != kNearMask)
+      continue;
+    if (const float sum = cost + error (other); sum < min) {
       best = static_cast<int> (i);
       min = sum;
     }
   }
+  if (before + kPriceOfBit * std::min (bits[kPredict], bits[kCorrect]) >= min)
+    return best;
+  /* The residual, and those that have one component nearer to 0. */
+  const bool has_neighbour = n.any ();
+  const Components expected = predict (n, last_, limits_.max);
+  const auto attempt = [&] (Components residual, bool is_first) {
+    const Components made = clamped (expected + residual * steps_, limits_.min, limits_.max);
+    const PixelKey key = key_of (to_rgb (made, limits_));
+    if (!is_first && near_bits (own, key, bias_) != kNearMask)
+      return false;
+    const bool predicted = has_neighbour && is_zero (residual);
+    const float sum = before + error (key) +
+                      kPriceOfBit * (predicted ? bits[kPredict]
+                                               : bits[kCorrect] + code.residual_bits (
+                                                                      n, has_neighbour, residual));
+    if (sum >= min)
+      return false;
+    best = kPredict;
+    min = sum;
+    full = {residual, pack_components (made), key};
+    return true;
+  };
+  Components residual = rounded (components_of_key (own) - expected, half_steps_, reciprocals_);
+  attempt (residual, true);
+  for (int i = 0; i < kComponents; i++)
+    if (residual[i] != 0) {
+      Components smaller = residual;
+      smaller[i] -= residual[i] > 0 ? 1 : -1;
+      if (attempt (smaller, false))
+        residual = smaller;
+    }
   return best;
 }
 
@@ -287,10 +324,16 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
     find_upper (begin, end);
   for (std::size_t x = begin; x < end; x++) {
     const Neighbours n = {left, upper_codes + x, upper_states + x};
+    FullPixel full{};
+    [[maybe_unused]] int best = kPredict;
+    if constexpr (Best)
+      if (!Delta || !Code::kEarlierInRuns || !earlier[x])
+        best = best_choice<Code, Delta> (code, x, n, Delta && earlier[x], full);
     if constexpr (Delta) {
+      const bool is_earlier = Best && !Code::kEarlierInRuns ? best == kTakeEarlier : earlier[x];
       if constexpr (!Code::kEarlierInRuns)
-        (void)code.earlier (n, earlier[x]);
-      if (earlier[x]) {
+        (void)code.earlier (n, is_earlier);
+      if (is_earlier) {
         codes[x] = left.code = earlier_codes_[x];
         states[x] = left.state = copy_state (kTakeEarlier);
         keys[x] = left_key = earlier_keys_[x];
@@ -298,10 +341,9 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
       }
     }
     /* Choose the neighbour that replaces the pixel, if any. */
-    FullPixel full;
     std::uint64_t other = 0, take_left = 0; /* the latter is a mask */
     if constexpr (Best) {
-      other = static_cast<std::uint64_t> (best_choice (x, n, full));
+      other = static_cast<std::uint64_t> (best);
       take_left = zero_mask (other);
     } else {
       take_left = zero_mask (near_bits (own[x], left_key, bias) ^ kNearMask);
@@ -452,16 +494,20 @@ CompactEncoder::resize (int columns)
 {
   columns_ = columns;
   const auto n = static_cast<std::size_t> (columns);
+  const auto most = static_cast<std::size_t> (header_.roi.width); /* of later partitions */
+  row_.reserve (most);
+  upper_.reserve (most);
   row_.reset (n, kInvalidKey);
   upper_.reset (n, kInvalidKey);
-  own_.resize (std::max (own_.size (), n + CompactRow::kMargin));
+  own_.resize (std::max (own_.size (), most + CompactRow::kMargin));
   others_.resize (own_.size ());
   earlier_codes_.resize (own_.size ());
   earlier_keys_.resize (own_.size ());
-  runs_.reserve (n + 1);
+  runs_.reserve (most + 1);
+  motions_.reserve (most / kMotionBlock + 2);
   /* A row is coded completely before its size is checked. */
   const std::size_t size = static_cast<std::size_t> (settings_.max_slice_size) +
-                           (kMaxBytesOfPixel + kMaxBytesOfRun) * (n + 1);
+                           (kMaxBytesOfPixel + kMaxBytesOfRun) * (most + 1);
   bytes_.resize (std::max (bytes_.size (), size));
 }
 
@@ -481,7 +527,7 @@ CompactEncoder::code_rows (
     if constexpr (Delta) {
       if (y == band.first_row || (header_.roi.y + y) % kMotionBlock == 0)
         find_motions (image, y, band);
-      load_earlier (y, band);
+      load_earlier (y);
     }
     const EncoderResult result = result_;
     const Components sums = size_sums_, counts = size_counts_;
@@ -500,7 +546,7 @@ CompactEncoder::code_rows (
     }
     if (reference_.now)
       reference_.now->keep (header_.roi.x + header_.first_column, header_.roi.y + y,
-          {row_.codes (), static_cast<std::size_t> (columns_)});
+          row_.as_reference (static_cast<std::size_t> (columns_)));
     header_.rows++;
     std::swap (row_, upper_);
   }
@@ -515,6 +561,7 @@ CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &ba
   reference_ = picture.reference;
   quantisers_ = &picture.quantisers;
   motion_memory_ = &picture.motions;
+  refresh_rows_ = picture.refresh_rows;
   header_ = header;
   result_ = {};
   const auto bias = [] (int depth, int colour) {
@@ -537,6 +584,7 @@ CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &ba
   reciprocals_ = 1.0f / __builtin_convertvector(steps_, FloatComponents);
   limits_ =
       PixelLimits (quantisers_->depth.codes () - 1, (1 << quantisers_->colour.bits ()) - 1, steps_);
+  scale_ = MotionScale (steps_[0], limits_.max[0]);
   orders_ = {};
   size_sums_ = size_counts_ = Components{};
   const ConstRangeImage &image = picture.image;

@@ -40,6 +40,7 @@ struct CompactPicture {
   CompactQuantisers quantisers;
   CompactSettings settings;
   MotionMemory &motions; ///< of the view
+  int refresh_rows;      ///< of the bands of its full image that refer to their own pixels only
 };
 
 /** Codes partitions of range images in the profiles packed and entropy, each independently of those
@@ -74,11 +75,13 @@ private:
       Code &code, const Neighbours &n, Components residual);
   template <class Code, bool Delta> Code begin_slice (int first_row);
   template <class Code> void close_slice (Code &code, std::vector<std::uint8_t> &to);
-  int best_choice (std::size_t x, const Neighbours &n, FullPixel &full);
+  template <class Code, bool Delta>
+  [[gnu::always_inline]] int best_choice (
+      const Code &code, std::size_t x, const Neighbours &n, bool earlier, FullPixel &full);
   [[nodiscard, gnu::always_inline]] FullPixel make_full (PixelKey own, const Neighbours &n) const;
   [[gnu::always_inline]] void load_row (const ConstRangeImage &image, int y);
   [[gnu::always_inline]] void find_upper (std::size_t begin, std::size_t end);
-  void load_earlier (int y, const RowBand &band);
+  void load_earlier (int y);
   void find_motions (const ConstRangeImage &image, int y, const RowBand &band);
   void resize (int columns);
   [[nodiscard]] std::size_t header_size () const;
@@ -92,6 +95,7 @@ private:
   Components steps_{}, half_steps_{};
   FloatComponents reciprocals_{};
   PixelLimits limits_;
+  MotionScale scale_;
   PixelKey bias_ = 0, earlier_bias_ = 0; /* of the thresholds */
   Components earlier_threshold_{};
   CodingReference reference_;
@@ -105,6 +109,7 @@ private:
   std::vector<BlockMotion> motions_; /* of the blocks that the row touches */
   MotionSearch search_;
   PixelCode last_ = kNoPixel;
+  int refresh_rows_ = 1;
   int columns_ = 0;
   std::vector<int> runs_; /* ends of the row's runs */
   EntropyModel model_{};

@@ -18,8 +18,8 @@ inline constexpr int kNonZero = kPredicted + 25;          /* 12 for each compone
 inline constexpr int kSize = kNonZero + kComponents * 12; /* 2 x 16 for each component */
 inline constexpr int kEarlier = kSize + kComponents * 2 * 16;
 inline constexpr int kMotion = kEarlier + 36;     /* whether it equals the expected motion */
-inline constexpr int kMotionNumber = kMotion + 1; /* 1 + 16 for each of dx, dy, dz */
-inline constexpr int kCount = kMotionNumber + 3 * 17;
+inline constexpr int kMotionNumber = kMotion + 1; /* 1 + 16 for each of dx, dy, dz and slopes */
+inline constexpr int kCount = kMotionNumber + 5 * 17;
 } // namespace context
 
 using EntropyModel = std::array<Probability, context::kCount>;
@@ -29,6 +29,9 @@ using EntropyModel = std::array<Probability, context::kCount>;
 extern const EntropyModel kInitialModel;
 /** The same for slices that refer to an earlier frame set. */
 extern const EntropyModel kInitialDeltaModel;
+
+/** What a yes costs, bits, by the upper 8 bits of its probability. */
+extern const std::array<float, 256> kBitsOfProbability;
 
 /** Magnitudes with decisions of their own; greater ones are an exponential Golomb code. */
 inline constexpr int kUnarySizes = 4;
@@ -60,22 +63,21 @@ public:
       m = expected;
       return true;
     }
-    std::int32_t rest[] = {m.dx - expected.dx, m.dy - expected.dy, m.dz - expected.dz};
-    for (int i = 0; i < 3; i++)
-      if (const int at = context::kMotionNumber + 17 * i; !number (at, at + 1, rest[i]))
+    int at = context::kMotionNumber;
+    for (const auto member : kMotionMembers) {
+      std::int32_t rest = m.*member - expected.*member;
+      if (!number (at, at + 1, rest))
         return false;
-    m = {expected.dx + rest[0], expected.dy + rest[1], expected.dz + rest[2]};
+      m.*member = expected.*member + rest;
+      at += 17;
+    }
     return true;
   }
 
   /** Whether a valid pixel equals one of the earlier frame set. */
   bool earlier (const Neighbours &n, bool yes)
   {
-    const auto of = [] (PixelState s) { return (s != 0) + is_copy (s, kTakeEarlier); };
-    const int at = of (n.left.state) + 3 * of (n.states[0]) +
-                   9 * is_copy (n.states[1], kTakeEarlier) +
-                   18 * is_copy (n.states[-1], kTakeEarlier);
-    return code (context::kEarlier + at, yes);
+    return code (context::kEarlier + earlier_context (n), yes);
   }
 
   /** The PixelChoice of a valid pixel that has a neighbour.
@@ -90,8 +92,7 @@ public:
     const int other = other_choice (n, chosen, Delta ? known_candidates (n) : candidates (n));
     if (other != kPredict)
       return other;
-    const int at = context::kPredicted + n.left.origin () + 5 * n.upper ().origin ();
-    return code (at, chosen == kPredict) ? kPredict : kCorrect;
+    return code (predicted_context (n), chosen == kPredict) ? kPredict : kCorrect;
   }
 
   /** The residual of a pixel coded in full. @return false if it is too large */
@@ -101,19 +102,61 @@ public:
     const bool alone = !n.left.valid () || !n.upper ().valid ();
     bool previous = false;
     for (int i = 0; i < kComponents; i++) {
-      const int surroundings = !has_neighbour ? 5
-                               : alone        ? 4
-                                              : kActivityClass[sums >> 8 * i & 0xff];
-      const int zero = context::kNonZero + 12 * i + 6 * previous + surroundings;
-      const int size = context::kSize + 32 * i + 16 * (surroundings >= 3);
+      const int where = surroundings (has_neighbour, alone, sums >> 8 * i & 0xff);
       std::int32_t value = r[i];
-      if (!number (zero, size, value))
+      if (!number (zero_context (i, previous, where), size_context (i, where), value))
         return false;
       r[i] = value;
       previous = value != 0;
     }
     return true;
   }
+
+  /** @name What decisions would cost, bits @{ */
+  [[nodiscard]] float earlier_bits (const Neighbours &n, bool yes) const
+  {
+    return bits_of (context::kEarlier + earlier_context (n), yes);
+  }
+  /** Of the left neighbour, which is valid: to take it, and at least to take another. */
+  [[nodiscard]] std::pair<float, float> left_bits (const Neighbours &n) const
+  {
+    const int at = context::kLeft + static_cast<int> (n.kinds ());
+    return {bits_of (at, true), bits_of (at, false)};
+  }
+  template <bool Delta> [[nodiscard]] ChoiceBits choice_bits (const Neighbours &n) const
+  {
+    ChoiceBits bits;
+    bits.fill (kImpossible);
+    float before = 0; /* of the decisions against the choices before */
+    const auto decide = [&] (int at, int choice) {
+      bits[static_cast<std::size_t> (choice)] = before + bits_of (at, true);
+      before += bits_of (at, false);
+    };
+    if (n.left.valid ())
+      decide (context::kLeft + static_cast<int> (n.kinds ()), kTakeLeft);
+    const Candidates c = Delta ? known_candidates (n) : candidates (n);
+    for (int i = 0; i < 3; i++)
+      if (c.is[i])
+        decide (other_context (n, i, c), kTakeUpperLeft + i);
+    if (n.any ())
+      decide (predicted_context (n), kPredict);
+    bits[kCorrect] = before;
+    return bits;
+  }
+  [[nodiscard]] float residual_bits (const Neighbours &n, bool has_neighbour, Components r) const
+  {
+    const Activity sums = n.activities ();
+    const bool alone = !n.left.valid () || !n.upper ().valid ();
+    bool previous = false;
+    float bits = 0;
+    for (int i = 0; i < kComponents; i++) {
+      const int where = surroundings (has_neighbour, alone, sums >> 8 * i & 0xff);
+      bits += number_bits (zero_context (i, previous, where), size_context (i, where), r[i]);
+      previous = r[i] != 0;
+    }
+    return bits;
+  }
+  /** @} */
 
 private:
   bool code (int at, bool yes) { return coder_.code (model_[at], yes); }
@@ -143,15 +186,67 @@ private:
   int other_choice (const Neighbours &n, int chosen, const Candidates &candidates)
   {
     const bool *const candidate = candidates.is;
-    const int full = 2 * (n.left.kind () == 3) + (n.upper ().kind () == 3);
-    for (int i = 0; i < 3; i++) {
-      if (!candidate[i])
-        continue;
-      const int later = i == 0 ? candidate[1] + 2 * candidate[2] : i == 1 ? candidate[2] : 0;
-      if (code (context::kOther + 16 * i + 4 * full + later, chosen == kTakeUpperLeft + i))
+    for (int i = 0; i < 3; i++)
+      if (candidate[i] && code (other_context (n, i, candidates), chosen == kTakeUpperLeft + i))
         return kTakeUpperLeft + i;
-    }
     return kPredict;
+  }
+
+  /* ---- contexts ---- */
+
+  static int earlier_context (const Neighbours &n)
+  {
+    const auto of = [] (PixelState s) { return (s != 0) + is_copy (s, kTakeEarlier); };
+    return of (n.left.state) + 3 * of (n.states[0]) + 9 * is_copy (n.states[1], kTakeEarlier) +
+           18 * is_copy (n.states[-1], kTakeEarlier);
+  }
+  static int other_context (const Neighbours &n, int i, const Candidates &candidates)
+  {
+    const bool *const is = candidates.is;
+    const int full = 2 * (n.left.kind () == 3) + (n.upper ().kind () == 3);
+    const int later = i == 0 ? is[1] + 2 * is[2] : i == 1 ? is[2] : 0;
+    return context::kOther + 16 * i + 4 * full + later;
+  }
+  static int predicted_context (const Neighbours &n)
+  {
+    return context::kPredicted + n.left.origin () + 5 * n.upper ().origin ();
+  }
+  static int surroundings (bool has_neighbour, bool alone, Activity sum)
+  {
+    return !has_neighbour ? 5 : alone ? 4 : kActivityClass[sum];
+  }
+  static int zero_context (int component, bool previous, int where)
+  {
+    return context::kNonZero + 12 * component + 6 * previous + where;
+  }
+  static int size_context (int component, int where)
+  {
+    return context::kSize + 32 * component + 16 * (where >= 3);
+  }
+
+  /* ---- costs ---- */
+
+  [[nodiscard]] float bits_of (int at, bool yes) const
+  {
+    const Probability p = model_[at];
+    return kBitsOfProbability[(yes ? p : static_cast<Probability> (~p)) >> 8];
+  }
+  [[nodiscard]] float number_bits (int zero, int at, std::int32_t r) const
+  {
+    float bits = bits_of (zero, r != 0);
+    if (r == 0)
+      return bits;
+    bits += bits_of (at++, r < 0);
+    const std::uint32_t size = static_cast<std::uint32_t> (std::abs (r)) - 1;
+    for (std::uint32_t i = 0; i < kUnarySizes; i++) {
+      bits += bits_of (at + static_cast<int> (i), size > i);
+      if (size <= i)
+        return bits;
+    }
+    const int width = std::bit_width (size - kUnarySizes + 1) - 1;
+    for (int i = 0; i <= width; i++)
+      bits += bits_of (at + kUnarySizes + std::min (i, 10), i < width);
+    return bits + float (width);
   }
 
   /* Context class for the sum of three activities. */

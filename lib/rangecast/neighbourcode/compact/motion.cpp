@@ -2,29 +2,126 @@
 #include "motion.hpp"
 
 #include <algorithm>
+#include <cmath>
+
+#include "../../base/simd.hpp"
+#include "pixel_key.hpp"
 
 namespace rangecast {
+namespace {
+
+/* Two pixels side by side. */
+typedef std::int16_t PixelHalves __attribute__ ((vector_size (16)));
+
+PixelHalves
+load_two (const PixelCode *from)
+{
+  PixelHalves pixels;
+  std::memcpy (&pixels, from, sizeof pixels);
+  return pixels;
+}
+
+/* One number of each of two pixels in all their four. */
+template <int kAt>
+PixelHalves
+spread (PixelHalves v)
+{
+  if constexpr (std::endian::native == std::endian::big)
+    return __builtin_shufflevector (
+        v, v, 3 - kAt, 3 - kAt, 3 - kAt, 3 - kAt, 7 - kAt, 7 - kAt, 7 - kAt, 7 - kAt);
+  return __builtin_shufflevector (v, v, kAt, kAt, kAt, kAt, kAt + 4, kAt + 4, kAt + 4, kAt + 4);
+}
+
+/* Where a row lies between the pixels of an earlier frame set: the four around each of its pixels,
+ * which may be the same, and their weights. */
+struct Taps {
+  const PixelCode *pixels[4]; /* upper left, upper right, lower left, lower right */
+  const PixelCode *nearest;
+  std::int16_t weights[4]; /* sixteenths */
+};
+
+/* Mixes the four pixels if all are valid and their depths are close to the first one's, and else
+ * takes the nearest. Differences are 16 bits: those of colours are, and those of depths if they
+ * count. */
+[[gnu::always_inline]] inline void
+mix (const Taps &taps, std::int16_t max_gap, std::span<PixelCode> to)
+{
+  const PixelHalves none = PixelHalves{} - 1, gap = PixelHalves{} + max_gap;
+  for (std::size_t i = 0; i < to.size (); i += 2) {
+    const PixelHalves first = load_two (taps.pixels[0] + i);
+    PixelHalves sum = PixelHalves{} + 8, far = {}, negative = first, unknown = {};
+    unknown |= spread<1> (first) == none;
+    for (int t = 1; t < 4; t++) {
+      const PixelHalves other = load_two (taps.pixels[t] + i), difference = other - first;
+      sum += difference * taps.weights[t];
+      far |= (difference > gap) | (difference < -gap);
+      negative |= other;
+      unknown |= spread<1> (other) == none;
+    }
+    const PixelHalves mixed = first + (sum >> 4);
+    const PixelHalves apart = spread<0> (far) | (spread<1> (negative) < 0);
+    const PixelHalves nearest = load_two (taps.nearest + i);
+    const PixelHalves empty = unknown | (spread<1> (nearest) < 0);
+    const PixelHalves result =
+        (((mixed & ~apart) | (nearest & apart)) & ~(empty & apart)) | (empty & apart);
+    std::memcpy (&to[i], &result, std::min<std::size_t> (2, to.size () - i) * sizeof (PixelCode));
+  }
+}
+
+/* Pixels of a block's row. */
+[[gnu::always_inline]] inline void
+fetch_part (const ReferencePlane &plane, int x, int y, const BlockMotion &m,
+    const MotionScale &scale, std::span<PixelCode> to)
+{
+  const int right = m.dx & 3, down = m.dy & 3;
+  PixelCode rows[2][kMotionBlock + 2] = {};
+  const int left = x + (m.dx >> 2), top = y + (m.dy >> 2);
+  for (int i = 0; i < 1 + (down > 0); i++)
+    plane.fetch (left, top + i, std::span (rows[i]).first (to.size () + 1), kEmptyPixel);
+  const PixelCode *const upper = rows[0], *const lower = rows[down > 0];
+  const int next = right > 0;
+  const auto weight = [] (int a, int b) { return static_cast<std::int16_t> (a * b); };
+  const Taps taps = {{upper, upper + next, lower, lower + next},
+      (down >= 2 ? lower : upper) + (right >= 2),
+      {weight (4 - right, 4 - down), weight (right, 4 - down), weight (4 - right, down),
+          weight (right, down)}};
+  mix (taps, static_cast<std::int16_t> (scale.max_gap), to);
+}
+
+} // namespace
+
+bool
+is_sound (const BlockMotion &m, const MotionScale &scale)
+{
+  return std::abs (m.dx) <= kMaxMotion && std::abs (m.dy) <= kMaxMotion &&
+         std::abs (m.dz) <= kMaxMotionDepth / scale.unit &&
+         std::abs (m.slope_x) <= kMaxMotionSlope && std::abs (m.slope_y) <= kMaxMotionSlope;
+}
 
 void
 fetch_displaced (const ReferencePlane &plane, int x, int y, std::span<const BlockMotion> motions,
-    std::int32_t last_depth, int first_y, int end_y, std::span<PixelCode> to)
+    const MotionScale &scale, int first_y, int end_y, std::span<PixelCode> to)
 {
-  const int end = x + static_cast<int> (to.size ());
+  const int end = x + static_cast<int> (to.size ()), line = y % kMotionBlock;
   for (const BlockMotion &m : motions) {
     const int next = std::min ((x / kMotionBlock + 1) * kMotionBlock, end);
     const auto part = to.first (static_cast<std::size_t> (next - x));
     to = to.subspan (part.size ());
-    if (y + m.dy < first_y || y + m.dy >= end_y)
+    const int top = y + (m.dy >> 2);
+    if (top < first_y || top + ((m.dy & 3) > 0) >= end_y)
       std::ranges::fill (part, kNoPixel);
     else
-      plane.fetch (x + m.dx, y + m.dy, part);
-    if (m.dz != 0)
-      for (PixelCode &code : part)
-        if (code != kNoPixel) {
-          const auto depth = static_cast<std::int32_t> (code & 0xffff) + m.dz;
-          code = (code & ~PixelCode{0xffff}) |
-                 static_cast<PixelCode> (std::clamp (depth, 0, last_depth));
-        }
+      for_this_cpu ([&] { fetch_part (plane, x, y, m, scale, part); });
+    /* A mixture may exceed the greatest depth because differences are modulo 2^16. */
+    if (m != BlockMotion{m.dx & ~3, m.dy & ~3})
+      for (int i = 0; i < next - x; i++) {
+        PixelCode &code = part[static_cast<std::size_t> (i)];
+        const auto depth = static_cast<std::int32_t> (code & 0xffff) +
+                           depth_offset (m, scale, (x + i) % kMotionBlock, line);
+        const auto moved = (code & ~PixelCode{0xffff}) |
+                           static_cast<PixelCode> (std::clamp (depth, 0, scale.last_depth));
+        code = code == kNoPixel ? code : moved;
+      }
     x = next;
   }
 }
@@ -40,7 +137,7 @@ MotionMemory::resize (int width, int height)
 MotionSearch::MotionSearch ()
 {
   samples_.reserve (kMotionBlock * kMotionBlock);
-  differences_.reserve (kMotionBlock * kMotionBlock);
+  pairs_.reserve (kMotionBlock * kMotionBlock);
   sorted_.reserve (kMotionBlock * kMotionBlock);
 }
 
@@ -59,78 +156,192 @@ MotionSearch::collect_samples (const Pictures &pictures, const Area &area)
       if (pictures.depth.valid (z[x])) {
         const Components own = {pictures.depth.code (z[x]), colour.code (c[x].r),
             colour.code (c[x].g), colour.code (c[x].b)};
-        samples_.push_back ({own, x, y});
+        samples_.push_back ({components_of_key (key_of (own)), x, y});
       }
   }
 }
 
-/* The best dz of one displacement is the median of the depth differences. */
-MotionSearch::Match
-MotionSearch::match (
-    const Pictures &pictures, Components threshold, const Area &area, int dx, int dy)
+/* The pixels that a motion in x and y gives the samples. */
+void
+MotionSearch::pair_up (const Pictures &pictures, const Area &area, const BlockMotion &m)
 {
-  Match found = {{dx, dy, 0}, 0};
-  if (std::abs (dx) > kMaxMotion || std::abs (dy) > kMaxMotion)
-    return found;
-  differences_.clear ();
+  pairs_.clear ();
+  const ReferencePlane &before = pictures.before;
+  const int right = m.dx & 3, down = m.dy & 3, next = right > 0, below = down > 0;
+  const int left = m.dx >> 2, top = m.dy >> 2;
+  const std::uint64_t *const inside =
+      before.inverted (area.x + left, area.y + top, area.width + next, area.height + below);
+  const std::ptrdiff_t stride = before.stride ();
+  const int nearest = (right >= 2) + 2 * (down >= 2);
   for (const Sample &s : samples_) {
-    const PixelCode code = s.y + dy >= area.first_y && s.y + dy < area.end_y
-                               ? pictures.before.at (s.x + dx, s.y + dy)
-                               : kNoPixel;
-    if (code == kNoPixel)
+    const int x = s.x + left, y = s.y + top;
+    if (y < area.first_y || y + below >= area.end_y)
       continue;
-    const Components difference = s.own - to_rgb (components_of (code), pictures.limits);
-    const Components beyond = (difference > threshold) | (difference < -threshold);
-    if (is_zero (beyond & Components{0, -1, -1, -1})) /* depth does not count here */
-      differences_.push_back (difference[0]);
+    Components taps[4];
+    if (inside) {
+      const std::uint64_t *const at = inside + (s.y - area.y) * stride + (s.x - area.x);
+      const std::uint64_t *const lower = at + below * stride;
+      taps[0] = components_of (~at[0]);
+      taps[1] = components_of (~at[next]);
+      taps[2] = components_of (~lower[0]);
+      taps[3] = components_of (~lower[next]);
+    } else {
+      for (int t = 0; t < 4; t++)
+        taps[t] = components_of (before.at (x + (t & 1 & next), y + (t >> 1 & below)));
+    }
+    const Components upper = 4 * taps[0] + right * (taps[1] - taps[0]);
+    const Components lower = 4 * taps[2] + right * (taps[3] - taps[2]);
+    Components mixed = (4 * upper + down * (lower - upper) + 8) >> 4;
+    const std::int32_t first = taps[0][0], gap = pictures.scale.max_gap;
+    const bool is_one =
+        ((taps[0] | taps[1] | taps[2] | taps[3])[1] >= 0) & (std::abs (taps[1][0] - first) <= gap) &
+        (std::abs (taps[2][0] - first) <= gap) & (std::abs (taps[3][0] - first) <= gap);
+    if (!is_one) {
+      mixed = taps[nearest];
+      if (mixed[1] < 0)
+        continue;
+    }
+    const Components difference = s.own - mixed;
+    const FloatComponents error = __builtin_convertvector(difference, FloatComponents);
+    const FloatComponents squares = error * error * colour_weights_;
+    pairs_.push_back ({s.x % kMotionBlock, s.y % kMotionBlock, difference[0],
+        squares[1] + squares[2] + squares[3]});
   }
-  if (differences_.empty ())
-    return found;
-  sorted_ = differences_;
+}
+
+std::int32_t
+MotionSearch::median_depth ()
+{
+  constexpr std::size_t kEnough = 16; /* pairs */
+  const std::size_t step = std::max<std::size_t> (pairs_.size () / kEnough, 1);
+  sorted_.clear ();
+  for (std::size_t i = 0; i < pairs_.size (); i += step)
+    sorted_.push_back (pairs_[i].depth);
   const auto middle = sorted_.begin () + static_cast<std::ptrdiff_t> (sorted_.size () / 2);
   std::ranges::nth_element (sorted_, middle);
-  const auto hits = [&] (int dz) {
-    return std::ranges::count_if (
-        differences_, [&] (int d) { return std::abs (d - dz) <= threshold[0]; });
+  return *middle;
+}
+
+/* A pixel that is far off costs its bits, however far it is. */
+constexpr float kMaxDepthError = 1.5f, kMaxError = 2.5f;
+
+float
+MotionSearch::error_of (const MotionScale &scale, const BlockMotion &m) const
+{
+  float sum = kMaxError * float (samples_.size () - pairs_.size ());
+  for (const Pair &p : pairs_) {
+    const auto d = float (p.depth - depth_offset (m, scale, p.x, p.y));
+    sum += std::min (std::min (d * d * depth_weight_, kMaxDepthError) + p.colour_error, kMaxError);
+  }
+  return sum;
+}
+
+/* Least squares over the pairs that are near the plane of the last round. */
+void
+MotionSearch::fit_plane (const MotionScale &scale, BlockMotion &m) const
+{
+  constexpr std::size_t kMinPairs = 8;
+  if (pairs_.size () < kMinPairs)
+    return;
+  float plane[3] = {float (m.dz * scale.unit), 0, 0}; /* codes: at the centre, per column and row */
+  for (int round = 0; round < 3; round++) {
+    const float near = round == 0 ? 16 / depth_weight_ : 4 / depth_weight_; /* squared */
+    float a[3][4] = {};
+    std::size_t count = 0;
+    for (const Pair &p : pairs_) {
+      const float u[] = {1, float (p.x - 7), float (p.y - 7)};
+      const auto d = float (p.depth), off = d - plane[0] - plane[1] * u[1] - plane[2] * u[2];
+      if (off * off > near)
+        continue;
+      count++;
+      for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++)
+          a[i][j] += u[i] * u[j];
+        a[i][3] += u[i] * d;
+      }
+    }
+    if (count < kMinPairs)
+      return;
+    a[1][1] += 8; /* where the pairs do not tell, there is no slope */
+    a[2][2] += 8;
+    for (int i = 0; i < 2; i++)
+      for (int j = i + 1; j < 3; j++) {
+        const float f = a[j][i] / a[i][i];
+        for (int k = i; k < 4; k++)
+          a[j][k] -= f * a[i][k];
+      }
+    plane[2] = a[2][3] / a[2][2];
+    plane[1] = (a[1][3] - a[1][2] * plane[2]) / a[1][1];
+    plane[0] = (a[0][3] - a[0][1] * plane[1] - a[0][2] * plane[2]) / a[0][0];
+  }
+  const auto units = [&] (float codes) {
+    return static_cast<std::int32_t> (std::lround (codes / float (scale.unit)));
   };
-  const auto still = hits (0), moved = hits (*middle);
-  found.hits = static_cast<int> (std::max (still, moved));
-  found.motion.dz = moved > still + still / 16 ? *middle : 0;
-  return found;
+  BlockMotion tilted = m;
+  tilted.dz =
+      std::clamp (units (plane[0]), -kMaxMotionDepth / scale.unit, kMaxMotionDepth / scale.unit);
+  tilted.slope_x = std::clamp (units (8 * plane[1]), -kMaxMotionSlope, kMaxMotionSlope);
+  tilted.slope_y = std::clamp (units (8 * plane[2]), -kMaxMotionSlope, kMaxMotionSlope);
+  constexpr float kPriceOfSlope = 0.5f;
+  if (error_of (scale, tilted) + kPriceOfSlope < error_of (scale, m))
+    m = tilted;
 }
 
 BlockMotion
 MotionSearch::find (const Pictures &pictures, Components threshold, const Area &area,
     std::span<const BlockMotion> near_by, MotionMemory &memory)
 {
+  const auto weight = [] (std::int32_t t) { return 1 / ((float (t) + 0.5f) * (float (t) + 0.5f)); };
+  depth_weight_ = weight (threshold[0]);
+  /* Squares of R, G and B added up are about 3 Y^2 + Co^2 / 2 + 3 Cg^2 / 4. */
+  colour_weights_ = FloatComponents{0, 3, 0.5f, 0.75f} * weight (threshold[1]);
   collect_samples (pictures, area);
-  Match best = match (pictures, threshold, area, 0, 0);
-  const auto all = static_cast<int> (samples_.size ());
-  const auto attempt = [&] (int dx, int dy) {
-    const Match other = match (pictures, threshold, area, dx, dy);
-    if (other.hits <= best.hits + all / 32) /* a motion costs bits */
+  const auto all = float (samples_.size ());
+  const float price = all / 64; /* of a motion, in errors: it costs bits */
+  const MotionScale &scale = pictures.scale;
+  BlockMotion best;
+  float least = 0;
+  const auto attempt = [&] (int dx, int dy, float cost) {
+    BlockMotion m = {dx, dy, 0, 0, 0};
+    if (std::abs (dx) > kMaxMotion || std::abs (dy) > kMaxMotion)
       return false;
-    best = other;
+    pair_up (pictures, area, m);
+    if (!pairs_.empty ()) {
+      const std::int32_t depth = median_depth ();
+      m.dz = std::abs (depth) <= threshold[0] / 6 ? 0 : depth / scale.unit;
+    }
+    const float error = error_of (scale, m) + cost;
+    if (error >= least)
+      return false;
+    least = error;
+    best = m;
     return true;
   };
-  if (best.hits < all - all / 32) {
-    for (const BlockMotion &m : near_by)
-      attempt (m.dx, m.dy);
-    const BlockMotion last = memory.before (area.x, area.y);
-    attempt (last.dx, last.dy);
-    for (bool better = true; better && best.hits < all - all / 32;) {
-      const int x = best.motion.dx, y = best.motion.dy;
-      better = attempt (x - 1, y);
-      better |= attempt (x + 1, y);
-      better |= attempt (x, y - 1);
-      better |= attempt (x, y + 1);
+  least = kMaxError * all + 1;
+  attempt (0, 0, -price);
+  const BlockMotion &left = near_by[0], last = memory.before (area.x, area.y);
+  if (left.dx != 0 || left.dy != 0)
+    attempt (left.dx, left.dy, -price);
+  for (const BlockMotion &m : {near_by[1], last})
+    if (m.dx != best.dx || m.dy != best.dy)
+      attempt (m.dx, m.dy, 0);
+  for (const int step : {4, 2, 1})
+    for (bool better = step < 4 || least > all / 4; better && least > price / 2;) {
+      const int x = best.dx, y = best.dy;
+      better = attempt (x - step, y, 0) || attempt (x + step, y, 0);
+      better |= attempt (best.dx, y - step, 0) || attempt (best.dx, y + step, 0);
     }
-  }
+  pair_up (pictures, area, best);
+  fit_plane (scale, best);
+  least = error_of (scale, best);
+  pair_up (pictures, area, left);
+  if (is_sound (left, scale) && error_of (scale, left) - 2 * price < least)
+    best = left;
   /* Partitions may share a block: the one with its first pixel records its motion. */
   const auto begins = [] (int at, int of_roi) { return at % kMotionBlock == 0 || at == of_roi; };
   if (begins (area.x, pictures.image.roi.x) && begins (area.y, pictures.image.roi.y))
-    memory.keep (area.x, area.y, best.motion);
-  return best.motion;
+    memory.keep (area.x, area.y, best);
+  return best;
 }
 
 } // namespace rangecast

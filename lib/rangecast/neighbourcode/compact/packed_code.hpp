@@ -17,7 +17,7 @@ inline constexpr int kMaxGolombPrefix = 18;
 /** Bits of the greatest number that such a code holds. */
 inline constexpr int kMaxGolombBits = 20;
 /** Golomb orders of run ends and of depth motion. */
-inline constexpr int kRunOrder = 1, kMotionDepthOrder = 3;
+inline constexpr int kRunOrder = 1, kMotionOrder = 1;
 
 /** Lengths of the codes in bits, 0 = no code. Part of the format. */
 extern const std::array<std::array<std::uint8_t, kChoices>, kPackedContexts> kChoiceLengths;
@@ -123,9 +123,8 @@ public:
     put (m == expected, 1);
     if (m == expected)
       return;
-    golomb (zigzag (m.dx - expected.dx), 0);
-    golomb (zigzag (m.dy - expected.dy), 0);
-    golomb (zigzag (m.dz - expected.dz), kMotionDepthOrder);
+    for (const auto member : kMotionMembers)
+      golomb (zigzag (m.*member - expected.*member), kMotionOrder);
   }
   template <bool Delta> [[gnu::always_inline]] void choice (const Neighbours &n, int chosen)
   {
@@ -171,6 +170,37 @@ public:
     quick (3);
     put (bits, length);
   }
+  /** @name What choices and residuals would cost, bits @{ */
+  /** Of the left neighbour, which is valid: to take it, and at least to take another. */
+  [[nodiscard]] std::pair<float, float> left_bits (const Neighbours &n) const
+  {
+    return {float (tables_->choice[n.kinds ()][kTakeLeft].length), 1};
+  }
+  template <bool Delta> [[nodiscard]] ChoiceBits choice_bits (const Neighbours &n) const
+  {
+    ChoiceBits bits;
+    bits.fill (kImpossible);
+    bits[kCorrect] = 0;
+    if (n.any ())
+      for (std::size_t i = 0; i < kChoices; i++)
+        if (const int length = tables_->choice[n.kinds ()][i].length; length > 0)
+          bits[i] = float (length);
+    return bits;
+  }
+  [[nodiscard]] float residual_bits (const Neighbours &, bool has_neighbour, Components r) const
+  {
+    const auto pattern = static_cast<std::size_t> (
+        (r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3);
+    int bits = tables_->pattern[pattern_code (has_neighbour, exact_)][pattern].length;
+    for (int i = 0; i < kComponents; i++)
+      if (r[i] != 0) {
+        const int order = orders_[static_cast<std::size_t> (i)];
+        const auto size = static_cast<std::uint32_t> (std::abs (r[i])) - 1;
+        bits += 2 + order + 2 * (std::bit_width ((size >> order) + 1) - 1);
+      }
+    return float (bits);
+  }
+  /** @} */
   /** The bytes that finish() returns. */
   [[nodiscard]] std::size_t bound () const
   {
@@ -245,10 +275,12 @@ public:
     m = expected;
     if (take (1))
       return true;
-    std::uint32_t x = 0, y = 0, z = 0;
-    if (!golomb (0, x) || !golomb (0, y) || !golomb (kMotionDepthOrder, z))
-      return false;
-    m = {m.dx + unzigzag (x), m.dy + unzigzag (y), m.dz + unzigzag (z)};
+    for (const auto member : kMotionMembers) {
+      std::uint32_t rest = 0;
+      if (!golomb (kMotionOrder, rest))
+        return false;
+      m.*member += unzigzag (rest);
+    }
     return true;
   }
   /** A PixelChoice, or kNoSymbol for damage. */

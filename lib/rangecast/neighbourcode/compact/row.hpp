@@ -15,6 +15,14 @@ public:
   /** Pixels after the row that may be read. */
   static constexpr std::size_t kMargin = 8;
 
+  /** Reserves memory for rows of so many columns. */
+  void reserve (std::size_t columns)
+  {
+    for (auto *numbers : {&codes_, &states_, &shown_, &reference_})
+      numbers->reserve (columns + 1 + kMargin);
+    valid_.reserve (columns);
+    earlier_.reserve (columns);
+  }
   /** Makes all pixels invalid.
    *  @param shown  value of invalid pixels in shown() */
   void reset (std::size_t columns, std::uint64_t shown)
@@ -24,6 +32,7 @@ public:
     shown_.assign (columns + 1 + kMargin, shown);
     valid_.assign (columns, 0);
     earlier_.assign (columns, 0);
+    reference_.resize (columns);
   }
   void invalidate (std::size_t begin, std::size_t end, std::uint64_t shown)
   {
@@ -43,8 +52,16 @@ public:
   /** One byte a pixel, not 0 = equals a pixel of an earlier frame set. */
   [[nodiscard]] std::vector<std::uint8_t> &earlier () { return earlier_; }
 
+  /** The pixels as later frame sets refer to them. */
+  [[nodiscard]] std::span<const PixelCode> as_reference (std::size_t columns)
+  {
+    for (std::size_t x = 0; x < columns; x++)
+      reference_[x] = states ()[x] != 0 ? codes ()[x] : kEmptyPixel;
+    return std::span (reference_).first (columns);
+  }
+
 private:
-  std::vector<PixelCode> codes_;
+  std::vector<PixelCode> codes_, reference_;
   std::vector<PixelState> states_;
   std::vector<std::uint64_t> shown_;
   std::vector<std::uint8_t> valid_, earlier_;
