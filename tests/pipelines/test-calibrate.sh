@@ -21,7 +21,7 @@ test_pictures_in_order_do_as_well_as_numbered_ones () {
   "$pipelines/calibrate.sh" --left 'left0*.jpg' --right 'right0?.jpg' --out rig.json >report.txt
   grep -q "all: 9 frames" report.txt || fail "$(tail -n 5 report.txt)"
   rm right05.jpg
-  expect_error "8 pictures; expected as many as of the other cameras, 9" \
+  expect_error "8 pictures; expected 9, as for the other cameras" \
     "$pipelines/calibrate.sh" --left 'left0*.jpg' --right 'right0*.jpg' --out rig.json
   "$pipelines/calibrate.sh" --left 'left%02d.jpg' --right 'right%02d.jpg' --out rig.json >report.txt
   grep -q "all: 8 frames" report.txt || fail "$(tail -n 5 report.txt)"
@@ -42,7 +42,7 @@ test_live_cameras_without_a_board_are_one_error () {
 test_bad_arguments_are_named () {
   expect_error "no pictures 'nothing%d.png'" "$pipelines/calibrate.sh" --left nothing%d.png --out rig.yaml
   expect_error "no file, pictures or source 'nothing.mp4'" "$pipelines/calibrate.sh" --left nothing.mp4 --out rig.yaml
-  expect_error "expected a --left before it" "$pipelines/calibrate.sh" --right a%d.png --out rig.yaml
+  expect_error "--right: expected after the --left of its view" "$pipelines/calibrate.sh" --right a%d.png --out rig.yaml
   expect_error "expected at least --left and --out" "$pipelines/calibrate.sh" --left a%d.png
   expect_error "its folder does not exist" "$pipelines/calibrate.sh" --left videotestsrc --out nowhere/rig.yaml
 }
@@ -57,8 +57,8 @@ test_values_out_of_range_name_the_option_and_what_is_allowed () {
   expect_error "--board: expected one of chessboard, charuco, got 'circles'" "${calibrate[@]}" --board circles
   expect_error "--distortion: expected one of none, four, five, eight, got 'six'" "${calibrate[@]}" --distortion six
   expect_error "--world: expected one of centre, first-view, board, got 'room'" "${calibrate[@]}" --world room
-  expect_error "--columns: expected a value" "$pipelines/calibrate.sh" --left videotestsrc --columns --out rig.yaml
-  expect_error "--out: expected a value" "$pipelines/calibrate.sh" --left videotestsrc --out
+  expect_error "option --columns needs a value" "$pipelines/calibrate.sh" --left videotestsrc --columns --out rig.yaml
+  expect_error "option --out needs a value" "$pipelines/calibrate.sh" --left videotestsrc --out
   [ ! -e rig.yaml ] || fail "a rig was written"
 }
 
