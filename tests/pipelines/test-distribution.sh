@@ -105,7 +105,7 @@ test_encrypted_hosts_need_the_same_key () {
     ! grep -q 'packets cannot be decrypted with the key in .*wrong.key' two.log || break
     sleep 0.2
   done
-  grep -q 'packets cannot be decrypted' two.log || fail "nothing was said: $(cat two.log)"
+  grep -q 'packets cannot be decrypted' two.log || fail "expected a message that packets cannot be decrypted: $(cat two.log)"
   [ ! -s two.rcnc ] || fail "a wrong key shows something"
 }
 

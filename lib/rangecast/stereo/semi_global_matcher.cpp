@@ -91,12 +91,13 @@ void
 compare_with (const std::uint8_t *__restrict other, const std::uint8_t *__restrict own, int n,
     std::uint8_t *__restrict differences, std::uint8_t *__restrict sums)
 {
-  constexpr std::uint8_t kMost = kMaxDifference;
+  constexpr std::uint8_t kMaxShift = kMaxDifference;
   for (int begin = 0; begin < n; begin += kSide)
     for (int x = begin; x < begin + kSide; x++) {
       const std::uint8_t high = greater (other[x], own[x]);
       const auto above = std::uint8_t (high - own[x]), below = std::uint8_t (high - other[x]);
-      differences[x] = std::uint8_t (kMost + lesser (above, kMost) - lesser (below, kMost));
+      differences[x] =
+          std::uint8_t (kMaxShift + lesser (above, kMaxShift) - lesser (below, kMaxShift));
       sums[x] = std::uint8_t (sums[x] + differences[x]);
     }
 }
