@@ -33,6 +33,7 @@
 #include <vector>
 
 #include "codedviews.hpp"
+#include "common/capserrors.hpp"
 #include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 
@@ -72,9 +73,9 @@ struct GstRangeDemuxPrivate {
   GstFlowCombiner *combiner = gst_flow_combiner_new ();
   RangeInfo info;
   bool coded = false;
-  bool had_pads = false;      /* since start */
-  CodedViews units;           /* of the current frame set, if coded */
-  GstCaps *refused = nullptr; /* of the last error; the caps event is repeated with data */
+  bool had_pads = false; /* since start */
+  CodedViews units;      /* of the current frame set, if coded */
+  CapsErrors caps_errors;
   guint group_id = GST_GROUP_ID_INVALID;
 
   ~GstRangeDemuxPrivate () { gst_flow_combiner_free (combiner); }
@@ -352,10 +353,8 @@ handle_caps (GstRangeDemux *self, GstPad *sink, GstEvent *event)
   const bool coded =
       gst_structure_has_name (gst_caps_get_structure (caps, 0), GST_NEIGHBOUR_CODE_MEDIA_TYPE);
   const Status status = gstrange::parse_caps (caps, priv->info);
-  const bool reported = !status.ok () && priv->refused && gst_caps_is_equal (priv->refused, caps);
-  gst_caps_replace (&priv->refused, status.ok () ? nullptr : caps);
   gst_event_unref (event);
-  if (reported || gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
+  if (!priv->caps_errors.accept (GST_ELEMENT (self), status))
     return FALSE;
   priv->coded = coded;
   priv->reporter.set_views (priv->info.rig);
@@ -431,7 +430,7 @@ gst_range_demux_change_state (GstElement *element, GstStateChange transition)
         remove_pad (self, entry);
     gst_flow_combiner_reset (priv->combiner);
     priv->info = {};
-    gst_caps_replace (&priv->refused, nullptr);
+    priv->caps_errors.reset ();
     priv->had_pads = false;
     priv->group_id = GST_GROUP_ID_INVALID;
     priv->last_seek = GST_SEQNUM_INVALID;
@@ -470,7 +469,6 @@ gst_range_demux_finalize (GObject *object)
   GstRangeDemuxPrivate *priv = GST_RANGE_DEMUX (object)->priv;
   for (DemuxPad &entry : priv->pads)
     gst_caps_replace (&entry.caps, nullptr);
-  gst_caps_replace (&priv->refused, nullptr);
   delete priv;
   G_OBJECT_CLASS (gst_range_demux_parent_class)->finalize (object);
 }

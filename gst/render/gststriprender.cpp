@@ -63,14 +63,13 @@ has_same_cameras (const rangecast::Rig &a, const rangecast::Rig &b)
       });
 }
 
-/* Downstream may renegotiate, or cylinderfilter correct poses, at any time: a fit outlasts both.
- * Caps that were refused come again with each buffer: their error is posted once. */
+/* Downstream may renegotiate, or cylinderfilter correct poses, at any time: a fit outlasts both. */
 bool
 handle_input_caps (GstStripRender *self, GstCaps *caps)
 {
   GstStripRenderPrivate *priv = self->priv;
   if (priv->input && gst_caps_is_equal (caps, priv->input)) {
-    priv->caps_refused = false;
+    priv->caps_errors.reset ();
     return true;
   }
   const Status status = rangecast::guarded ("striprender", [&] {
@@ -87,10 +86,7 @@ handle_input_caps (GstStripRender *self, GstCaps *caps)
     gst_caps_replace (&priv->input, caps);
     return parsed;
   });
-  const bool posted = std::exchange (priv->caps_refused, !status.ok ());
-  if (!status.ok () && !posted)
-    gst_range_flow_return (GST_ELEMENT (self), status);
-  return status.ok ();
+  return priv->caps_errors.accept (GST_ELEMENT (self), status);
 }
 
 struct PoolSizes {
@@ -343,7 +339,8 @@ gst_strip_render_start (GstBaseTransform *base)
   auto self = GST_STRIP_RENDER (base);
   GstStripRenderPrivate *priv = self->priv;
   priv->first_running = GST_CLOCK_TIME_NONE;
-  priv->gl_error_posted = priv->no_context = priv->caps_refused = false;
+  priv->gl_error_posted = priv->no_context = false;
+  priv->caps_errors.reset ();
   priv->live = false;
   priv->stats_text = {};
   priv->fit.reset ();

@@ -12,6 +12,7 @@
 #include <rangecast/overlay/stats_panel.hpp>
 
 #include "category.hpp"
+#include "common/capserrors.hpp"
 #include "common/statsreporter.hpp"
 #include "gststriprender.h"
 #include "outputschedule.hpp"
@@ -47,7 +48,7 @@ struct GstStripRenderPrivate {
   gstrange::RangeInfo info; /* of these */
   GstVideoInfo out;
   bool live = false, live_known = false;
-  bool caps_refused = false; /* the last ones, with an error */
+  CapsErrors caps_errors;
 
   /* Of drawing: with the source pad's stream lock, or on the streaming thread if that draws;
    * or on the OpenGL thread while that thread waits for it. */
