@@ -604,8 +604,11 @@ handle_caps (GstRangeMux *self, MuxStream &stream, GstCaps *caps)
   if (!status.ok ())
     status = {status.code (),
         "pad " + std::string (GST_PAD_NAME (stream.pad)) + ": " + status.message ()};
-  if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
+  if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK) {
+    stream.clash = status;
+    stream.reported = StreamState::kClash;
     return FALSE;
+  }
   GST_INFO_OBJECT (stream.pad, "%" GST_PTR_FORMAT, caps);
   const rangecast::Rig &expected = self->priv->rig;
   stream.other_rig = expected.views.empty () ? Status{} : check_rig (info.rig, expected);

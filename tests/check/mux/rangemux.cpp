@@ -219,6 +219,21 @@ GST_START_TEST (test_raw_and_coded_together_are_one_error)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_refused_caps_are_one_error_and_no_warning)
+{
+  Mux mux (2);
+  GstCaps *caps = gstrange::make_range_caps (gstrange::make_info (mux.one (1), 25, 1));
+  gst_caps_set_simple (caps, "rig", G_TYPE_INT, 5, nullptr);
+  gst_harness_set_src_caps (mux.in[1], caps);
+  gst_harness_push (mux.in[1], make_frame_set (mux.one (1), 0));
+  mux.push (0, 0, 0);
+  fail_unless_contains (next_message_text (mux.bus, GST_MESSAGE_ERROR), "pad sink_1");
+  GstMessage *more = gst_bus_timed_pop_filtered (
+      mux.bus, GST_SECOND / 2, GstMessageType (GST_MESSAGE_ERROR | GST_MESSAGE_WARNING));
+  fail_unless (more == nullptr);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_coded_access_units_are_joined)
 {
   Mux mux (2, true);
@@ -324,6 +339,7 @@ rangemux_suite ()
       tc, test_of_recordings_one_that_begins_or_pauses_goes_on_later_and_none_loses_a_frame);
   tcase_add_test (tc, test_two_pads_with_one_view_are_one_error_that_names_both);
   tcase_add_test (tc, test_raw_and_coded_together_are_one_error);
+  tcase_add_test (tc, test_refused_caps_are_one_error_and_no_warning);
   tcase_add_test (tc, test_coded_access_units_are_joined);
   tcase_add_test (tc, test_request_for_a_key_frame_set_goes_to_all_streams);
   tcase_add_test (tc, test_plays_twice);
