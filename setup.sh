@@ -92,7 +92,6 @@ show_progress () {
 }
 
 build () {
-  mkdir -p build
   # What was left out of build/ for want of a package is not, from now on.
   if [ -n "$installed" ] && [ -f build/build.ninja ]; then
     logged meson configure build --clearcache
@@ -107,5 +106,13 @@ build () {
   NINJA_STATUS='[%f/%t] ' ninja -C build "${targets[@]}" 2>&1 | tee "$log" | show_progress || { show_failure; return 1; }
 }
 
+# One at a time: demo.sh and run.sh may be started together.
+lock_build () {
+  mkdir -p build
+  exec 9>build/setup.lock
+  flock -n 9 || { echo "setup.sh: waiting for another setup.sh in this folder"; flock 9; }
+}
+
+lock_build
 install_packages
 build

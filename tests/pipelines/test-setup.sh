@@ -42,6 +42,18 @@ test_setup_says_that_it_builds () {
   grep -q "2 of 2" terminal.txt || fail "no progress in a terminal: $(cat terminal.txt)"
 }
 
+test_setup_waits_for_another_setup () {
+  make_tree
+  sed -i '2s/echo/sleep 2 \&\& echo/' tree/build.ninja
+  run_setup >first.txt &
+  local first=$!
+  until [ -e tree/build/build.ninja ]; do sleep 0.05; done
+  run_setup >second.txt
+  wait "$first" || fail "$(cat first.txt)"
+  grep -q "waiting for another" second.txt || fail "$(cat second.txt)"
+  ! grep -q "building" second.txt || fail "built twice: $(cat second.txt)"
+}
+
 test_demo_builds_no_more_than_it_needs () {
   [ -f "$build/build.ninja" ] || skip "not a build folder"
   ninja -C "$build" -t query demo >demo.txt
