@@ -62,7 +62,8 @@ if [ -n "$listen" ]; then
   source=("${rtp[@]}")
 else
   source=(avatartestsrc "views=$views" "num-buffers=$frames" range-person-only=true
-    ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc)
+    ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1"
+    ! neighbourcodeenc profile=entropy temporal=true key-interval=2000)
 fi
 # If nothing arrives, an existing recording must not be lost.
 [ ! -s "$file" ] || mv -f -- "$file" "$file~"
