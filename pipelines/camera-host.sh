@@ -35,13 +35,13 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --learn N       number of frames from which the background is learnt (default 20)
   --depth WHAT    properties of stereodepth, e.g. "algorithm=bm refine=0", which is faster
   --encoder WHAT  properties of neighbourcodeenc, e.g. "profile=entropy temporal=true" (default:
-                  profile=packed)
+                  the element's: profile=packed)
 END
   rtp_usage_sender
 }
 
 view= to= rig= input=avatar views= size=320x240 fps=15 learn=20
-format=rgb trigger=software clock_server= action_send= reconnect=false depth= encoder=profile=packed loop=0 threads=
+format=rgb trigger=software clock_server= action_send= reconnect=false depth= encoder= loop=0 threads=
 while [ $# -gt 0 ]; do
   option=$1
   rtp_option sender "$1" "${2:-}"

@@ -48,7 +48,7 @@ def record(name, rig='rig.yaml', depth=lambda d: d, colour=lambda c: c):
         if i == BAD:
             d, c = depth(d), colour(c)
         cv2.imwrite('d.png', d), cv2.imwrite('c.png', c)
-        launch(f'rangecombine name=c depth-scale=0.0001 rig={rig} view-id={i} ! neighbourcodeenc ! neighbourcodeparse ! {STREAM} '
+        launch(f'rangecombine name=c depth-scale=0.0001 rig={rig} view-id={i} ! neighbourcodeenc profile=plain ! neighbourcodeparse ! {STREAM} '
                f'! filesink location=v{i}.rcnc filesrc location=c.png ! {still} ! c.colour '
                f'filesrc location=d.png ! {still} ! c.depth')
     launch(f'rangemux name=m ! neighbourcodeparse ! {STREAM} ! filesink location={name}.rcnc '

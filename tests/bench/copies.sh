@@ -37,7 +37,7 @@ cc -shared -fPIC -O2 -fno-builtin -o "$dir/count.so" "$dir/count.c"
 
 record () { # FILE FRAMES PROPERTIES...
   gst-launch-1.0 -q avatartestsrc views=4 "num-buffers=$(($2 + 20))" empty-frames=20 "${@:3}" ! video/x-range,width=320,height=240 \
-    ! roiextract background-frames=18 ! neighbourcodeenc ! neighbourcodeparse \
+    ! roiextract background-frames=18 ! neighbourcodeenc profile=plain ! neighbourcodeparse \
     ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$1"
 }
 for n in "$frames" $((2 * frames)); do
@@ -70,7 +70,7 @@ sink="fakesink sync=false"
 alone=${inputs//m./$sink}
 echo "| element | allocations | KB allocated | KB copied |"
 echo "|---|---|---|---|"
-decode="neighbourcodedec n-threads=1 $quiet" encode="neighbourcodeenc n-threads=1 $quiet"
+decode="neighbourcodedec n-threads=1 $quiet" encode="neighbourcodeenc profile=plain n-threads=1 $quiet"
 pay="rtpneighbourcodepay $quiet" depay="rtpneighbourcodedepay $quiet"
 row "neighbourcodeenc" "$file ! $decode ! $sink" "$file ! $decode ! $encode ! $sink"
 row "neighbourcodeenc, rtpneighbourcodepay" "$file ! $decode ! $sink" "$file ! $decode ! $encode ! $pay ! $sink"

@@ -18,7 +18,7 @@ for n in "${views[@]}"; do
   file=$out/views-$n.rcnc
   if [ ! -s "$file" ]; then
     gst-launch-1.0 -q avatartestsrc "views=$n" num-buffers=80 empty-frames=20 ! video/x-range,width=320,height=240,framerate=30/1 \
-      ! roiextract background-frames=18 ! neighbourcodeenc ! neighbourcodeparse \
+      ! roiextract background-frames=18 ! neighbourcodeenc profile=plain ! neighbourcodeparse \
       ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$file.part"
     mv "$file.part" "$file"
   fi

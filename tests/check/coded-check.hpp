@@ -66,12 +66,13 @@ harness_of (const std::string &launch)
   return h;
 }
 
-/** A frame set's slices, as neighbourcodeenc with these properties makes them. */
+/** A frame set's slices, as neighbourcodeenc with these properties makes them; of profile plain, so
+ * that small pictures have many. */
 inline std::vector<std::vector<guint8>>
 encoded_units (const Rig &rig, GstBuffer *frame_set,
     const char *properties = "depth-bits=16 depth-threshold=0 colour-threshold=0")
 {
-  GstHarness *h = harness_of (std::string ("neighbourcodeenc ") + properties);
+  GstHarness *h = harness_of (std::string ("neighbourcodeenc profile=plain ") + properties);
   gst_harness_set_src_caps (h, range_caps (rig));
   GstBuffer *coded = gst_harness_push_and_pull (h, frame_set);
   const auto units = units_of (bytes_of (coded));

@@ -14,10 +14,10 @@ record () { # stream 'properties of avatartestsrc' [property of neighbourcodeenc
     ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$stream.rcnc"
 }
 
-record default "num-buffers=2 range-person-only=true"
-record exact "num-buffers=1" depth-bits=16 depth-threshold=0 colour-threshold=0 max-slice-size=256
+record default "num-buffers=2 range-person-only=true" profile=plain
+record exact "num-buffers=1" profile=plain depth-bits=16 depth-threshold=0 colour-threshold=0 max-slice-size=256
 record coarse "num-buffers=3 empty-frames=1 range-person-only=true" \
-  depth-bits=7 colour-bits=5 depth-threshold=2 colour-threshold=3 max-slice-size=256
+  profile=plain depth-bits=7 colour-bits=5 depth-threshold=2 colour-threshold=3 max-slice-size=256
 for profile in packed entropy; do
   record "$profile" "num-buffers=2 range-person-only=true" "profile=$profile" max-slice-size=400
 done

@@ -2,7 +2,8 @@
 # Sourced by the tests of pipelines/rtsp-server.
 
 viewers=$source_dir/tests/pipelines/rtsp_viewers.py
-figure="avatartestsrc is-live=true range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 ! neighbourcodeenc"
+# Profile plain: large frame sets, so that slow viewers fall behind.
+figure="avatartestsrc is-live=true range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 ! neighbourcodeenc profile=plain"
 
 until_true () { # seconds command...
   local i most=$(($1 * 5))

@@ -57,7 +57,7 @@ test_all_bit_depths_and_thresholds_decode_the_same () {
   local settings
   while read -r settings; do
     # shellcheck disable=SC2086
-    record settings.rcnc 2 96x72 "num-buffers=2 range-person-only=true" $settings
+    record settings.rcnc 2 96x72 "num-buffers=2 range-person-only=true" profile=plain $settings
     expect_decoders_agree settings.rcnc 2 "$settings"
     expect_nothing_damaged "$settings"
   done <<'END'
@@ -126,7 +126,7 @@ test_short_and_long_slices_decode_the_same () {
 }
 
 test_16_and_8_bits_without_thresholds_lose_nothing () {
-  record exact.rcnc 2 96x72 num-buffers=2 depth-bits=16 colour-bits=8 depth-threshold=0 colour-threshold=0
+  record exact.rcnc 2 96x72 num-buffers=2 profile=plain depth-bits=16 colour-bits=8 depth-threshold=0 colour-threshold=0
   expect_decoders_agree exact.rcnc 2 exact
   write_pictures original 2 avatartestsrc views=2 num-buffers=2 ! video/x-range,width=96,height=72,framerate=15/1
   expect_same_pictures original python 2 "original and decoded"

@@ -28,7 +28,7 @@ struct EncoderSettings {
   int depth_threshold = 8;   ///< codes; 0 to 65535
   int colour_threshold = 5;  ///< codes of each of R, G, B; 0 to 255
   int max_slice_size = 1200; ///< bytes with all headers; 256 to 65535
-  Profile profile = Profile::kPlain;
+  Profile profile = Profile::kPacked;
   NeighbourChoice choice = NeighbourChoice::kFirst;
   DepthScale depth_scale = DepthScale::kLinear;
   /** Pixels may also equal one of the frame set before. */

@@ -23,7 +23,8 @@ decoder_harness (const Rig &rig, const char *launch = "neighbourcodedec")
 
 static GstBuffer *
 encoded (const Rig &rig, GstBuffer *frame_set,
-    const char *encoder = "neighbourcodeenc depth-bits=16 depth-threshold=0 colour-threshold=0")
+    const char *encoder = "neighbourcodeenc profile=plain depth-bits=16 depth-threshold=0 "
+                          "colour-threshold=0")
 {
   GstHarness *h = harness (rig, encoder);
   GstBuffer *buffer = gst_harness_push_and_pull (h, frame_set);

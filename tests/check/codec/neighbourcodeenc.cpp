@@ -262,7 +262,7 @@ GST_END_TEST;
 GST_START_TEST (test_no_slice_is_longer_than_max_slice_size_also_when_it_changes)
 {
   const Rig rig = ring_rig (2);
-  GstHarness *h = encoder (rig, "depth-threshold=0 colour-threshold=0 depth-bits=16");
+  GstHarness *h = encoder (rig, "profile=plain depth-threshold=0 colour-threshold=0 depth-bits=16");
   for (const int limit : {256, 1200, 257, 65535, 500}) {
     g_object_set (h->element, "max-slice-size", limit, nullptr);
     gsize longest = 0;
@@ -362,7 +362,7 @@ GST_START_TEST (test_slices_come_one_a_buffer_with_the_times_of_their_frame_set)
 {
   const Rig rig = ring_rig (2);
   const auto expected = encoded_units (rig, make_frame_set (rig, 42), "");
-  GstHarness *h = encoder (rig, "", kSliceCaps);
+  GstHarness *h = encoder (rig, "profile=plain", kSliceCaps);
   GstBuffer *input = make_frame_set (rig, 42);
   GST_BUFFER_DURATION (input) = 5;
   fail_unless_equals_int (gst_harness_push (h, input), GST_FLOW_OK);

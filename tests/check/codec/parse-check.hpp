@@ -25,7 +25,7 @@ struct Recording {
   explicit Recording (int frames = 10, int width = 64, GstClockTime start = GST_SECOND)
       : rig (ring_rig (2, width, width * 3 / 4))
   {
-    GstHarness *encoder = gst_harness_new ("neighbourcodeenc");
+    GstHarness *encoder = gst_harness_new_parse ("neighbourcodeenc profile=plain");
     GstHarness *writer = gst_harness_new ("neighbourcodeparse");
     const auto info = gstrange::make_info (rig, 25, 1);
     gst_harness_set_src_caps (encoder, gstrange::make_range_caps (info));

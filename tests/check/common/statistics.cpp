@@ -185,7 +185,7 @@ GST_END_TEST;
 GST_START_TEST (test_packets_are_counted_on_both_sides_and_the_lost_ones)
 {
   const Rig rig = ring_rig (1, 64, 48);
-  Watched enc ("neighbourcodeenc max-slice-size=400", range_caps (rig));
+  Watched enc ("neighbourcodeenc profile=plain max-slice-size=400", range_caps (rig));
   Watched pay (std::string ("rtpneighbourcodepay mtu=600") + kAtTheEnd, coded_caps (rig));
   for (int i = 0; i < 3; i++)
     gst_harness_push (pay.h, gst_harness_push_and_pull (enc.h, make_frame_set (rig, i * kFrame)));

@@ -109,8 +109,8 @@ static Received
 send (const Rig &rig, const char *network, const char *decoder = "", const char *coded = "")
 {
   const std::string launch =
-      std::string ("appsrc name=in format=time is-live=true ! neighbourcodeenc depth-bits=16 "
-                   "depth-threshold=0 colour-threshold=0 ! ") +
+      std::string ("appsrc name=in format=time is-live=true ! neighbourcodeenc profile=plain "
+                   "depth-bits=16 depth-threshold=0 colour-threshold=0 ! ") +
       coded + " rtpneighbourcodepay config-interval=-1 ! netsim " + network +
       " ! rtpjitterbuffer latency=150 ! rtpneighbourcodedepay ! neighbourcodedec name=dec " +
       decoder + " ! appsink name=out sync=false async=false";

@@ -23,7 +23,7 @@ struct Sent {
   explicit Sent (
       const Rig &rig, int frames = 3, const char *launch = "rtpneighbourcodepay mtu=1400")
   {
-    GstHarness *encoder = gst_harness_new ("neighbourcodeenc");
+    GstHarness *encoder = gst_harness_new_parse ("neighbourcodeenc profile=plain");
     gst_harness_set_src_caps (
         encoder, gstrange::make_range_caps (gstrange::make_info (rig, 25, 1)));
     GstHarness *h = gst_harness_new_parse (launch);
@@ -264,8 +264,8 @@ GST_END_TEST;
 
 GST_START_TEST (test_slice_too_long_for_the_mtu_is_one_error_that_says_what_to_set)
 {
-  GstHarness *h =
-      gst_harness_new_parse ("neighbourcodeenc max-slice-size=4000 ! rtpneighbourcodepay mtu=1400");
+  GstHarness *h = gst_harness_new_parse (
+      "neighbourcodeenc profile=plain max-slice-size=4000 ! rtpneighbourcodepay mtu=1400");
   GstBus *bus = gst_bus_new ();
   gst_element_set_bus (h->element, bus);
   const Rig rig = ring_rig (1);

@@ -25,7 +25,7 @@ same (Picture &a, Picture &b)
 EncoderSettings
 lossless ()
 {
-  return {16, 8, 0, 0, 1200};
+  return {16, 8, 0, 0, 1200, Profile::kPlain};
 }
 
 /* A view whose depth codes are depth - 3000 and whose colours are exact. */
@@ -98,7 +98,7 @@ TEST (NeighbourCode, threshold_0_is_lossless)
 TEST (NeighbourCode, differences_stay_within_thresholds_and_quantisation)
 {
   const Rig rig = ring_rig (1);
-  const EncoderSettings settings = {10, 6, 3, 2, 1200};
+  const EncoderSettings settings = {10, 6, 3, 2, 1200, Profile::kPlain};
   std::vector<Picture> pictures;
   pictures.emplace_back (0, Roi{0, 0, 320, 240}, 3, 8);
   AccessUnitDecoder decoder;
@@ -129,7 +129,8 @@ TEST (NeighbourCode, differences_stay_within_thresholds_and_quantisation)
 TEST (NeighbourCode, decoded_frame_set_codes_to_itself_again)
 {
   const Rig rig = ring_rig (1);
-  const EncoderSettings settings = {10, 6, 3, 2, 1200}, exact = {10, 6, 0, 0, 1200};
+  const EncoderSettings settings = {10, 6, 3, 2, 1200, Profile::kPlain},
+                        exact = {10, 6, 0, 0, 1200, Profile::kPlain};
   std::vector<Picture> pictures;
   pictures.emplace_back (0, Roi{0, 0, 200, 150}, 3, 8);
   AccessUnitDecoder decoder;

@@ -24,7 +24,7 @@ small_stream ()
   std::vector<Picture> pictures;
   pictures.emplace_back (0, Roi{7, 9, 24, 20}, 1, 6);
   pictures.emplace_back (1, Roi{0, 0, 16, 12}, 2, 6);
-  return encode (rig (), pictures, {10, 6, 2, 2, 256});
+  return encode (rig (), pictures, {10, 6, 2, 2, 256, Profile::kPlain});
 }
 
 struct Hostile : ::testing::Test {
@@ -160,7 +160,7 @@ TEST_F (Hostile, shuffled_and_duplicated_slices_decode_to_the_same)
 {
   std::vector<Picture> pictures;
   pictures.emplace_back (0, Roi{7, 9, 24, 20}, 1, 6);
-  const auto stream = encode (rig (), pictures, {16, 8, 0, 0, 256});
+  const auto stream = encode (rig (), pictures, {16, 8, 0, 0, 256, Profile::kPlain});
   auto units = units_of (stream);
   units.push_back (units[1]);
   std::shuffle (units.begin (), units.end (), std::mt19937 (3));
@@ -318,7 +318,7 @@ TEST_F (Hostile, roi_that_shrinks_to_its_slices_loses_no_pixel)
 {
   std::vector<Picture> pictures;
   pictures.emplace_back (0, Roi{7, 9, 200, 160}, 1, 6);
-  const auto units = units_of (encode (rig (), pictures, {10, 6, 2, 2, 256}));
+  const auto units = units_of (encode (rig (), pictures, {10, 6, 2, 2, 256, Profile::kPlain}));
   for (std::size_t i = 0; i + 5 < units.size (); i += 7) {
     const auto bytes = joined ({units[i], units[i + 2], units[i + 5]});
     const Decoded whole = decode (decoder, bytes), small = decode (decoder, bytes, {}, false);
@@ -343,7 +343,7 @@ TEST_F (Hostile, duplicate_of_one_slice_does_not_hide_the_loss_of_another)
 {
   std::vector<Picture> pictures;
   pictures.emplace_back (0, Roi{7, 9, 24, 20}, 1, 6);
-  auto units = units_of (encode (rig (), pictures, {16, 8, 0, 0, 256}));
+  auto units = units_of (encode (rig (), pictures, {16, 8, 0, 0, 256, Profile::kPlain}));
   ASSERT_GT (units.size (), 3u);
   for (std::size_t lost = 0; lost < units.size (); lost++)
     for (std::size_t twice = 0; twice < units.size (); twice++) {
@@ -363,8 +363,8 @@ TEST_F (Hostile, stray_slice_of_another_frame_clears_nothing)
 {
   std::vector<Picture> pictures;
   pictures.emplace_back (0, Roi{7, 9, 24, 20}, 1, 6);
-  auto bytes = encode (rig (), pictures, {16, 8, 0, 0, 256});
-  const auto stray = encode (rig (), pictures, {16, 8, 0, 0, 256}, nullptr, 77);
+  auto bytes = encode (rig (), pictures, {16, 8, 0, 0, 256, Profile::kPlain});
+  const auto stray = encode (rig (), pictures, {16, 8, 0, 0, 256, Profile::kPlain}, nullptr, 77);
   bytes.insert (bytes.end (), stray.begin (), stray.end ());
   Decoded decoded = decode_exact (decoder, bytes);
   EXPECT_EQ (decoded.result.missing_pixels, 0u);
@@ -386,7 +386,7 @@ struct Slices : Hostile {
     Hostile::SetUp ();
     pictures.emplace_back (0, Roi{7, 9, 24, 20}, 1, 6);
     EncoderResult result;
-    units = units_of (encode (rig (), pictures, {16, 8, 0, 0, 256}, &result));
+    units = units_of (encode (rig (), pictures, {16, 8, 0, 0, 256, Profile::kPlain}, &result));
     points = result.points;
     ASSERT_GT (units.size (), 3u);
   }
@@ -414,7 +414,8 @@ struct Slices : Hostile {
 
 TEST_F (Slices, strays_of_another_frame_that_come_first_cost_nothing_but_themselves)
 {
-  const auto strays = units_of (encode (rig (), pictures, {16, 8, 0, 0, 256}, nullptr, 77));
+  const auto strays =
+      units_of (encode (rig (), pictures, {16, 8, 0, 0, 256, Profile::kPlain}, nullptr, 77));
   auto sent = units;
   sent.insert (sent.begin (), strays.begin (), strays.begin () + 2);
   Decoded decoded = decode_exact (decoder, joined (sent));
@@ -430,7 +431,8 @@ TEST_F (Slices, stray_with_another_roi_that_comes_first_costs_nothing_but_itself
   std::vector<Picture> others;
   others.emplace_back (0, Roi{30, 2, 50, 60}, 2, 6);
   auto sent = units;
-  sent.insert (sent.begin (), units_of (encode (rig (), others, {16, 8, 0, 0, 256}))[1]);
+  sent.insert (
+      sent.begin (), units_of (encode (rig (), others, {16, 8, 0, 0, 256, Profile::kPlain}))[1]);
   Decoded decoded = decode_exact (decoder, joined (sent));
   EXPECT_EQ (decoded.result.slices, units.size ());
   EXPECT_EQ (decoded.result.bad_slices, 1u);
@@ -440,7 +442,8 @@ TEST_F (Slices, stray_with_another_roi_that_comes_first_costs_nothing_but_itself
 
 TEST_F (Slices, of_as_many_strays_as_right_ones_the_first_that_came_stay)
 {
-  const auto stray = units_of (encode (rig (), pictures, {16, 8, 0, 0, 256}, nullptr, 77))[2];
+  const auto stray =
+      units_of (encode (rig (), pictures, {16, 8, 0, 0, 256, Profile::kPlain}, nullptr, 77))[2];
   for (const bool stray_first : {false, true}) {
     const Decoded decoded = decode_exact (
         decoder, joined ({stray_first ? stray : units[0], stray_first ? units[0] : stray}));

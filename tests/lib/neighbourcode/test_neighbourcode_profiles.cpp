@@ -136,7 +136,7 @@ TEST_P (Profiles, smaller_than_plain_and_best_is_smaller_and_nearer_than_first)
 {
   std::vector<Picture> pictures;
   pictures.emplace_back (0, Roi{0, 0, 320, 240}, 3, 2);
-  EncoderSettings s = {};
+  EncoderSettings s = {.profile = Profile::kPlain};
   const std::size_t plain = encode (rig (), pictures, s).size ();
   s.profile = GetParam ();
   s.colour_threshold = 8;
