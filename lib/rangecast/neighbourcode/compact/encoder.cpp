@@ -38,17 +38,16 @@ public:
   std::size_t finish () { return coder_.finish (); }
 };
 
-/* Residuals are divided by multiplication, and half a step more makes up for what the reciprocal
- * lacks: sizes are below 2^17 and so float's 24 bits are enough for every step. */
-
+/* Differences divided by steps, to the nearest. Steps are odd, so no quotient lies in the middle,
+ * and differences are below 2^17, so float's 24 bits find the nearest for every step. Adding 1.5 x
+ * 2^23 leaves the integer in the lowest bits. */
 Components
-rounded (Components difference, Components half_steps, FloatComponents reciprocals)
+rounded (Components difference, FloatComponents reciprocals)
 {
-  const Components sign = difference >> 31;
-  const Components size = (difference ^ sign) - sign + half_steps;
-  const FloatComponents quotient =
-      (__builtin_convertvector(size, FloatComponents) + 0.5f) * reciprocals;
-  return (__builtin_convertvector(quotient, Components) ^ sign) - sign;
+  constexpr float kIntegers = 12582912;
+  const FloatComponents sum =
+      __builtin_convertvector(difference, FloatComponents) * reciprocals + kIntegers;
+  return reinterpret_cast<Components> (sum) - std::bit_cast<std::int32_t> (kIntegers);
 }
 
 /* States of copies of a neighbour, left or above. */
@@ -83,7 +82,7 @@ finer_settings (const CompactSettings &settings)
 
 /* ---- loading a row and choosing what its pixels become ---- */
 
-/* Quantises a row. */
+/* Quantises the valid pixels of a row. */
 inline void
 CompactEncoder::load_row (const ConstRangeImage &image, int y)
 {
@@ -91,25 +90,29 @@ CompactEncoder::load_row (const ConstRangeImage &image, int y)
   const Rgbx *colour = image.colour.row (y) + header_.first_column;
   const DepthQuantiser &d = quantisers_->depth;
   const ColourQuantiser &c = quantisers_->colour;
-  const auto columns = static_cast<std::size_t> (columns_);
   PixelKey *const own = own_.data ();
-  std::uint8_t *const valid = row_.valid ().data ();
-  for (std::size_t x = 0; x < columns; x++)
+  const std::span<std::uint8_t> valid (row_.valid ());
+  for (std::size_t x = 0; x < valid.size (); x++)
     valid[x] = d.valid (depth[x]);
-  for (std::size_t x = 0; x < columns; x++)
-    own[x] = d.code (depth[x]);
-  if (c.bits () < 8)
-    for (std::size_t x = 0; x < columns; x++)
-      own[x] |=
-          key_of (0, c.code (colour[x].r) | c.code (colour[x].g) << 8 | c.code (colour[x].b) << 16);
-  else
-    for (std::size_t x = 0; x < columns; x++) {
-      std::uint32_t rgbx = 0;
-      std::memcpy (&rgbx, colour + x, sizeof rgbx);
-      if constexpr (std::endian::native == std::endian::big)
-        rgbx = __builtin_bswap32 (rgbx);
-      own[x] |= key_of (0, rgbx);
-    }
+  for (int run = run_end (valid, 0, false); run < columns_;) {
+    const int run_after = run_end (valid, run, true);
+    const auto begin = static_cast<std::size_t> (run), end = static_cast<std::size_t> (run_after);
+    for (std::size_t x = begin; x < end; x++)
+      own[x] = d.code (depth[x]);
+    if (c.bits () < 8)
+      for (std::size_t x = begin; x < end; x++)
+        own[x] |= key_of (
+            0, c.code (colour[x].r) | c.code (colour[x].g) << 8 | c.code (colour[x].b) << 16);
+    else
+      for (std::size_t x = begin; x < end; x++) {
+        std::uint32_t rgbx = 0;
+        std::memcpy (&rgbx, colour + x, sizeof rgbx);
+        if constexpr (std::endian::native == std::endian::big)
+          rgbx = __builtin_bswap32 (rgbx);
+        own[x] |= key_of (0, rgbx);
+      }
+    run = run_end (valid, run_after, false);
+  }
 }
 
 /* Finds the motion of the blocks that begin or continue in row y. They refer to rows of their band
@@ -193,8 +196,7 @@ inline CompactEncoder::FullPixel
 CompactEncoder::make_full (PixelKey own, const Neighbours &n) const
 {
   const Components expected = predict (n, last_, limits_.max);
-  const Components residual =
-      rounded (components_of_key (own) - expected, half_steps_, reciprocals_);
+  const Components residual = rounded (components_of_key (own) - expected, reciprocals_);
   const Components made = clamped (expected + residual * steps_, limits_.min, limits_.max);
   return {residual, pack_components (made), key_of (to_rgb (made, limits_))};
 }
@@ -271,7 +273,7 @@ CompactEncoder::best_choice (
     full = {residual, pack_components (made), key};
     return true;
   };
-  Components residual = rounded (components_of_key (own) - expected, half_steps_, reciprocals_);
+  Components residual = rounded (components_of_key (own) - expected, reciprocals_);
   attempt (residual, true);
   for (int i = 0; i < kComponents; i++)
     if (residual[i] != 0) {
@@ -580,7 +582,6 @@ CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &ba
   depth_weight_ = weight (depth);
   colour_weight_ = weight (colour);
   steps_ = steps_within (depth, colour).components ();
-  half_steps_ = steps_ / 2;
   reciprocals_ = 1.0f / __builtin_convertvector(steps_, FloatComponents);
   limits_ =
       PixelLimits (quantisers_->depth.codes () - 1, (1 << quantisers_->colour.bits ()) - 1, steps_);

@@ -92,7 +92,7 @@ private:
   MotionMemory *motion_memory_ = nullptr;
   SliceHeader header_;
   EncoderResult result_;
-  Components steps_{}, half_steps_{};
+  Components steps_{};
   FloatComponents reciprocals_{};
   PixelLimits limits_;
   MotionScale scale_;
