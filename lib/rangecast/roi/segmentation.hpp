@@ -4,8 +4,10 @@
 #include <array>
 #include <opencv2/core.hpp>
 
+#include "../geometry/components.hpp"
 #include "background.hpp"
 #include "depth_fill.hpp"
+#include "majority.hpp"
 #include "surroundings.hpp"
 
 namespace rangecast {
@@ -94,7 +96,9 @@ private:
   cv::Mat dark_beside_, dark_, by_colour_;
   cv::Mat ratio_, tolerance_; /* brightness relative to the background, and its noise */
   cv::Mat behind_, light_beside_, opened_, kernel_, guard_;
-  cv::Mat mask_, inverse_, labels_, stats_, centroids_, steps_, speckles_;
+  cv::Mat mask_, inverse_, steps_;
+  Components components_;
+  Majority majority_;
   DepthFill fill_;
   Surroundings surroundings_;
   std::vector<int> areas_;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "../base/simd.hpp"
+
 namespace rangecast {
 
 void
@@ -27,55 +29,88 @@ Surroundings::halve (const cv::Mat &sides)
   }
 }
 
+namespace {
+
+/* What the pixels of a row see one step further, given what the next pixels in that direction are
+ * and see. Columns are those of the next pixels. */
+void
+step_row (const std::uint8_t *__restrict side, const std::uint8_t *__restrict seen,
+    const std::uint8_t *__restrict distance, int n, int reach, std::uint8_t *__restrict new_seen,
+    std::uint8_t *__restrict new_distance)
+{
+  const auto most = static_cast<std::uint8_t> (reach);
+  for (int x = 0; x < n; x++) {
+    const auto farther = static_cast<std::uint8_t> (distance[x] + 1);
+    new_seen[x] = side[x] ? side[x] : seen[x];
+    new_distance[x] = side[x] ? std::uint8_t{1} : std::min (farther, most);
+  }
+}
+
+void
+count_row (const std::uint8_t *__restrict seen, const std::uint8_t *__restrict distance, int n,
+    int reach, std::uint8_t *__restrict foreground, std::uint8_t *__restrict background)
+{
+  for (int x = 0; x < n; x++) {
+    const bool within = distance[x] < reach;
+    foreground[x] =
+        std::uint8_t (foreground[x] + (within & (seen[x] == std::uint8_t (Side::kForeground))));
+    background[x] =
+        std::uint8_t (background[x] + (!within | (seen[x] == std::uint8_t (Side::kBackground))));
+  }
+}
+
+} // namespace
+
 /* Four of the eight directions: along the row, and to three pixels of the previous row, which is
- * above for step 1 and below for step -1. */
+ * above for step 1 and below for step -1. Rows have a border of one pixel, from which a pixel sees
+ * nothing. */
 void
 Surroundings::look (int reach, int step)
 {
-  const cv::Mat &sides = blocks_;
-  const int width = sides.cols, height = sides.rows;
-  /* A pixel sees its neighbour in a direction, or what that one sees. */
-  const auto beyond = [reach] (Side side, Sight neighbour) -> Sight {
-    if (side != Side::kUnknown)
-      return {side, 1};
-    if (neighbour.distance >= reach)
-      return neighbour;
-    return {neighbour.side, static_cast<std::uint8_t> (neighbour.distance + 1)};
-  };
-  const auto count = [reach] (Sight sight, std::uint8_t &foreground, std::uint8_t &background) {
-    const bool within = sight.distance < reach;
-    foreground += within && sight.side == Side::kForeground;
-    background += !within || sight.side == Side::kBackground;
-  };
+  static_assert (int (Side::kUnknown) == 0);
+  const int width = blocks_.cols, height = blocks_.rows;
+  const auto n = static_cast<std::size_t> (width) + 2;
+  side_before_.assign (n, 0);
   for (auto *rows : {before_, row_})
-    for (int k = 0; k < 3; k++)
-      rows[k].assign (static_cast<std::size_t> (width), {});
+    for (int k = 0; k < 3; k++) {
+      rows[k].seen.assign (n, 0);
+      rows[k].distance.assign (n, 0);
+    }
+  along_.seen.resize (n);
+  along_.distance.resize (n);
   const int first = step > 0 ? 0 : height - 1;
   for (int i = 0, y = first; i < height; i++, y += step) {
-    const auto side = sides.ptr<std::uint8_t> (y);
-    const auto side_before = i > 0 ? sides.ptr<std::uint8_t> (y - step) : nullptr;
+    const auto side = blocks_.ptr<std::uint8_t> (y);
     auto foreground = foreground_.ptr<std::uint8_t> (y),
          background = background_.ptr<std::uint8_t> (y);
-    Sight along;
+    std::uint8_t seen = 0, distance = 0;
     for (int j = 0, x = step > 0 ? 0 : width - 1; j < width; j++, x += step) {
-      along = j > 0 ? beyond (Side (side[x - step]), along) : Sight{};
-      count (along, foreground[x], background[x]);
-      for (int k = 0; k < 3; k++) {
-        const int u = x + k - 1;
-        const bool outside = !side_before || u < 0 || u >= width;
-        row_[k][x] = outside ? Sight{} : beyond (Side (side_before[u]), before_[k][u]);
-        count (row_[k][x], foreground[x], background[x]);
-      }
+      const std::uint8_t next = j > 0 ? side[x - step] : 0;
+      seen = next ? next : seen;
+      distance =
+          next ? std::uint8_t{1} : static_cast<std::uint8_t> (std::min (distance + 1, reach));
+      along_.seen[static_cast<std::size_t> (x)] = seen;
+      along_.distance[static_cast<std::size_t> (x)] = distance;
     }
-    for (int k = 0; k < 3; k++)
-      std::swap (row_[k], before_[k]);
+    for_this_cpu ([&] {
+      count_row (
+          along_.seen.data (), along_.distance.data (), width, reach, foreground, background);
+      for (int k = 0; k < 3; k++) {
+        step_row (side_before_.data () + k, before_[k].seen.data () + k,
+            before_[k].distance.data () + k, width, reach, row_[k].seen.data () + 1,
+            row_[k].distance.data () + 1);
+        count_row (row_[k].seen.data () + 1, row_[k].distance.data () + 1, width, reach, foreground,
+            background);
+        std::swap (row_[k], before_[k]);
+      }
+    });
+    std::copy_n (side, width, side_before_.begin () + 1);
   }
 }
 
 void
 Surroundings::find_inside (const cv::Mat &sides, int reach, cv::Mat &inside)
 {
-  constexpr int kMinDirections = 4;
   halve (sides);
   inside.create (sides.size (), CV_8U);
   inside.setTo (0);
@@ -87,15 +122,32 @@ Surroundings::find_inside (const cv::Mat &sides, int reach, cv::Mat &inside)
   background_.setTo (0);
   look (std::max (1, reach / 2), 1);
   look (std::max (1, reach / 2), -1);
+  for_this_cpu ([&] { choose (sides, inside); });
+}
+
+/* The pixels without a side whose block sees foreground in enough directions. */
+void
+Surroundings::choose (const cv::Mat &sides, cv::Mat &inside)
+{
+  constexpr int kMinDirections = 4;
+  const int width = sides.cols, n = blocks_.cols;
+  enough_.resize (2 * static_cast<std::size_t> (n));
+  std::uint8_t *__restrict enough = enough_.data ();
   for (int y = 0; y < sides.rows; y++) {
     const auto side = sides.ptr<std::uint8_t> (y);
-    const auto foreground = foreground_.ptr<std::uint8_t> (y / 2),
-               background = background_.ptr<std::uint8_t> (y / 2);
-    auto in = inside.ptr<std::uint8_t> (y);
-    for (int x = 0; x < sides.cols; x++)
-      if (Side (side[x]) == Side::kUnknown && foreground[x / 2] >= kMinDirections &&
-          foreground[x / 2] >= 3 * background[x / 2])
-        in[x] = 255;
+    if (y % 2 == 0) {
+      const auto foreground = foreground_.ptr<std::uint8_t> (y / 2),
+                 background = background_.ptr<std::uint8_t> (y / 2);
+      for (int x = 0; x < n; x++) {
+        const std::uint8_t yes =
+            (foreground[x] >= kMinDirections) & (foreground[x] >= 3 * background[x]) ? 255 : 0;
+        enough[2 * x] = yes;
+        enough[2 * x + 1] = yes;
+      }
+    }
+    std::uint8_t *__restrict in = inside.ptr<std::uint8_t> (y);
+    for (int x = 0; x < width; x++)
+      in[x] = side[x] == std::uint8_t (Side::kUnknown) ? enough[x] : std::uint8_t{0};
   }
 }
 

@@ -23,14 +23,18 @@ public:
   void find_inside (const cv::Mat &sides, int reach, cv::Mat &inside);
 
 private:
-  struct Sight {
-    Side side = Side::kUnknown; /* beyond the image border */
-    std::uint8_t distance = 1;
+  /* What the pixels of a row see in one direction: a value of Side, and its distance. */
+  struct Sights {
+    std::vector<std::uint8_t> seen, distance;
   };
   void halve (const cv::Mat &sides);
   void look (int reach, int step);
+  void choose (const cv::Mat &sides, cv::Mat &inside);
 
-  std::vector<Sight> before_[3], row_[3]; /* previous row, current row: three directions */
+  Sights before_[3], row_[3]; /* previous row, current row: three directions */
+  Sights along_;
+  std::vector<std::uint8_t> side_before_; /* of the previous row */
+  std::vector<std::uint8_t> enough_;      /* of a row, by pixel: 255 = sees enough foreground */
   cv::Mat blocks_;                        /* CV_8U: sides of 2x2 pixels */
   cv::Mat foreground_, background_;       /* CV_8U: number of directions in which it is seen */
 };

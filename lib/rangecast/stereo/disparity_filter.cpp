@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
 
 namespace rangecast {
@@ -226,80 +227,26 @@ DisparityFilter::clear_doubled (const cv::Mat &left, const cv::Mat &right, int r
 
 /* ---- specks ---- */
 
-int
-DisparityFilter::find_root (int run)
-{
-  while (runs_[std::size_t (run)].root != run) {
-    const int up = runs_[std::size_t (run)].root;
-    run = runs_[std::size_t (run)].root = runs_[std::size_t (up)].root;
-  }
-  return run;
-}
-
-/* Merges runs a to a_end of a row with runs a_end to b_end of the row below. */
-void
-DisparityFilter::join_rows (const std::int16_t *upper, const std::int16_t *lower, std::size_t a,
-    std::size_t a_end, std::size_t b_end, int range)
-{
-  for (std::size_t b = a_end; a < a_end && b < b_end;) {
-    const int x0 = std::max (runs_[a].x0, runs_[b].x0), x1 = std::min (runs_[a].x1, runs_[b].x1);
-    bool touch = false;
-    for (int x = x0; x < x1 && !touch; x++)
-      touch = std::abs (upper[x] - lower[x]) <= range;
-    if (touch) {
-      const int one = find_root (int (a)), other = find_root (int (b));
-      if (one != other) {
-        runs_[std::size_t (other)].root = one;
-        runs_[std::size_t (one)].size += runs_[std::size_t (other)].size;
-      }
-    }
-    runs_[a].x1 <= runs_[b].x1 ? a++ : b++;
-  }
-}
-
-/* Finds the runs of one row, from x0 to x1. */
-void
-DisparityFilter::find_runs (const std::int16_t *d, int x0, int x1, int range, int min)
-{
-  for (int x = x0; x < x1;) {
-    if (d[x] < min) {
-      x++;
-      continue;
-    }
-    const int begin = x++;
-    while (x < x1 && d[x] >= min && std::abs (d[x] - d[x - 1]) <= range)
-      x++;
-    runs_.push_back ({begin, x, int (runs_.size ()), x - begin});
-  }
-}
-
 void
 DisparityFilter::clear_specks (
     int window, int range, int min, int nearest, const Tiles &tiles, cv::Mat &disparity)
 {
-  runs_.clear ();
-  first_runs_.assign (std::size_t (disparity.rows) + 1, 0);
-  std::size_t next = 0; /* first row without first_runs_ */
+  components_.clear ();
+  int next = 0;
   for (const cv::Rect &part : tiles.parts ()) {
-    const std::size_t top = std::size_t (part.y);
-    for (; next <= top; next++)
-      first_runs_[next] = runs_.size ();
-    for (std::size_t y = top; y < top + std::size_t (part.height); y++) {
-      const auto row = disparity.ptr<std::int16_t> (int (y));
-      find_runs (row, part.x, part.br ().x, range, nearest);
-      first_runs_[y + 1] = runs_.size ();
-      if (y > 0 && first_runs_[y - 1] < first_runs_[y])
-        join_rows (disparity.ptr<std::int16_t> (int (y) - 1), row, first_runs_[y - 1],
-            first_runs_[y], runs_.size (), range);
-    }
-    next = top + std::size_t (part.height) + 1;
+    for (; next < part.y; next++)
+      components_.add_empty_row ();
+    for (; next < part.br ().y; next++)
+      components_.add_level_row (disparity.ptr<std::int16_t> (next),
+          disparity.ptr<std::int16_t> (std::max (0, next - 1)), part.x, part.br ().x, nearest,
+          range);
   }
   for (const cv::Rect &part : tiles.parts ())
     for (int y = part.y; y < part.br ().y; y++) {
       auto row = disparity.ptr<std::int16_t> (y);
-      for (std::size_t i = first_runs_[std::size_t (y)]; i < first_runs_[std::size_t (y) + 1]; i++)
-        if (runs_[std::size_t (find_root (int (i)))].size <= window)
-          std::fill (row + runs_[i].x0, row + runs_[i].x1, std::int16_t (min - 16));
+      for (const Components::Run &run : components_.row (y))
+        if (components_.size_of (run) <= window)
+          std::fill (row + run.x0, row + run.x1, std::int16_t (min - 16));
     }
 }
 
@@ -316,6 +263,26 @@ is_between (const cv::Vec4b &p, const cv::Vec4b &a, const cv::Vec4b &b)
     if (p[c] < std::min (a[c], b[c]) - kLike || p[c] > std::max (a[c], b[c]) + kLike)
       return false;
   return true;
+}
+
+/* Whether row y ends a gap, by column.
+ *  @param last  rows with a disparity before, or INT16_MIN */
+void
+find_ends (const std::int16_t *__restrict d, int n, int min, int y, int width,
+    const std::int16_t *__restrict last, std::uint8_t *__restrict ends)
+{
+  const auto first = std::int16_t (std::max (0, y - 1 - width)), end = std::int16_t (y - 1),
+             lowest = std::int16_t (min);
+  for (int i = 0; i < n; i++)
+    ends[i] = (d[i] >= lowest) & (last[i] >= first) & (last[i] < end);
+}
+
+void
+move_last (const std::int16_t *__restrict d, int n, int min, int y, std::int16_t *__restrict last)
+{
+  const auto lowest = std::int16_t (min), now = std::int16_t (y);
+  for (int i = 0; i < n; i++)
+    last[i] = d[i] >= lowest ? now : last[i];
 }
 
 /* Fills elements `last` + 1 to i - 1 of a row or column if they are a gap in one surface. Steps are
@@ -340,42 +307,62 @@ void
 DisparityFilter::fill_gaps (
     const cv::Mat &colour, int width, int min, const Tiles &tiles, cv::Mat &disparity)
 {
-  tiles.each ([&] (const cv::Rect &tile, std::size_t) {
+  memory_.reserve (tiles.workers ());
+  tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
+    std::vector<std::uint8_t> &known = memory_.of (worker).known;
+    known.resize (std::size_t (tile.width));
     for (int y = tile.y; y < tile.br ().y; y++) {
-      auto d = disparity.ptr<std::int16_t> (y);
-      int last = -1; /* with a disparity */
-      for (int x = tile.x; x < tile.br ().x; x++) {
-        if (d[x] < min)
-          continue;
-        if (last >= 0 && x - last > 1 && x - last - 1 <= width)
-          fill_gap (colour.ptr<cv::Vec4b> (y), 1, d, 1, last, x);
-        last = x;
+      const auto d = disparity.ptr<std::int16_t> (y);
+      for (int i = 0; i < tile.width; i++)
+        known[std::size_t (i)] = d[tile.x + i] >= min;
+      const auto find = [&] (int from, int value) {
+        const void *found =
+            std::memchr (known.data () + from, value, std::size_t (tile.width - from));
+        return found ? int (static_cast<const std::uint8_t *> (found) - known.data ()) : tile.width;
+      };
+      for (int end, begin = find (find (0, 1), 0); begin < tile.width; begin = find (end, 0)) {
+        end = find (begin, 1);
+        if (end < tile.width && end - begin <= width)
+          fill_gap (colour.ptr<cv::Vec4b> (y), 1, d, 1, tile.x + begin - 1, tile.x + end);
       }
     }
   });
-  /* Columns are processed in groups, in memory order; threads share the groups. */
+  fill_gaps_of_columns (colour, width, min, tiles, disparity);
+}
+
+/* Columns are processed in groups, in memory order; threads share the groups. */
+void
+DisparityFilter::fill_gaps_of_columns (
+    const cv::Mat &colour, int width, int min, const Tiles &tiles, cv::Mat &disparity)
+{
   constexpr int kColumns = 64;
   const cv::Rect hull = tiles.hull ();
-  last_rows_.assign (std::size_t (disparity.cols), -1);
   in_parallel (std::size_t ((hull.width + kColumns - 1) / kColumns), tiles.n_threads (),
       [&] (std::size_t stripe) {
-        const int begin = hull.x + int (stripe) * kColumns,
-                  end = std::min (begin + kColumns, hull.br ().x);
-        for (const cv::Rect &part : tiles.parts ())
-          for (int y = part.y; y < part.br ().y; y++) {
-            const auto d = disparity.ptr<std::int16_t> (y);
-            for (int x = std::max (begin, part.x); x < std::min (end, part.br ().x); x++) {
-              if (d[x] < min)
-                continue;
-              int &last = last_rows_[std::size_t (x)];
-              if (last >= 0 && y - last > 1 && y - last - 1 <= width)
-                fill_gap (colour.ptr<cv::Vec4b> (0) + x,
+        for_this_cpu ([&] {
+          const int x0 = hull.x + int (stripe) * kColumns;
+          std::int16_t last[kColumns]; /* rows with a disparity */
+          std::uint8_t ends[kColumns] = {};
+          std::fill_n (last, kColumns, std::int16_t{INT16_MIN});
+          for (const cv::Rect &part : tiles.parts ()) {
+            const int begin = std::max (x0, part.x) - x0,
+                      end = std::min (x0 + kColumns, part.br ().x) - x0;
+            for (int y = part.y; begin < end && y < part.br ().y; y++) {
+              const auto d = disparity.ptr<std::int16_t> (y) + x0;
+              find_ends (d + begin, end - begin, min, y, width, last + begin, ends + begin);
+              const std::uint8_t *at = ends + begin;
+              while (const void *found = std::memchr (at, 1, std::size_t (ends + end - at))) {
+                at = static_cast<const std::uint8_t *> (found);
+                const int i = int (at++ - ends);
+                fill_gap (colour.ptr<cv::Vec4b> (0) + x0 + i,
                     std::ptrdiff_t (colour.step / sizeof (cv::Vec4b)),
-                    disparity.ptr<std::int16_t> (0) + x, std::ptrdiff_t (disparity.step1 ()), last,
-                    y);
-              last = y;
+                    disparity.ptr<std::int16_t> (0) + x0 + i, std::ptrdiff_t (disparity.step1 ()),
+                    last[i], y);
+              }
+              move_last (d + begin, end - begin, min, y, last + begin);
             }
           }
+        });
       });
 }
 

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "../geometry/components.hpp"
 #include "box_sum.hpp"
 #include "tiles.hpp"
 
@@ -58,26 +59,18 @@ private:
     Plane grey, contrast, valid, difference, size; /* of pixels, and sums over patches */
     Plane contrasts, counts, differences, sizes, sums;
     std::vector<std::int16_t> columns, nearest;
+    std::vector<std::uint8_t> known;          /* by column of a tile: 1 = has a disparity */
     std::vector<std::array<int, 2>> surfaces; /* of a row: first column, last column + 1 */
-  };
-  /* Connected pixels of a row. */
-  struct Run {
-    int x0, x1;     /* columns, without x1 */
-    int root, size; /* index of a run of the same component; its pixels, in the root run */
   };
   void compare_patches (const cv::Mat &left, const cv::Mat &right, int right_x, int min,
       const cv::Rect &tile, const cv::Mat &disparity, Memory &memory) const;
-  void find_runs (const std::int16_t *row, int x0, int x1, int range, int min);
-  void join_rows (const std::int16_t *upper, const std::int16_t *lower, std::size_t a,
-      std::size_t a_end, std::size_t b_end, int range);
-  [[nodiscard]] int find_root (int run);
+  static void fill_gaps_of_columns (
+      const cv::Mat &colour, int width, int min, const Tiles &tiles, cv::Mat &disparity);
   static void clear_doubled_of_row (const std::uint8_t *left, const std::uint8_t *right,
       int right_width, int right_x, int min, int width, Memory &memory, std::int16_t *disparity);
 
   WorkerMemory<Memory> memory_;
-  std::vector<Run> runs_;
-  std::vector<std::size_t> first_runs_; /* by row of the image, and one for the end */
-  std::vector<int> last_rows_;          /* by column: last row with a disparity */
+  Components components_;
 };
 
 } // namespace rangecast

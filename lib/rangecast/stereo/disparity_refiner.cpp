@@ -42,7 +42,7 @@ public:
    *  @param columns scratch memory; @param[out] sums  those of the row, after next() */
   WindowSums (
       const T *from, std::ptrdiff_t step, int width, std::vector<T> &columns, std::vector<T> &sums)
-      : gone_ (from), next_ (from), step_ (step), width_ (width)
+      : next_ (from), step_ (step), width_ (width)
   {
     const auto n = std::size_t (width) + kSide - 1;
     columns.assign (2 * n, 0);
@@ -60,21 +60,23 @@ public:
     T *__restrict columns = columns_, *__restrict threes = threes_, *__restrict sums = sums_;
     const T *__restrict come = next_, *__restrict go = gone_;
     const int n = width_ + kSide - 1;
-    for (int x = 0; x < n; x++)
-      columns[x] = T (columns[x] + come[x]);
+    if (!go)
+      for (int x = 0; x < n; x++)
+        columns[x] = T (columns[x] + come[x]);
+    else
+      for (int x = 0; x < n; x++)
+        columns[x] = T (T (columns[x] - go[x]) + come[x]);
     for (int x = 0; x < n - 2; x++)
       threes[x] = T (columns[x] + columns[x + 1] + columns[x + 2]);
     const T *last = kSide == 9 ? threes : columns;
     for (int x = 0; x < width_; x++)
       sums[x] = T (threes[x] + threes[x + 3] + last[x + 6]);
-    for (int x = 0; x < n; x++)
-      columns[x] = T (columns[x] - go[x]);
     next_ += step_;
-    gone_ += step_;
+    gone_ = next_ - kSide * step_;
   }
 
 private:
-  const T *gone_, *next_;
+  const T *next_, *gone_ = nullptr; /* rows that come in and go out */
   const std::ptrdiff_t step_;
   const int width_;
   T *columns_, *threes_, *sums_;

@@ -4,6 +4,7 @@
 #include "silhouette_filter.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <opencv2/core/hal/intrin.hpp>
 
 #include "../base/simd.hpp"
@@ -67,13 +68,35 @@ cut (const cv::Mat &picture, const cv::Rect &tile, int around, Plane &to)
   }
 }
 
+/* Splits every second pixel of a row into planes, from column x0 of theirs on. */
+void
+take_every_second (
+    const std::uint32_t *__restrict pixels, int n, std::uint8_t *const (&planes)[4], int x0)
+{
+  constexpr int kAtOnce = 64;
+  constexpr bool kLittle = std::endian::native == std::endian::little;
+  for (int begin = 0; begin < n; begin += kAtOnce) {
+    const int end = std::min (kAtOnce, n - begin);
+    std::uint32_t chosen[kAtOnce];
+    for (int i = 0; i < end; i++)
+      chosen[i] = pixels[2 * (begin + i)];
+    for (int c = 0; c < 3; c++) {
+      const int shift = kLittle ? 8 * c : 24 - 8 * c;
+      std::uint8_t *__restrict to = planes[c] + x0 + begin;
+      for (int i = 0; i < end; i++)
+        to[i] = std::uint8_t (chosen[i] >> shift);
+    }
+  }
+}
+
 } // namespace
 
 void
 SilhouetteFilter::sample (
-    int radius, const cv::Mat &colour, const cv::Mat &disparity, int n_threads)
+    const Settings &settings, const cv::Mat &colour, const cv::Mat &disparity, int n_threads)
 {
-  pad_ = radius / 2 + 1; /* windows stay inside */
+  const bool sample_colour = !settings.same_picture;
+  pad_ = settings.radius / 2 + 1; /* windows stay inside */
   const int cols = (disparity.cols + 1) / 2, rows = (disparity.rows + 1) / 2;
   samples_.set_size (cols + 2 * pad_ + kLanes, rows + 2 * pad_);
   const auto width = std::size_t (samples_.width ());
@@ -88,19 +111,20 @@ SilhouetteFilter::sample (
           std::uint8_t *to[4];
           for (int c = 0; c < 4; c++)
             to[c] = colours_[c].data () + std::size_t (v) * width;
-          std::fill_n (to[3], width, std::uint8_t{255});
+          if (sample_colour)
+            std::fill_n (to[3], width, std::uint8_t{255});
           std::int16_t *depth = samples_.row (v);
           std::fill_n (depth, width, std::int16_t{0});
           const int y = 2 * (v - pad_);
           if (y < 0 || y >= disparity.rows)
             continue;
-          const auto from = colour.ptr<cv::Vec4b> (y);
+          const auto from = colour.ptr<std::uint32_t> (y);
           const auto d = disparity.ptr<std::int16_t> (y);
-          std::fill_n (to[3] + pad_, cols, std::uint8_t{0});
+          if (sample_colour)
+            std::fill_n (to[3] + pad_, cols, std::uint8_t{0});
           for_this_cpu ([&] {
-            for (int c = 0; c < 3; c++)
-              for (int x = 0; x < cols; x++)
-                to[c][pad_ + x] = from[2 * x][c];
+            if (sample_colour)
+              take_every_second (from, cols, to, pad_);
             for (int x = 0; x < cols; x++)
               depth[pad_ + x] = d[2 * x];
           });
@@ -230,7 +254,7 @@ void
 SilhouetteFilter::apply (const Settings &settings, const cv::Mat &colour, const Tiles &tiles,
     const cv::Mat &disparity, cv::Mat &to)
 {
-  sample (settings.radius, colour, disparity, tiles.n_threads ());
+  sample (settings, colour, disparity, tiles.n_threads ());
   memory_.reserve (tiles.workers ());
   tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
     apply_to (settings, colour, tile, disparity, memory_.of (worker), to);

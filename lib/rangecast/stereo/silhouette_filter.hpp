@@ -26,6 +26,8 @@ public:
     bool only_beyond = false;
     /** With only_beyond: 1/16 pixel; skip pixels that have none this far around them. */
     int look_near = 0;
+    /** `radius` and `colour` are those of the last call, whose samples are used again. */
+    bool same_picture = false;
   };
 
   /** @param colour     CV_8UC4, of the disparities' size
@@ -43,7 +45,8 @@ private:
     int same = 0, near = 0; /* of disparity d, nearer */
     int far = 0, none = 0;  /* farther, without depth; unless kCountNone, both are in `far` */
   };
-  void sample (int radius, const cv::Mat &colour, const cv::Mat &disparity, int n_threads);
+  void sample (
+      const Settings &settings, const cv::Mat &colour, const cv::Mat &disparity, int n_threads);
   template <typename Count>
   void for_window (const cv::Vec4b &own, int x, int y, int radius, const Count &count) const;
   template <bool kCountNone>

@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <random>
+#include <rangecast/base/cpu.hpp>
 #include <rangecast/roi/background.hpp>
 #include <rangecast/roi/segmentation.hpp>
 #include <rangecast/roi/surroundings.hpp>
@@ -190,6 +191,60 @@ TEST (Background, depth_goes_on_farther_where_the_hue_differs)
     segment (frame);
     EXPECT_EQ (frame.valid (30, 12, 3, 24), 3 * 24) << hue;
     EXPECT_EQ (frame.valid (38, 12, 9, 24), hue ? 9 * 24 : 0) << hue;
+  }
+}
+
+TEST (Surroundings, equal_a_walk_from_each_block_in_eight_directions)
+{
+  constexpr int kReach = 24; /* pixels: 12 blocks */
+  cv::RNG random (4);
+  for (const cv::Size size : {cv::Size (1, 1), {6, 3}, {97, 61}, {160, 120}}) {
+    cv::Mat sides (size, CV_8U), inside;
+    for (int y = 0; y < size.height; y++)
+      for (int x = 0; x < size.width; x++)
+        sides.at<std::uint8_t> (y, x) = std::uint8_t (random.uniform (0, 30) > 1 ? 0
+                                                      : random.uniform (0, 4)    ? 2
+                                                                                 : 1);
+    const cv::Size blocks ((size.width + 1) / 2, (size.height + 1) / 2);
+    const auto block = [&] (int bx, int by) {
+      int sum = 0;
+      for (int i = 0; i < 4; i++) {
+        const int x = std::min (2 * bx + i % 2, size.width - 1),
+                  y = std::min (2 * by + i / 2, size.height - 1),
+                  side = sides.at<std::uint8_t> (y, x);
+        sum += (side == 2) - (side == 1);
+      }
+      return sum;
+    };
+    const auto is_inside = [&] (int bx, int by) {
+      int foreground = 0, background = 0;
+      for (int i = 0; i < 9; i++) {
+        const int dx = i % 3 - 1, dy = i / 3 - 1;
+        if (dx == 0 && dy == 0)
+          continue;
+        bool found = false;
+        for (int t = 1; t < kReach / 2 && !found; t++) {
+          const int x = bx + t * dx, y = by + t * dy;
+          const bool outside = x < 0 || y < 0 || x >= blocks.width || y >= blocks.height;
+          const int sum = outside ? 0 : block (x, y);
+          foreground += sum > 0;
+          background += sum < 0;
+          found = outside || sum != 0;
+        }
+        background += !found;
+      }
+      return foreground >= 4 && foreground >= 3 * background;
+    };
+    for (CpuLevel level : kCpuLevels) {
+      limit_cpu (level);
+      Surroundings surroundings;
+      surroundings.find_inside (sides, kReach, inside);
+      for (int y = 0; y < size.height; y++)
+        for (int x = 0; x < size.width; x++)
+          ASSERT_EQ (inside.at<std::uint8_t> (y, x) != 0,
+              sides.at<std::uint8_t> (y, x) == 0 && is_inside (x / 2, y / 2))
+              << size << " at " << x << ", " << y;
+    }
   }
 }
 
