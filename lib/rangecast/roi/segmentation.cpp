@@ -181,7 +181,7 @@ Segmenter::remove_small (cv::Mat &mask, int min_area, int keep)
   for (int y = 0; y < mask.rows; y++)
     components_.add_mask_row (mask.ptr (y), mask.cols);
   areas_.clear ();
-  for (const Components::Run &run : components_.runs ())
+  for (const ConnectedComponents::Run &run : components_.runs ())
     if (components_.is_root (run))
       areas_.push_back (run.size);
   int min_kept = min_area;
@@ -192,7 +192,7 @@ Segmenter::remove_small (cv::Mat &mask, int min_area, int keep)
   if (std::ranges::none_of (areas_, [min_kept] (int area) { return area < min_kept; }))
     return;
   for (int y = 0; y < mask.rows; y++)
-    for (const Components::Run &run : components_.row (y))
+    for (const ConnectedComponents::Run &run : components_.row (y))
       if (components_.size_of (run) < min_kept)
         std::fill (mask.ptr (y) + run.x0, mask.ptr (y) + run.x1, std::uint8_t{0});
 }
@@ -252,7 +252,7 @@ Segmenter::remove_small_in_space (
     components_.add_level_row (steps_.ptr<std::int16_t> (y),
         steps_.ptr<std::int16_t> (std::max (0, y - 1)), 0, image.roi.width, 1, kStep);
   for (int y = 0; y < image.roi.height; y++)
-    for (const Components::Run &run : components_.row (y))
+    for (const ConnectedComponents::Run &run : components_.row (y))
       if (components_.size_of (run) < min_area)
         std::fill (image.depth.row (y) + run.x0, image.depth.row (y) + run.x1, kInvalidDepth);
 }

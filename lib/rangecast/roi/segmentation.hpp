@@ -4,7 +4,7 @@
 #include <array>
 #include <opencv2/core.hpp>
 
-#include "../geometry/components.hpp"
+#include "../geometry/connected_components.hpp"
 #include "background.hpp"
 #include "depth_fill.hpp"
 #include "majority.hpp"
@@ -97,7 +97,7 @@ private:
   cv::Mat ratio_, tolerance_; /* brightness relative to the background, and its noise */
   cv::Mat behind_, light_beside_, opened_, kernel_, guard_;
   cv::Mat mask_, inverse_, steps_;
-  Components components_;
+  ConnectedComponents components_;
   Majority majority_;
   DepthFill fill_;
   Surroundings surroundings_;

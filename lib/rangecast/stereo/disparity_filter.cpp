@@ -244,7 +244,7 @@ DisparityFilter::clear_specks (
   for (const cv::Rect &part : tiles.parts ())
     for (int y = part.y; y < part.br ().y; y++) {
       auto row = disparity.ptr<std::int16_t> (y);
-      for (const Components::Run &run : components_.row (y))
+      for (const ConnectedComponents::Run &run : components_.row (y))
         if (components_.size_of (run) <= window)
           std::fill (row + run.x0, row + run.x1, std::int16_t (min - 16));
     }

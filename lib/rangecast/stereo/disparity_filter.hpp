@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "../geometry/components.hpp"
+#include "../geometry/connected_components.hpp"
 #include "box_sum.hpp"
 #include "tiles.hpp"
 
@@ -70,7 +70,7 @@ private:
       int right_width, int right_x, int min, int width, Memory &memory, std::int16_t *disparity);
 
   WorkerMemory<Memory> memory_;
-  Components components_;
+  ConnectedComponents components_;
 };
 
 } // namespace rangecast

@@ -10,7 +10,7 @@ namespace rangecast {
 
 /** Connected components of an image, built row by row: runs of pixels, joined by union-find
  *  (R. Sedgewick, K. Wayne, "Algorithms", 4th ed., section 1.5). Its memory only grows. */
-class Components {
+class ConnectedComponents {
 public:
   /** Connected pixels of a row, columns x0 to x1 - 1. */
   struct Run {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
-#include <rangecast/geometry/components.hpp>
+#include <rangecast/geometry/connected_components.hpp>
 
 using namespace rangecast;
 
@@ -28,25 +28,25 @@ const cv::Size kSizes[] = {{1, 1}, {1, 20}, {20, 1}, {7, 5}, {64, 48}, {129, 90}
 
 } // namespace
 
-TEST (Components, of_masks_have_the_sizes_of_opencvs_labels)
+TEST (ConnectedComponents, of_masks_have_the_sizes_of_opencvs_labels)
 {
   cv::RNG random (5);
   for (const cv::Size size : kSizes) {
     const cv::Mat mask = random_levels (size, 2, random) > 0;
     cv::Mat labels, stats, centroids;
     const int n = cv::connectedComponentsWithStats (mask, labels, stats, centroids, 8);
-    Components components;
+    ConnectedComponents components;
     for (int round = 0; round < 2; round++) { /* memory is used again */
       components.clear ();
       for (int y = 0; y < mask.rows; y++)
         components.add_mask_row (mask.ptr (y), mask.cols);
     }
     EXPECT_EQ (std::ranges::count_if (components.runs (),
-                   [&] (const Components::Run &run) { return components.is_root (run); }),
+                   [&] (const ConnectedComponents::Run &run) { return components.is_root (run); }),
         n - 1);
     int pixels = 0;
     for (int y = 0; y < mask.rows; y++)
-      for (const Components::Run &run : components.row (y))
+      for (const ConnectedComponents::Run &run : components.row (y))
         for (int x = run.x0; x < run.x1; x++, pixels++)
           ASSERT_EQ (components.size_of (run),
               mask.at<std::uint8_t> (y, x) ? stats.at<int> (labels.at<int> (y, x), cv::CC_STAT_AREA)
@@ -56,7 +56,7 @@ TEST (Components, of_masks_have_the_sizes_of_opencvs_labels)
   }
 }
 
-TEST (Components, of_levels_are_opencvs_speckles)
+TEST (ConnectedComponents, of_levels_are_opencvs_speckles)
 {
   constexpr int kRange = 16, kMaxSpeckle = 12;
   cv::RNG random (6);
@@ -64,29 +64,29 @@ TEST (Components, of_levels_are_opencvs_speckles)
     const cv::Mat levels = random_levels (size, 400, random);
     cv::Mat expected = levels.clone (), got = levels.clone (), memory;
     cv::filterSpeckles (expected, 0, kMaxSpeckle, kRange, memory);
-    Components components;
+    ConnectedComponents components;
     components.clear ();
     for (int y = 0; y < levels.rows; y++)
       components.add_level_row (levels.ptr<std::int16_t> (y),
           levels.ptr<std::int16_t> (std::max (0, y - 1)), 0, levels.cols, 1, kRange);
     for (int y = 0; y < levels.rows; y++)
-      for (const Components::Run &run : components.row (y))
+      for (const ConnectedComponents::Run &run : components.row (y))
         if (components.size_of (run) <= kMaxSpeckle)
           got.row (y).colRange (run.x0, run.x1).setTo (0);
     EXPECT_EQ (cv::norm (got, expected, cv::NORM_INF), 0) << size;
   }
 }
 
-TEST (Components, rows_without_pixels_separate)
+TEST (ConnectedComponents, rows_without_pixels_separate)
 {
   const std::uint8_t mask[] = {255, 255, 0};
-  Components components;
+  ConnectedComponents components;
   components.clear ();
   components.add_mask_row (mask, 3);
   components.add_empty_row ();
   components.add_mask_row (mask, 3);
   ASSERT_EQ (components.runs ().size (), 2u);
   EXPECT_TRUE (components.row (1).empty ());
-  for (const Components::Run &run : components.runs ())
+  for (const ConnectedComponents::Run &run : components.runs ())
     EXPECT_EQ (components.size_of (run), 2);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "components.hpp"
+#include "connected_components.hpp"
 
 #include <algorithm>
 #include <cstdlib>
@@ -8,20 +8,20 @@
 namespace rangecast {
 
 void
-Components::clear ()
+ConnectedComponents::clear ()
 {
   runs_.clear ();
   rows_.assign (1, 0);
 }
 
 void
-Components::add (int x0, int x1)
+ConnectedComponents::add (int x0, int x1)
 {
   runs_.push_back ({x0, x1, static_cast<int> (runs_.size ()), x1 - x0});
 }
 
 int
-Components::find_root (int run)
+ConnectedComponents::find_root (int run)
 {
   const auto root_of = [this] (int i) -> int & { return runs_[static_cast<std::size_t> (i)].root; };
   while (root_of (run) != run)
@@ -30,7 +30,7 @@ Components::find_root (int run)
 }
 
 void
-Components::join (int one, int other)
+ConnectedComponents::join (int one, int other)
 {
   one = find_root (one);
   other = find_root (other);
@@ -44,7 +44,7 @@ Components::join (int one, int other)
  * at most `reach` columns beside, where touch (x0, x1) says so of the common columns. */
 template <typename Touch>
 void
-Components::join_rows (int reach, const Touch &touch)
+ConnectedComponents::join_rows (int reach, const Touch &touch)
 {
   const std::size_t n = rows_.size ();
   if (n < 3)
@@ -60,7 +60,7 @@ Components::join_rows (int reach, const Touch &touch)
 }
 
 void
-Components::add_mask_row (const std::uint8_t *mask, int width)
+ConnectedComponents::add_mask_row (const std::uint8_t *mask, int width)
 {
   const std::uint8_t *at = mask, *end = mask + width;
   while (at < end) {
@@ -80,7 +80,7 @@ Components::add_mask_row (const std::uint8_t *mask, int width)
 }
 
 void
-Components::add_level_row (
+ConnectedComponents::add_level_row (
     const std::int16_t *level, const std::int16_t *above, int x0, int x1, int min, int range)
 {
   for (int x = x0; x < x1;) {
