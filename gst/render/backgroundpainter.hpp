@@ -3,10 +3,8 @@
 
 #include "glhelpers.hpp"
 
-/** For fragment shaders: `vec4 background (vec2 at)`, the background's colour at that pixel of the
- *  framebuffer; first in the shader. Its uniforms: set_background_uniforms(). */
-extern const char *const kBackgroundFunction;
-/** @param colour  R, G, B, A, straight
+/** Uniforms of the background, in the fragment shaders of shaders.hpp that paint it.
+ *  @param colour  R, G, B, A, straight
  *  @param shade   0 to 1: share by which the colour is lighter in the first row and darker in the
  *                 last one
  *  @param part    pixels that the picture fills */

@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "blendpainter.hpp"
 
-#include <algorithm>
 #include <cstddef>
 #include <cstring>
-#include <string>
+#include <rangecast/surface/painting.hpp>
 
 #include "backgroundpainter.hpp"
 
@@ -19,92 +18,20 @@
 #endif
 
 using rangecast::BlendVertex;
-using rangecast::Mat3;
-using rangecast::Vec3;
+using rangecast::Shader;
 
 namespace {
-
-/* Up to so many views half floats keep 8 bits of colour: each addition is rounded to 11 bits. */
-constexpr std::size_t kMaxHalfFloatViews = 16;
-
-/* Views that look against the viewer show the inside of surfaces, which fills holes, but must not
- * hide an outside less than so many metres behind it. */
-constexpr double kInsideGap_m = 0.015;
-
-/* ---- passes 1 and 2 ---- */
-
-const char *const kVertexShader = R"(
-layout (location = 0) in vec2 a_place; /* quarters of a pixel */
-layout (location = 1) in float a_depth;
-invariant gl_Position; /* in both passes */
-#if SUM
-uniform float u_unit;
-uniform vec4 u_lens; /* principal point in the ROI, 1 / focal lengths; pixels */
-uniform vec3 u_viewer; /* in the view's camera coordinates, metres */
-layout (location = 2) in vec4 a_colour; /* and the square root of the weight */
-out vec4 v_colour;
-const float kMinAngle = 0.03; /* square root of the minimum weight; the cosine's power is 6 */
-#endif
-void main ()
-{
-  vec2 at = 0.25 * a_place;
-  gl_Position = clip_position (at, a_depth);
-#if SUM
-  vec3 ray = vec3 ((at - u_lens.xy) * u_lens.zw, 1.0);
-  float along = dot (normalize (ray), normalize (ray * a_depth * u_unit - u_viewer));
-  v_colour = vec4 (a_colour.rgb, a_colour.a * max (along * along * along, kMinAngle));
-#endif
-}
-)";
-
-const char *const kFragmentShader = R"(
-precision highp float;
-#if SUM
-in vec4 v_colour;
-uniform vec3 u_weights; /* maximum, minimum, inside */
-out vec4 sum;
-#endif
-void main ()
-{
-#if SUM
-  float weight = gl_FrontFacing ? max (v_colour.a * v_colour.a * u_weights.x, u_weights.y) : u_weights.z;
-  sum = vec4 (v_colour.rgb * weight, weight);
-#endif
-}
-)";
-
-/* The largest weight: half floats (up to 65504) hold the sum of four surfaces of each view. The
- * smallest weight is a share of it. The inside of a surface weighs so little that the sum tells a
- * pixel in which all views show an inside from one in which a view shows an outside. */
-constexpr float kMaxWeight = 1000, kMaxSum = 64000, kMinShare = 2e-6f;
-
-struct Weights {
-  float max, min, inside;
-};
-
-Weights
-weights_for (std::size_t views, bool precise)
-{
-  const auto n = static_cast<float> (std::max<std::size_t> (views, 1));
-  const float max = precise ? kMaxWeight : std::min (kMaxWeight, kMaxSum / (4 * n)),
-              min = kMinShare * max;
-  return {max, min, min / (2.5f * n)};
-}
 
 /* The angle between the view's ray and the viewer's. */
 void
 set_angle_uniforms (GstGLShader *shader, const RenderPicture &picture, const RenderLayer &layer)
 {
-  const rangecast::View &view = *layer.view;
-  const rangecast::Intrinsics &lens = view.intrinsics;
-  const Mat3 &r = view.world_from_view.rotation;
-  const Vec3 from =
-      rangecast::viewer_position (picture.clip_from_world) - view.world_from_view.translation;
-  gst_gl_shader_set_uniform_4f (shader, "u_lens", gfloat (lens.cx - layer.image.roi.x),
-      gfloat (lens.cy - layer.image.roi.y), gfloat (1 / lens.fx), gfloat (1 / lens.fy));
-  gst_gl_shader_set_uniform_3f (shader, "u_viewer", gfloat (dot (from, {r[0], r[3], r[6]})),
-      gfloat (dot (from, {r[1], r[4], r[7]})), gfloat (dot (from, {r[2], r[5], r[8]})));
-  gst_gl_shader_set_uniform_1f (shader, "u_unit", gfloat (view.depth_unit_m));
+  const auto angles =
+      rangecast::layer_angles (picture.clip_from_world, *layer.view, layer.image.roi);
+  const auto &[lens, viewer, unit] = angles;
+  gst_gl_shader_set_uniform_4f (shader, "u_lens", lens[0], lens[1], lens[2], lens[3]);
+  gst_gl_shader_set_uniform_3f (shader, "u_viewer", viewer[0], viewer[1], viewer[2]);
+  gst_gl_shader_set_uniform_1f (shader, "u_unit", unit);
 }
 
 void
@@ -119,112 +46,6 @@ describe_vertices (const GstGLFuncs *gl)
   attribute (1, 1, GL_UNSIGNED_SHORT, false, offsetof (BlendVertex, depth));
   attribute (2, 4, GL_UNSIGNED_BYTE, true, offsetof (BlendVertex, colour));
 }
-
-/* ---- pass 3 ---- */
-
-/* Outlines are smoothed over the four neighbours, which also closes cracks of one pixel between
- * what two views draw. Where no camera saw the outside of a surface, so that the inside of one
- * behind shows through (beside a nose, round glasses), small gaps take the colours around them,
- * from the farther surfaces: what a nearer one hides is theirs. */
-const char *const kDivideShader = R"(
-precision highp int;
-precision highp sampler2D;
-uniform sampler2D u_sum; /* R, G, B times weight; weight */
-uniform sampler2D u_depth;
-uniform vec3 u_shift; /* a, b, g of DepthShift */
-uniform ivec4 u_part; /* first and last pixel */
-uniform float u_outside; /* minimum weight of an outside, less rounding */
-uniform int u_reach; /* pixels: wider gaps are not filled */
-out vec4 fragment;
-float distance_at (ivec2 at)
-{
-  return u_shift.y / (2.0 * texelFetch (u_depth, at, 0).r - 1.0 - u_shift.x) - u_shift.z;
-}
-/* The first outside in a direction, and how many steps away; 0: none within reach. */
-int trace (ivec2 at, ivec2 step, out vec4 outside)
-{
-  outside = vec4 (0.0);
-  int last = 0;
-  for (int r = 1; r <= u_reach; r += 1 + r / 4) {
-    outside = texelFetch (u_sum, clamp (at + r * step, u_part.xy, u_part.zw), 0);
-    if (outside.a >= u_outside) {
-      for (int back = r - 1; back > last; back--) { /* the strides grow */
-        vec4 nearer = texelFetch (u_sum, clamp (at + back * step, u_part.xy, u_part.zw), 0);
-        if (nearer.a < u_outside)
-          break;
-        outside = nearer;
-        r = back;
-      }
-      return r;
-    }
-    last = r;
-  }
-  return 0;
-}
-ivec2 direction (int k) /* 0 to 7; k and 7 - k are opposite */
-{
-  int q = k < 4 ? k : k + 1; /* of 3 x 3, without the centre */
-  return ivec2 (q % 3 - 1, q / 3 - 1);
-}
-/* Weighted mean of the farthest outsides in eight directions, and its share: all of it in gaps up to
- * half the reach wide, less in wider ones; nothing where a direction ends in none. */
-vec4 fill (ivec2 at)
-{
-  const float kSameSurface = 0.02; /* metres */
-  vec4 outside;
-  float farthest = 0.0;
-  int widest = 0;
-  for (int k = 0; k < 4; k++) {
-    int there = trace (at, direction (k), outside), opposite = trace (at, direction (7 - k), outside);
-    if (there == 0 || opposite == 0)
-      return vec4 (0.0);
-    widest = max (widest, there + opposite);
-    farthest = max (farthest, max (distance_at (at + there * direction (k)),
-                                  distance_at (at + opposite * direction (7 - k))));
-  }
-  float share = clamp (2.0 - 2.0 * float (widest) / float (u_reach), 0.0, 1.0);
-  if (share <= 0.0)
-    return vec4 (0.0);
-  vec4 sum = vec4 (0.0);
-  for (int k = 0; k < 8; k++) {
-    ivec2 way = trace (at, direction (k), outside) * direction (k);
-    if (distance_at (at + way) > farthest - kSameSurface)
-      sum += vec4 (outside.rgb / outside.a, 1.0) / float (way.x * way.x + way.y * way.y);
-  }
-  return vec4 (sum.rgb / sum.a, share);
-}
-void main ()
-{
-  vec4 ground = background (gl_FragCoord.xy);
-  ivec2 at = ivec2 (gl_FragCoord.xy), first = u_part.xy, last = u_part.zw;
-  vec4 sum = texelFetch (u_sum, at, 0);
-  vec4 west = texelFetch (u_sum, ivec2 (max (at.x - 1, first.x), at.y), 0);
-  vec4 east = texelFetch (u_sum, ivec2 (min (at.x + 1, last.x), at.y), 0);
-  vec4 north = texelFetch (u_sum, ivec2 (at.x, max (at.y - 1, first.y)), 0);
-  vec4 south = texelFetch (u_sum, ivec2 (at.x, min (at.y + 1, last.y)), 0);
-  vec4 weights = vec4 (west.a, east.a, north.a, south.a);
-  float covered = dot (vec4 (greaterThan (weights, vec4 (0.0))), vec4 (1.0));
-  /* a pixel that is drawn: from 1/2 where none beside it is; one that is not: up to 1/2, or a crack */
-  float coverage = sum.a > 0.0 ? 0.5 + 0.125 * covered : covered > 2.0 ? 1.0 : 0.125 * covered;
-  float heaviest = sum.a;
-  if (sum.a <= 0.0) {
-    sum = west + east + north + south;
-    heaviest = max (max (west.a, east.a), max (north.a, south.a));
-  }
-  if (heaviest > 0.0 && heaviest < u_outside) {
-    vec4 filled = fill (at);
-    sum = vec4 (mix (sum.rgb / sum.a, filled.rgb, filled.a), 1.0);
-  }
-#if WITH_DEPTH
-  float depth = texelFetch (u_depth, at, 0).r, distance = distance_at (at);
-  gl_FragDepth = depth < 1.0 ? 0.5 + 0.5 * (u_shift.x + u_shift.y / distance) : 1.0;
-#endif
-  float behind = (1.0 - coverage) * ground.a;
-  float alpha = coverage + behind;
-  vec3 colour = coverage * sum.rgb / max (sum.a, 1e-7) + behind * ground.rgb;
-  fragment = alpha > 0.0 ? vec4 (colour / alpha, alpha) : ground;
-}
-)";
 
 } // namespace
 
@@ -243,21 +64,18 @@ BlendPainter::start (GstGLContext *context, GError **error)
   const auto renderer =
       reinterpret_cast<const char *> (context->gl_vtable->GetString (GL_RENDERER));
   in_software_ = renderer && std::strstr (renderer, "llvmpipe");
-  for (std::size_t i = 0; i < shaders_.size (); i++) {
-    const std::string variant = "#define SUM " + std::to_string (i);
-    const std::string vertex = variant + kPositionFunction + kVertexShader,
-                      fragment = variant + kFragmentShader;
-    shaders_[i] = make_shader (context, vertex.c_str (), fragment.c_str (), error);
-    if (!shaders_[i])
+  const struct {
+    GstGLShader *&shader;
+    Shader vertex, fragment;
+  } stages[] = {
+      {shaders_[kDepth], Shader::kBlendDepthVertex, Shader::kBlendDepthFragment},
+      {shaders_[kSum], Shader::kBlendSumVertex, Shader::kBlendSumFragment},
+      {divide_shaders_[0], Shader::kCoveringVertex, Shader::kDivideFragment},
+      {divide_shaders_[1], Shader::kCoveringVertex, Shader::kDivideDepthFragment},
+  };
+  for (const auto &[shader, vertex, fragment] : stages)
+    if (!(shader = make_shader (context, vertex, fragment, error)))
       return false;
-  }
-  for (std::size_t i = 0; i < divide_shaders_.size (); i++) {
-    const std::string fragment =
-        "#define WITH_DEPTH " + std::to_string (i) + kBackgroundFunction + kDivideShader;
-    divide_shaders_[i] = make_shader (context, kCoveringVertexShader, fragment.c_str (), error);
-    if (!divide_shaders_[i])
-      return false;
-  }
   context->gl_vtable->GenVertexArrays (1, &array_);
   return true;
 }
@@ -320,12 +138,13 @@ BlendPainter::draw_layers (
   for (const RenderLayer &layer : layers) {
     if (layer.blend_vertices.empty ())
       continue;
-    const auto matrix = clip_from_pixel (picture.clip_from_world, *layer.view, layer.image.roi);
-    const double against = -view_alignment (picture.clip_from_world, *layer.view);
-    const double gap_m = (pass == kDepth ? picture.blend_range_m : 0) +
-                         kInsideGap_m * std::clamp (2 * against, 0.0, 1.0);
+    const auto &matrix = picture.clip_from_world;
+    const double gap_m =
+        pass == kDepth ? rangecast::depth_pass_gap (matrix, *layer.view, picture.blend_range_m)
+                       : rangecast::sum_pass_gap (matrix, *layer.view);
     set_position_uniforms (
-        shader, matrix, rangecast::depth_shift (matrix, picture.clip_from_world, gap_m));
+        shader, rangecast::place_layer (
+                    clip_from_pixel (matrix, *layer.view, layer.image.roi), matrix, gap_m));
     if (pass == kSum)
       set_angle_uniforms (shader, picture, layer);
     gl->BindVertexArray (objects_[turn_][std::size_t (layer.image.view_id)].array);
@@ -339,7 +158,7 @@ BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> l
   const GstGLFuncs *gl = context_->gl_vtable;
   const rangecast::Roi &covered = picture.covered;
   const bool precise =
-      !is_gles (context_) && (in_software_ || picture.rig_views > kMaxHalfFloatViews);
+      !is_gles (context_) && (in_software_ || picture.rig_views > rangecast::kMaxHalfFloatViews);
   if (!bind_targets (picture.width, picture.height, precise))
     return false;
 
@@ -358,7 +177,7 @@ BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> l
   gl->Enable (GL_BLEND);
   gl->BlendFunc (GL_ONE, GL_ONE);
   gl->FrontFace (rangecast::mirrors (picture.clip_from_world) ? GL_CW : GL_CCW);
-  const Weights weights = weights_for (picture.rig_views, precise);
+  const auto weights = rangecast::blend_weights (picture.rig_views, precise);
   gst_gl_shader_use (shaders_[kSum]);
   gst_gl_shader_set_uniform_3f (
       shaders_[kSum], "u_weights", weights.max, weights.min, weights.inside);
@@ -367,7 +186,7 @@ BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> l
   gl->BlendFunc (GL_ONE, GL_ZERO);
   gl->DepthMask (TRUE);
 
-  divide (picture, 0.9f * weights.min);
+  divide (picture, weights.outside ());
   gl->DepthFunc (GL_LESS);
   gl->FrontFace (GL_CCW);
   gl->Disable (GL_DEPTH_TEST);
@@ -407,7 +226,7 @@ BlendPainter::divide (const RenderPicture &picture, float outside) const
       picture.clip_from_world, picture.clip_from_world, picture.blend_range_m);
   gst_gl_shader_set_uniform_3f (shader, "u_shift", shift.a, shift.b, shift.g);
   gst_gl_shader_set_uniform_1f (shader, "u_outside", outside);
-  gst_gl_shader_set_uniform_1i (shader, "u_reach", std::max (part.height / 15, 2));
+  gst_gl_shader_set_uniform_1i (shader, "u_reach", rangecast::fill_reach (part.height));
   set_background_uniforms (shader, picture.background, picture.background_shade, part);
   draw_covering (gl, array_);
   for (std::size_t i = targets_.size (); i-- > 0;) { /* they are targets again next time */

@@ -39,13 +39,13 @@ make_shader (GstGLContext *context, const char *vertex, const char *fragment, GE
       stage (GL_FRAGMENT_SHADER, fragment), nullptr);
 }
 
-const char *const kCoveringVertexShader = R"(
-uniform float u_covering_depth;
-void main ()
+GstGLShader *
+make_shader (
+    GstGLContext *context, rangecast::Shader vertex, rangecast::Shader fragment, GError **error)
 {
-  gl_Position = vec4 (gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, u_covering_depth, 1.0);
+  return make_shader (context, rangecast::shader_source (vertex).c_str (),
+      rangecast::shader_source (fragment).c_str (), error);
 }
-)";
 
 void
 draw_covering (const GstGLFuncs *gl, guint array)
@@ -55,36 +55,29 @@ draw_covering (const GstGLFuncs *gl, guint array)
   gl->BindVertexArray (0);
 }
 
-const char *const kColourFragmentShader = R"(
-precision highp float;
-in vec3 v_colour;
-out vec4 fragment;
-void main ()
-{
-  fragment = vec4 (v_colour, 1.0);
-}
-)";
-
-const char *const kPositionFunction = R"(
-precision highp float;
-uniform mat4 u_clip_from_pixel; /* column, row and 1, all times depth, and 1 */
-uniform vec2 u_behind;
-vec4 clip_position (vec2 at, float depth)
-{
-  vec4 position = u_clip_from_pixel * vec4 (at * depth, depth, 1.0);
-  /* the depth of what is u_behind.y metres farther, in the same place of the picture */
-  position.z -= u_behind.x / (max (position.w, 0.0) + u_behind.y);
-  return position;
-}
-)";
-
 void
-set_position_uniforms (
-    GstGLShader *shader, const rangecast::Mat4 &clip_from_pixel, const rangecast::DepthShift &shift)
+set_position_uniforms (GstGLShader *shader, const rangecast::LayerPlace &place)
 {
   gst_gl_shader_set_uniform_matrix_4fv (
-      shader, "u_clip_from_pixel", 1, FALSE, clip_from_pixel.data ());
-  gst_gl_shader_set_uniform_2f (shader, "u_behind", shift.b * shift.g, shift.g);
+      shader, "u_clip_from_pixel", 1, FALSE, place.clip_from_pixel.data ());
+  gst_gl_shader_set_uniform_2f (shader, "u_behind", place.behind[0], place.behind[1]);
+}
+
+bool
+LazyShader::make (GstGLContext *context, const char *fragment, const char *purpose)
+{
+  if (shader_ || failed_)
+    return !failed_;
+  const std::string vertex = rangecast::shader_source (rangecast::Shader::kCoveringVertex);
+  return make (context, vertex.c_str (), fragment, purpose);
+}
+
+bool
+LazyShader::make (GstGLContext *context, rangecast::Shader fragment, const char *purpose)
+{
+  if (shader_ || failed_)
+    return !failed_;
+  return make (context, rangecast::shader_source (fragment).c_str (), purpose);
 }
 
 bool

@@ -6,7 +6,8 @@
 #include <gst/gl/gl.h>
 #include <gst/gl/gstglfuncs.h>
 
-#include <rangecast/surface/view_matrices.hpp>
+#include <rangecast/surface/painting.hpp>
+#include <rangecast/surface/shaders.hpp>
 
 #include "category.hpp"
 
@@ -46,23 +47,17 @@ void upload_vertices (
 GstGLShader *make_shader (
     GstGLContext *context, const char *vertex, const char *fragment, GError **error);
 
-/** Covers the viewport with one triangle, see draw_covering(), at a depth of u_covering_depth (-1
- *  to 1; 0 unless it is set). */
-extern const char *const kCoveringVertexShader;
-/** Draws kCoveringVertexShader. @param array  without attributes: the core profile draws nothing
- *  without a vertex array */
+/** The same of shaders that the library has. */
+GstGLShader *make_shader (
+    GstGLContext *context, rangecast::Shader vertex, rangecast::Shader fragment, GError **error);
+
+/** Covers the viewport with one triangle by Shader::kCoveringVertex, at a depth of u_covering_depth
+ *  (-1 to 1; 0 unless it is set).
+ *  @param array  without attributes: the core profile draws nothing without a vertex array */
 void draw_covering (const GstGLFuncs *gl, guint array);
 
-/** Fragment shader that writes the colour of the vertex shader's v_colour. */
-extern const char *const kColourFragmentShader;
-
-/** For vertex shaders: `vec4 clip_position (vec2 at, float depth)` of a view's pixel `at` (column,
- *  row of the ROI), moved away from the viewer. Its uniforms: set_position_uniforms(). */
-extern const char *const kPositionFunction;
-/** @param clip_from_pixel  see rangecast::clip_from_pixel()
- *  @param shift            how far away from the viewer, without another place in the picture */
-void set_position_uniforms (GstGLShader *shader, const rangecast::Mat4 &clip_from_pixel,
-    const rangecast::DepthShift &shift);
+/** Uniforms of the library's vertex shaders: where a layer is drawn. */
+void set_position_uniforms (GstGLShader *shader, const rangecast::LayerPlace &place);
 
 /** The shader of a painter that is used now and then: compiled by the first picture that needs it.
  */
@@ -71,6 +66,9 @@ public:
   /** Compiles unless that has been done, with a vertex array. @return false after a failure, which
    *  is logged once */
   bool make (GstGLContext *context, const char *vertex, const char *fragment, const char *purpose);
+  /** The same with Shader::kCoveringVertex. */
+  bool make (GstGLContext *context, const char *fragment, const char *purpose);
+  bool make (GstGLContext *context, rangecast::Shader fragment, const char *purpose);
   /** After make(). */
   [[nodiscard]] GstGLShader *shader () const { return shader_; }
   [[nodiscard]] guint array () const { return array_; }

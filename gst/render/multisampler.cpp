@@ -36,7 +36,7 @@ bool
 Multisampler::make_resolved (int width, int height)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
-  if (!over_background_.make (context_, kCoveringVertexShader, kOverBackground, "antialiasing"))
+  if (!over_background_.make (context_, kOverBackground, "antialiasing"))
     return false;
   gl->GenTextures (1, &texture_);
   gl->BindTexture (GL_TEXTURE_2D, texture_);

@@ -9,11 +9,6 @@ using rangecast::Orbit;
 
 namespace {
 
-constexpr double kZoomStep = 1.1;
-constexpr double kKeyTurn_deg = 5;
-constexpr double kMaxElevation_deg = 89; /* as the property */
-constexpr double kMaxDistance_m = 1000;  /* as the properties */
-
 /* No screen is larger, and results for larger numbers may not be finite. */
 bool
 is_on_screen (double x, double y)
@@ -32,36 +27,6 @@ OrbitControl::at (guint64 running_ns) const
   return turned;
 }
 
-void
-OrbitControl::set_shown (const rangecast::OrbitMatrices &matrices,
-    const rangecast::SceneFrame &scene, int width, int height)
-{
-  home_distance_m_ = scene.distance_m;
-  home_elevation_deg_ = scene.elevation_deg;
-  pan_right_ = matrices.pan_right;
-  pan_down_ = matrices.pan_down;
-  width_ = width;
-  height_ = height;
-}
-
-/* Stays within the ranges of the properties and below the vertical, which is nearer where the first
- * view itself looks down or up. */
-void
-OrbitControl::turn (double azimuth_deg, double elevation_deg)
-{
-  orbit.azimuth_deg = std::fmod (orbit.azimuth_deg + azimuth_deg, 360.0);
-  orbit.elevation_deg = std::clamp (orbit.elevation_deg + elevation_deg,
-      std::max (-kMaxElevation_deg, -kMaxElevation_deg - home_elevation_deg_),
-      std::min (kMaxElevation_deg, kMaxElevation_deg - home_elevation_deg_));
-}
-
-void
-OrbitControl::zoom (double factor)
-{
-  const double distance_m = orbit.distance_m > 0 ? orbit.distance_m : home_distance_m_;
-  orbit.distance_m = std::clamp (distance_m * factor, 0.01, kMaxDistance_m);
-}
-
 bool
 OrbitControl::press (GstEvent *event)
 {
@@ -69,7 +34,7 @@ OrbitControl::press (GstEvent *event)
   gint button = 0;
   gst_navigation_event_parse_mouse_button_event (event, &button, &x, &y);
   if (button == 4 || button == 5) { /* the wheel, from older sinks */
-    zoom (button == 4 ? 1 / kZoomStep : kZoomStep);
+    step_nearer (button == 4);
     return true;
   }
   if (!is_on_screen (x, y))
@@ -78,24 +43,6 @@ OrbitControl::press (GstEvent *event)
   x_ = x;
   y_ = y;
   return true;
-}
-
-/* Half a circle over the width of the picture, a quarter over its height. */
-void
-OrbitControl::orbit_by (double dx, double dy)
-{
-  turn (-180 * dx / width_, 90 * dy / height_);
-}
-
-/* The scene follows the pointer. */
-void
-OrbitControl::pan_by (double dx, double dy)
-{
-  const rangecast::Vec3 pan = orbit.pan - dx / width_ * pan_right_ - dy / height_ * pan_down_;
-  const auto limited = [] (double metres) {
-    return std::clamp (metres, -kMaxDistance_m, kMaxDistance_m);
-  };
-  orbit.pan = {limited (pan.x), limited (pan.y), limited (pan.z)};
 }
 
 bool
@@ -156,9 +103,7 @@ OrbitControl::touch_move (GstEvent *event)
     if (other.down) {
       const double before = std::hypot (finger.x - other.x, finger.y - other.y);
       const double after = std::hypot (to.x - other.x, to.y - other.y);
-      pan_by (dx / 2, dy / 2);
-      if (before > 1 && after > 1)
-        zoom (before / after);
+      pinch (dx / 2, dy / 2, before, after);
     } else {
       orbit_by (dx, dy);
     }
@@ -174,7 +119,7 @@ OrbitControl::scroll (GstEvent *event)
   double x = 0, y = 0, delta_x = 0, delta_y = 0;
   gst_navigation_event_parse_mouse_scroll_event (event, &x, &y, &delta_x, &delta_y);
   if (delta_y != 0)
-    zoom (delta_y > 0 ? 1 / kZoomStep : kZoomStep);
+    step_nearer (delta_y > 0);
   return true;
 }
 
@@ -183,17 +128,16 @@ bool
 OrbitControl::key (const char *name)
 {
   const std::string_view k = name;
-  if (k == "r" || k == "Home") {
-    orbit = {.fov_deg = orbit.fov_deg, .pan = {}}; /* no event changes the field of view */
-    home_requests++;
-  } else if (k == "Left" || k == "Right")
-    turn (k == "Left" ? -kKeyTurn_deg : kKeyTurn_deg, 0);
+  if (k == "r" || k == "Home")
+    go_home ();
+  else if (k == "Left" || k == "Right")
+    step (k == "Left" ? -1 : 1, 0);
   else if (k == "Up" || k == "Down")
-    turn (0, k == "Up" ? kKeyTurn_deg : -kKeyTurn_deg);
+    step (0, k == "Up" ? 1 : -1);
   else if (k == "plus" || k == "equal" || k == "KP_Add")
-    zoom (1 / kZoomStep);
+    step_nearer (true);
   else if (k == "minus" || k == "KP_Subtract")
-    zoom (kZoomStep);
+    step_nearer (false);
   else
     return false;
   return true;

@@ -4,23 +4,17 @@
 #include <gst/video/navigation.h>
 
 #include <array>
-#include <rangecast/surface/orbit.hpp>
+#include <rangecast/surface/orbit_motion.hpp>
 
 /** The orbit camera, moved by mouse, touch and keys (GstNavigation) and by time. Has no lock:
  *  callers share it between threads under theirs. */
-class OrbitControl {
+class OrbitControl : public rangecast::OrbitMotion {
 public:
-  rangecast::Orbit orbit;  ///< as the properties; azimuth -360 to 360
-  double auto_orbit = 0;   ///< degrees a second
-  guint home_requests = 0; ///< how often the first view was requested
+  double auto_orbit = 0; ///< degrees a second
 
   /** @param running_ns   time since the first picture
    *  @return the orbit at that time */
   [[nodiscard]] rangecast::Orbit at (guint64 running_ns) const;
-
-  /** Sets what is on the screen, for drags, and the camera's position while properties are 0. */
-  void set_shown (const rangecast::OrbitMatrices &matrices, const rangecast::SceneFrame &scene,
-      int width, int height);
 
   /** @return whether the event was handled */
   bool handle (GstEvent *event);
@@ -40,10 +34,6 @@ private:
   bool touch_down (GstEvent *event);
   bool touch_up (GstEvent *event);
   bool touch_move (GstEvent *event);
-  void orbit_by (double dx, double dy);
-  void pan_by (double dx, double dy);
-  void turn (double azimuth_deg, double elevation_deg);
-  void zoom (double factor);
 
   struct Finger {
     bool down = false;
@@ -54,7 +44,4 @@ private:
   int button_ = 0;                /* that is down; 0: none */
   double x_ = 0, y_ = 0;          /* last position of the mouse, pixels */
   std::array<Finger, 2> fingers_; /* more are ignored */
-  double home_distance_m_ = 1, home_elevation_deg_ = 0;
-  rangecast::Vec3 pan_right_, pan_down_;
-  int width_ = 640, height_ = 480;
 };

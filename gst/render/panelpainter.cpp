@@ -25,8 +25,7 @@ PanelPainter::draw (GstGLContext *context, const rangecast::ImageView<const rang
     bool changed, int x, int y, int scale)
 {
   const GstGLFuncs *gl = context->gl_vtable;
-  if (panel.empty () ||
-      !shader_.make (context, kCoveringVertexShader, kFragmentShader, "show-stats"))
+  if (panel.empty () || !shader_.make (context, kFragmentShader, "show-stats"))
     return 0;
   guint64 uploaded = 0;
   const bool is_new = !texture_;

@@ -3,8 +3,7 @@
 
 #include <rangecast/geometry/rig.hpp>
 #include <rangecast/surface/orbit.hpp>
-#include <rangecast/surface/strips.hpp>
-#include <span>
+#include <rangecast/surface/painting.hpp>
 
 /** What StripPainter and BlendPainter draw: one picture of a frame set. */
 struct RenderPicture {
@@ -23,17 +22,11 @@ struct RenderPicture {
 
   /** Metres by which a view's surfaces are moved away from the viewer, times 1 - cosine of the
    *  angle between the two's directions; not in mode blend. */
-  double view_gap_m = 0.012;
+  double view_gap_m = rangecast::kViewGap_m;
   /** Mode blend: metres behind the nearest surface within which views are blended. */
-  double blend_range_m = 0.02;
+  double blend_range_m = rangecast::kBlendRange_m;
   int width, height;   ///< of the framebuffer, pixels
   rangecast::Roi part; ///< of it that the picture fills
 };
 
-/** One view of the frame set. */
-struct RenderLayer {
-  rangecast::ConstRangeImage image;
-  const rangecast::View *view;
-  std::span<const rangecast::StripVertex> vertices;
-  std::span<const rangecast::BlendVertex> blend_vertices = {}; ///< mode blend, instead
-};
+using RenderLayer = rangecast::SurfaceLayer;

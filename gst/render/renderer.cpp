@@ -2,7 +2,6 @@
 #include "renderer.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <exception>
 #include <utility>
 
@@ -250,14 +249,13 @@ Renderer::make_picture (const RenderJob &job, const EyeViewport &viewport, Resul
   rangecast::PicturePart part{double (viewport.width) / width_, double (viewport.height) / height_};
   part.x = double (2 * viewport.x + viewport.width) / width_ - 1;
   part.y = double (2 * viewport.y + viewport.height) / height_ - 1;
-  const double fov = job.orbit.fov_deg > 0 ? job.orbit.fov_deg : frame.fov_deg;
   RenderPicture picture = {};
   picture.clip_from_world = rangecast::in_part (matrices.clip_from_world, part);
   std::ranges::copy (Colour (settings.background).rgba, picture.background);
   if (picture.background[3] >= 1)
     picture.background_shade = float (settings.background_shade);
   picture.point_size = float (settings.point_size);
-  picture.pixels_per_unit = float (viewport.height / (2 * std::tan (fov * M_PI / 360)));
+  picture.pixels_per_unit = float (rangecast::pixels_per_unit (frame, job.orbit, viewport.height));
   picture.mode = settings.strips.mode;
   picture.depth_step = settings.strips.depth_step;
   /* What one camera sees is open at the back, where there is nothing else to see. */

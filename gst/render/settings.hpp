@@ -3,7 +3,7 @@
 
 #include <gst/gst.h>
 
-#include <rangecast/surface/strips.hpp>
+#include <rangecast/surface/painting.hpp>
 
 #include "common/properties.hpp"
 #include "orbitcontrol.hpp"
@@ -11,15 +11,15 @@
 /** striprender's properties. Any thread, under the element's lock. */
 struct StripRenderSettings {
   OrbitControl camera;
-  guint background = 0xff20242a;   ///< ARGB
-  double background_shade = 0;     ///< share, of opaque backgrounds
-  double point_size = 1;           ///< in footprints of a pixel
-  bool fit = false;                ///< to the content
-  guint64 view_mask = G_MAXUINT64; ///< bit n: view-id n is drawn
+  guint background = 0xff000000 | rangecast::kBackgroundColour; ///< ARGB
+  double background_shade = 0;                                  ///< share, of opaque backgrounds
+  double point_size = 1;                                        ///< in footprints of a pixel
+  bool fit = false;                                             ///< to the content
+  guint64 view_mask = G_MAXUINT64;                              ///< bit n: view-id n is drawn
   bool show_cameras = false;
   bool back_faces = false;
-  double view_gap_m = 0.012;
-  double blend_range_m = 0.02;
+  double view_gap_m = rangecast::kViewGap_m;
+  double blend_range_m = rangecast::kBlendRange_m;
   int samples = 0; ///< a pixel; below 2: no antialiasing
   bool tint_views = false;
   bool show_stats = false;

@@ -2,9 +2,10 @@
 #include "strippainter.hpp"
 
 #include <algorithm>
-#include <string>
+#include <rangecast/surface/painting.hpp>
 
 using rangecast::Mat4;
+using rangecast::Shader;
 using rangecast::StripMode;
 using rangecast::StripVertex;
 
@@ -23,75 +24,8 @@ using rangecast::StripVertex;
 
 namespace {
 
-/* A vertex is the number of its pixel, whose depth and colour are fetched here. Vertices beside
- * their pixel follow the surface of it and its neighbours. */
-const char *const kVertexShader = R"(
-precision highp int;
-precision highp usampler2D;
-uniform usampler2D u_depth;
-uniform sampler2D u_colour;
-uniform ivec2 u_size; /* of the ROI; beyond it the textures hold older frames */
-uniform float u_focal; /* pixels */
-uniform float u_unit;
-uniform float u_step;
-uniform float u_point_size;
-layout (location = 0) in uint a_vertex;
-out vec3 v_colour;
-
-#if WITH_OFFSETS
-/* The growth of depth from the neighbour before `p`, if that is on the same surface. */
-bool has_rise (ivec2 p, ivec2 way, float depth, out float rise)
-{
-  ivec2 from = clamp (p - way, ivec2 (0), u_size - 1);
-  float before = float (texelFetch (u_depth, from, 0).r);
-  rise = depth - before;
-  return from != p && before > 0.0 && abs (rise) <= u_step * depth;
-}
-/* Surfaces are extended beyond their edges at 45 degrees at most: where they are seen at a grazing
- * angle, depth rises too fast to be trusted, and the extensions would be spikes. */
-const float kMaxSlope = 1.0;
-float slope (ivec2 p, ivec2 way, float offset, float depth)
-{
-  float limit = kMaxSlope * depth / u_focal, rise;
-#if BOTH_SIDES
-  float fall;
-  bool has_before = has_rise (p, way, depth, rise), has_after = has_rise (p, -way, depth, fall);
-  if (has_before && has_after)
-    return (rise - fall) * 0.5;
-  return clamp (has_before ? rise : has_after ? -fall : 0.0, -limit, limit);
-#else
-  int outward = offset > 0.0 ? 1 : -1;
-  return has_rise (p, outward * way, depth, rise) ? clamp (float (outward) * rise, -limit, limit) : 0.0;
-#endif
-}
-#endif
-
-void main ()
-{
-  ivec2 pixel = ivec2 (int (a_vertex & 8191u), int (a_vertex >> 13u & 8191u));
-  vec2 at = vec2 (pixel);
-  float depth = float (texelFetch (u_depth, pixel, 0).r);
-#if WITH_OFFSETS
-  ivec2 place = ivec2 (int (a_vertex >> 26u & 7u), int (a_vertex >> 29u));
-  vec2 offset = vec2 (place - 3) * 0.25;
-  at += offset;
-  if (offset.x != 0.0)
-    depth += offset.x * slope (pixel, ivec2 (1, 0), offset.x, depth);
-  if (offset.y != 0.0)
-    depth += offset.y * slope (pixel, ivec2 (0, 1), offset.y, depth);
-#endif
-  gl_Position = clip_position (at, depth);
-  gl_PointSize = max (1.0, u_point_size * depth * u_unit / (u_focal * gl_Position.w));
-  v_colour = texelFetch (u_colour, pixel, 0).rgb;
-}
-)";
-
-/* Strips extend beyond their ends, away from them; rectangles on all four sides; points do not. */
-const char *const kVariants[] = {
-    "#define WITH_OFFSETS 1\n#define BOTH_SIDES 0\n",
-    "#define WITH_OFFSETS 1\n#define BOTH_SIDES 1\n",
-    "#define WITH_OFFSETS 0\n#define BOTH_SIDES 0\n",
-};
+constexpr Shader kVertexShaders[] = {
+    Shader::kStripVertex, Shader::kRectangleVertex, Shader::kPointVertex};
 static_assert (int (StripMode::kStrips) == 1 && int (StripMode::kRectangles) == 2 &&
                int (StripMode::kPoints) == 3); /* the order in draw() */
 
@@ -127,8 +61,7 @@ StripPainter::start (GstGLContext *context, GError **error)
   if (BlendPainter::is_supported (context) && !blend_painter_.start (context, error))
     return false;
   for (std::size_t i = 0; i < shaders_.size (); i++) {
-    const std::string vertex = std::string (kVariants[i]) + kPositionFunction + kVertexShader;
-    shaders_[i] = make_shader (context, vertex.c_str (), kColourFragmentShader, error);
+    shaders_[i] = make_shader (context, kVertexShaders[i], Shader::kColourFragment, error);
     if (!shaders_[i])
       return false;
   }
@@ -240,12 +173,9 @@ StripPainter::draw_layer (const ViewObjects &objects, const RenderLayer &layer,
   Mat4 matrix = clip_from_pixel (picture.clip_from_world, *layer.view, layer.image.roi);
   if (picture.back_faces) /* half of the depth buffer for each side: fronts are before all backs */
     matrix = rangecast::in_half_of_depths (matrix, back);
-  /* Where two views see one surface, the one that looks more as the viewer does is in front: it has
-   * more pixels there, and noise must not let both show. */
   const double gap_m =
-      picture.view_gap_m * (1 - view_alignment (picture.clip_from_world, *layer.view));
-  set_position_uniforms (
-      shader, matrix, rangecast::depth_shift (matrix, picture.clip_from_world, gap_m));
+      rangecast::strip_gap (picture.clip_from_world, *layer.view, picture.view_gap_m);
+  set_position_uniforms (shader, rangecast::place_layer (matrix, picture.clip_from_world, gap_m));
   gst_gl_shader_set_uniform_1f (shader, "u_focal", gfloat (layer.view->intrinsics.fx));
   gst_gl_shader_set_uniform_1f (shader, "u_unit", gfloat (layer.view->depth_unit_m));
   gst_gl_shader_set_uniform_2i (

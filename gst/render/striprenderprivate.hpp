@@ -10,6 +10,7 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <mutex>
 #include <rangecast/overlay/stats_panel.hpp>
+#include <rangecast/surface/view_fit.hpp>
 
 #include "category.hpp"
 #include "common/capserrors.hpp"
@@ -21,7 +22,6 @@
 #include "scene.hpp"
 #include "settings.hpp"
 #include "stats.hpp"
-#include "viewfit.hpp"
 
 /** A part of the stream without frame sets. */
 struct StreamGap {
@@ -54,7 +54,7 @@ struct GstStripRenderPrivate {
    * or on the OpenGL thread while that thread waits for it. */
   StripScene scene;
   GstBuffer *drawn = nullptr; /* whose strips the scene has, if it may be drawn again */
-  ViewFit fit;
+  rangecast::ViewFit fit;
   std::array<rangecast::RangeImage, rangecast::kMaxViews> visible; /* selected by view-mask */
   Renderer renderer;
   StatsText stats_text;

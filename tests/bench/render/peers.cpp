@@ -56,7 +56,8 @@ public:
 
   bool start (GstGLContext *context, GError **error)
   {
-    shader_ = make_shader (context, kVertexShader, kColourFragmentShader, error);
+    shader_ = make_shader (context, kVertexShader,
+        rangecast::shader_source (rangecast::Shader::kColourFragment).c_str (), error);
     if (!shader_)
       return false;
     gl_ = context->gl_vtable;

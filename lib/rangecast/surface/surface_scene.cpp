@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "surface_scene.hpp"
+
+#include "../base/parallel.hpp"
+#include "scene_hull.hpp"
+#include "view_matrices.hpp"
+#include "view_tint.hpp"
+
+namespace rangecast {
+
+void
+SurfaceScene::set_rig (const Rig &rig)
+{
+  rig_ = &rig;
+  frame_ = scene_frame (rig);
+  lines_.clear ();
+  for (std::size_t i = 0; i < rig.views.size (); i++)
+    append_camera_lines (rig.views[i], camera_colour (i), lines_);
+  count_ = 0;
+  complete_ = false;
+}
+
+/* The views, by number of their image, that look against the viewer while another one does not. */
+std::uint64_t
+SurfaceScene::views_against (
+    std::span<const RangeImage> images, const SurfaceSettings &settings, const Orbit &orbit) const
+{
+  constexpr double kAgainst = -0.2; /* cosine between both directions */
+  if (settings.strips.mode != StripMode::kBlend)
+    return 0;
+  const auto matrix = orbit_matrices (frame_, orbit, 1, false).clip_from_world;
+  std::uint64_t against = 0;
+  bool any_along = false;
+  for (std::size_t i = 0; i < images.size (); i++) {
+    const double along = view_alignment (matrix, *rig_->find (images[i].view_id));
+    against |= std::uint64_t (along < kAgainst) << i;
+    any_along = any_along || along > -kAgainst;
+  }
+  return any_along ? against : 0;
+}
+
+void
+SurfaceScene::build_view (std::size_t which, const SurfaceSettings &settings)
+{
+  ViewMemory &memory = memory_[which];
+  const ConstRangeImage &image = views_[which].image;
+  const bool blends = settings.strips.mode == StripMode::kBlend;
+  const bool is_reduced = reduced_ >> which & 1;
+  const int reach = is_reduced ? 1 : 2; /* beyond the last pixels, quarters of a pixel */
+  results_[which] = {};
+  if (blends)
+    make_blend_planes ({views_.data (), count_}, which, settings.strips.depth_step, memory.planes);
+  build_strips (
+      image, settings.strips, memory.vertices, results_[which], blends ? &memory.planes : nullptr);
+  if (blends)
+    make_blend_vertices (image, memory.planes, memory.vertices, reach, memory.blend_vertices);
+  if (is_reduced)
+    results_[which].points = memory.reduced.points ();
+}
+
+void
+SurfaceScene::build (std::span<const RangeImage> images, const SurfaceSettings &settings,
+    const Orbit &orbit, bool same_frame_set)
+{
+  const std::uint64_t reduced = views_against (images, settings, orbit);
+  const bool built = same_frame_set && reduced == reduced_ && complete_ &&
+                     count_ == images.size () && built_with_ == settings.serial;
+  const bool blends = settings.strips.mode == StripMode::kBlend;
+  complete_ = false; /* what follows may throw */
+  count_ = images.size ();
+  reduced_ = reduced;
+  for (std::size_t i = 0; i < images.size (); i++) {
+    const bool is_reduced = reduced >> i & 1;
+    if (built && is_reduced)
+      continue;
+    const View *view = rig_->find (images[i].view_id);
+    ConstRangeImage image = images[i]; /* may be mapped elsewhere than last time */
+    if (settings.tint_views && built)
+      image.colour = views_[i].image.colour;
+    else if (settings.tint_views)
+      image.colour = tinted (images[i].colour,
+          camera_colour (std::size_t (view - rig_->views.data ())), memory_[i].tinted);
+    views_[i] = {image, view};
+    if (is_reduced)
+      views_[i] = memory_[i].reduced.reduce (views_[i]);
+  }
+  in_parallel (built ? 0 : images.size (), 0, [&] (std::size_t i) { build_view (i, settings); });
+  for (std::size_t i = 0; i < images.size (); i++) {
+    layers_[i] = {views_[i].image, views_[i].view, {}};
+    if (blends)
+      layers_[i].blend_vertices = memory_[i].blend_vertices;
+    else
+      layers_[i].vertices = memory_[i].vertices;
+  }
+  if (!built) {
+    hull_.clear ();
+    for (const SurfaceLayer &layer : layers ())
+      append_hull (layer.image, *layer.view, hull_);
+    serial_++;
+  }
+  built_with_ = settings.serial;
+  complete_ = true;
+}
+
+} // namespace rangecast
