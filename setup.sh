@@ -37,6 +37,8 @@ packages=(
   libgirepository1.0-dev python3-gst-1.0 python3-numpy
   # benchmarks
   libturbojpeg0-dev libzstd-dev libpng-dev libdraco-dev libavcodec-dev
+  # rangecast.wasm, the decoder for browsers; its tests
+  clang-19 lld-19 wasi-libc libc++-19-dev-wasm32 libc++abi-19-dev-wasm32 libclang-rt-19-dev-wasm32 nodejs
   # tests
   libgtest-dev iproute2 openssl opencv-doc valgrind xvfb xauth xdotool aravis-tools aravis-tools-cli umockdev libumockdev-dev
 )

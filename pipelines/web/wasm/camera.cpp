@@ -1,0 +1,273 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The orbiting camera, and the numbers that the shaders take. */
+#include <algorithm>
+#include <cstring>
+#include <iterator>
+#include <rangecast/surface/orbit_motion.hpp>
+#include <rangecast/surface/painting.hpp>
+#include <rangecast/surface/shaders.hpp>
+#include <vector>
+
+#include "border.hpp"
+
+using rangecast::Mat4;
+using rangecast::Roi;
+using rangecast::SceneFrame;
+using rangecast::Vec3;
+using rangecast::View;
+
+namespace {
+
+/* What rc_scene_state() wrote, one number after another. */
+class StateReader {
+public:
+  explicit StateReader (std::span<const std::uint8_t> bytes) : bytes_ (bytes) {}
+
+  double number ()
+  {
+    double value = 0;
+    good_ = good_ && bytes_.size () - at_ >= sizeof value;
+    if (good_)
+      std::memcpy (&value, bytes_.data () + at_, sizeof value);
+    at_ += good_ ? sizeof value : 0;
+    return value;
+  }
+  int integer ()
+  {
+    constexpr double kMax = 1e9;
+    const double value = number ();
+    good_ = good_ && value >= -kMax && value <= kMax;
+    return good_ ? static_cast<int> (value) : 0;
+  }
+  Vec3 vector ()
+  {
+    const double x = number (), y = number (), z = number ();
+    return {x, y, z};
+  }
+  /* A number of things that follow, of so many numbers each. */
+  std::size_t count (std::size_t numbers)
+  {
+    const double value = number ();
+    const double most = double (bytes_.size () - at_) / double (numbers * sizeof (double));
+    good_ = good_ && value >= 0 && value <= most;
+    return good_ ? static_cast<std::size_t> (value) : 0;
+  }
+  [[nodiscard]] bool ended_well () const { return good_ && at_ == bytes_.size (); }
+
+private:
+  std::span<const std::uint8_t> bytes_;
+  std::size_t at_ = 0;
+  bool good_ = true;
+};
+
+struct Layer {
+  View view;
+  Roi roi;
+};
+
+struct Scene {
+  rangecast::StripMode mode = rangecast::StripMode::kBlend;
+  std::size_t rig_views = 1;
+  SceneFrame home;
+  std::vector<Layer> layers;
+  std::vector<Vec3> hull;
+};
+
+constexpr std::size_t kNumbersOfLayer = 24;
+
+bool
+read_scene (StateReader &reader, Scene &to)
+{
+  to.mode = reader.integer () == 1 ? rangecast::StripMode::kStrips : rangecast::StripMode::kBlend;
+  to.rig_views = reader.count (1); /* there are more numbers than views */
+  to.layers.resize (reader.count (kNumbersOfLayer));
+  to.hull.resize (reader.count (3));
+  to.home.target = reader.vector ();
+  to.home.to_first = reader.vector ();
+  to.home.up = reader.vector ();
+  for (double *value : {&to.home.distance_m, &to.home.elevation_deg, &to.home.fov_deg,
+           &to.home.off_centre_x, &to.home.off_centre_y})
+    *value = reader.number ();
+  for (auto &[view, roi] : to.layers) {
+    for (int *value : {&view.id, &view.width, &view.height})
+      *value = reader.integer ();
+    rangecast::Intrinsics &lens = view.intrinsics;
+    for (double *value : {&lens.fx, &lens.fy, &lens.cx, &lens.cy, &view.depth_unit_m})
+      *value = reader.number ();
+    for (double &value : view.world_from_view.rotation)
+      value = reader.number ();
+    view.world_from_view.translation = reader.vector ();
+    for (int *value : {&roi.x, &roi.y, &roi.width, &roi.height})
+      *value = reader.integer ();
+  }
+  for (Vec3 &point : to.hull)
+    point = reader.vector ();
+  return reader.ended_well ();
+}
+
+struct Camera {
+  rangecast::OrbitMotion motion;
+  Scene scene;
+  std::vector<float> picture;
+};
+
+Camera &
+camera ()
+{
+  static Camera *made = nullptr;
+  if (!made)
+    made = new Camera;
+  return *made;
+}
+
+/* ---- the picture's record ---- */
+
+void
+write (std::vector<float> &to, std::initializer_list<double> values)
+{
+  for (const double value : values)
+    to.push_back (static_cast<float> (value));
+}
+
+void
+write (std::vector<float> &to, const rangecast::LayerPlace &place)
+{
+  to.insert (to.end (), place.clip_from_pixel.begin (), place.clip_from_pixel.end ());
+  to.insert (to.end (), std::begin (place.behind), std::end (place.behind));
+}
+
+/* In mode blend: places of both passes, angles. In mode strips: places of fronts and backs, whose
+ * depths share the depth buffer if backs are drawn. */
+void
+write_layer (std::vector<float> &to, const Layer &layer, const Mat4 &clip_from_world, bool blends,
+    bool backs)
+{
+  const View &view = layer.view;
+  const Mat4 matrix = rangecast::clip_from_pixel (clip_from_world, view, layer.roi);
+  if (blends) {
+    const double depth_gap_m =
+        rangecast::depth_pass_gap (clip_from_world, view, rangecast::kBlendRange_m);
+    write (to, rangecast::place_layer (matrix, clip_from_world, depth_gap_m));
+    write (to, rangecast::place_layer (
+                   matrix, clip_from_world, rangecast::sum_pass_gap (clip_from_world, view)));
+  } else {
+    const double gap_m = rangecast::strip_gap (clip_from_world, view, rangecast::kViewGap_m);
+    for (const bool back : {false, true})
+      write (
+          to, rangecast::place_layer (backs ? rangecast::in_half_of_depths (matrix, back) : matrix,
+                  clip_from_world, gap_m));
+  }
+  const rangecast::LayerAngles angles = rangecast::layer_angles (clip_from_world, view, layer.roi);
+  to.insert (to.end (), std::begin (angles.lens), std::end (angles.lens));
+  to.insert (to.end (), std::begin (angles.viewer), std::end (angles.viewer));
+  write (to, {angles.unit, view.intrinsics.fx, double (layer.roi.width), double (layer.roi.height),
+                 double (view.id)});
+}
+
+} // namespace
+
+/** Takes what rc_scene_state() of any instance gave, from the input. @return Outcome */
+RC_EXPORT (rc_camera_scene) std::int32_t rc_camera_scene (std::uint32_t size)
+{
+  StateReader reader (web::input (size));
+  Scene scene;
+  if (!read_scene (reader, scene))
+    return web::fail ("The scene's state is damaged.");
+  camera ().scene = std::move (scene);
+  return web::kDone;
+}
+
+/** The camera's numbers for a picture of the scene, in OpenGL's coordinates (first row at the
+ *  bottom). Drags count in pixels of the last such picture.
+ *  @param precise  1: sums are floats of 32 bits
+ *  @return an array of floats: background R, G, B, A; weights max, min, inside, outside; the part
+ *  that may be covered (x, y, width, height); depth shift a, b, g; reach; whether it mirrors;
+ *  whether backs are drawn; mode; depth step; number of layers. For each layer two places (matrix
+ *  16, behind 2), lens (4), viewer (3), unit, fx, ROI width and height, view-id */
+RC_EXPORT (rc_camera_picture)
+const float *rc_camera_picture (std::int32_t width, std::int32_t height, std::int32_t precise)
+{
+  Camera &c = camera ();
+  const Scene &scene = c.scene;
+  const bool blends = scene.mode == rangecast::StripMode::kBlend;
+  const double room_m = std::max (2 * rangecast::kViewGap_m, rangecast::kBlendRange_m);
+  const auto matrices = rangecast::orbit_matrices (
+      scene.home, c.motion.orbit, double (width) / height, false, {}, scene.hull, room_m);
+  const Mat4 &clip_from_world = matrices.clip_from_world;
+  c.motion.set_shown (matrices, scene.home, width, height);
+  const auto weights = rangecast::blend_weights (scene.rig_views, precise != 0);
+  const Roi covered =
+      rangecast::covered_part (clip_from_world, scene.hull, width, height, {0, 0, width, height});
+  const auto shift =
+      rangecast::depth_shift (clip_from_world, clip_from_world, rangecast::kBlendRange_m);
+  const bool backs = !blends && scene.rig_views == 1;
+  constexpr unsigned colour = rangecast::kBackgroundColour;
+  std::vector<float> &to = c.picture;
+  to.clear ();
+  write (to, {(colour >> 16) / 255.0, (colour >> 8 & 255) / 255.0, (colour & 255) / 255.0, 1});
+  write (to, {weights.max, weights.min, weights.inside, weights.outside ()});
+  write (to,
+      {double (covered.x), double (covered.y), double (covered.width), double (covered.height)});
+  write (to, {shift.a, shift.b, shift.g, double (rangecast::fill_reach (height)),
+                 double (rangecast::mirrors (clip_from_world)), double (backs), double (scene.mode),
+                 rangecast::StripSettings ().depth_step, double (scene.layers.size ())});
+  for (const Layer &layer : scene.layers)
+    write_layer (to, layer, clip_from_world, blends, backs);
+  return to.data ();
+}
+
+/** @return a record: azimuth, elevation (degrees), distance (metres, 0: default), field of view
+ *  (degrees, 0: default), pan x, y, z (metres), number of times the default was asked for */
+RC_EXPORT (rc_orbit) const double *rc_orbit ()
+{
+  static double record[8];
+  const rangecast::Orbit &o = camera ().motion.orbit;
+  const double values[] = {o.azimuth_deg, o.elevation_deg, o.distance_m, o.fov_deg, o.pan.x,
+      o.pan.y, o.pan.z, double (camera ().motion.home_requests)};
+  std::copy (std::begin (values), std::end (values), record);
+  return record;
+}
+
+RC_EXPORT (rc_set_orbit)
+void rc_set_orbit (double azimuth_deg, double elevation_deg, double distance_m, double fov_deg,
+    double pan_x, double pan_y, double pan_z)
+{
+  camera ().motion.orbit = {azimuth_deg, elevation_deg, distance_m, fov_deg, {pan_x, pan_y, pan_z}};
+}
+
+/* What OrbitMotion does. */
+RC_EXPORT (rc_orbit_by) void rc_orbit_by (double dx, double dy)
+{
+  camera ().motion.orbit_by (dx, dy);
+}
+RC_EXPORT (rc_pan_by) void rc_pan_by (double dx, double dy)
+{
+  camera ().motion.pan_by (dx, dy);
+}
+RC_EXPORT (rc_pinch) void rc_pinch (double dx, double dy, double before, double after)
+{
+  camera ().motion.pinch (dx, dy, before, after);
+}
+RC_EXPORT (rc_step) void rc_step (std::int32_t right, std::int32_t up)
+{
+  camera ().motion.step (right, up);
+}
+RC_EXPORT (rc_step_nearer) void rc_step_nearer (std::int32_t nearer)
+{
+  camera ().motion.step_nearer (nearer != 0);
+}
+RC_EXPORT (rc_go_home) void rc_go_home ()
+{
+  camera ().motion.go_home ();
+}
+
+/** The source of a shader (rangecast::Shader) with WebGL2's line of the version; nullptr if there
+ *  is none. */
+RC_EXPORT (rc_shader) const char *rc_shader (std::uint32_t number)
+{
+  static std::string source;
+  if (number >= rangecast::kShaders)
+    return nullptr;
+  source = "#version 300 es\n" + rangecast::shader_source (static_cast<rangecast::Shader> (number));
+  return source.c_str ();
+}

@@ -1,0 +1,365 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// rangecast.wasm through core.js, as the page uses it. usage: node --test tests/web
+import assert from 'node:assert/strict';
+import crypto from 'node:crypto';
+import fs from 'node:fs';
+import path from 'node:path';
+import test from 'node:test';
+import zlib from 'node:zlib';
+import { BLEND, Core, CoreFailure, DONE, END, FAILED, NOTHING, STRIPS } from '../../pipelines/web/core.js';
+import { accessUnits, build, byteStream, changedRigView, corpus, isRigView, joined, play, readStream, source, wasm, wasmFile } from './support.js';
+
+const STREAMS = ['coarse', 'damaged', 'default', 'entropy', 'exact', 'exact-packed', 'inverse', 'packed', 'temporal-entropy',
+  'temporal-lossy', 'temporal-packed', 'temporal-plain'];
+const sums = new Map (fs.readFileSync (path.join (source, 'tests/data/SHA256SUMS'), 'utf8').trim ().split ('\n')
+  .map ((line) => [line.slice (66), line.slice (0, 64)]));
+
+// Full pictures of a view as tests/bitstream/decode.py writes them.
+const fullPictures = (camera, view) => {
+  const depth = Buffer.alloc (2 * camera.width * camera.height), colour = Buffer.alloc (3 * camera.width * camera.height);
+  for (let y = 0; view && y < view.height; y++)
+    for (let x = 0; x < view.width; x++) {
+      const from = y * view.width + x, to = (view.y + y) * camera.width + view.x + x;
+      if (view.depth[from] === 0)
+        continue;
+      depth.writeUInt16LE (view.depth[from], 2 * to);
+      colour.set (view.colour.subarray (4 * from, 4 * from + 3), 3 * to);
+    }
+  return { depth, colour };
+};
+
+// Adds the pictures of the last frame set to digests by name, "depth-0.raw" and so on.
+const addDigests = (core, digests) => {
+  const views = core.views ();
+  for (const camera of core.rig ())
+    for (const [kind, bytes] of Object.entries (fullPictures (camera, views.find ((view) => view.id === camera.id)))) {
+      const name = `${kind}-${camera.id}.raw`;
+      if (!digests.has (name))
+        digests.set (name, crypto.createHash ('sha256'));
+      digests.get (name).update (bytes);
+    }
+};
+const digestOfFrame = (core) => {
+  const digests = new Map ();
+  addDigests (core, digests);
+  return [...digests].map (([name, hash]) => `${name} ${hash.digest ('hex')}`).join ('\n');
+};
+
+const expectGolden = (stream, digests) => {
+  const expected = [...sums.keys ()].filter ((name) => name.startsWith (`${stream}-depth`) || name.startsWith (`${stream}-colour`));
+  assert.ok (expected.length >= 2 && expected.length === digests.size, `${stream}: ${digests.size} pictures`);
+  for (const [name, hash] of digests)
+    assert.equal (hash.digest ('hex'), sums.get (`${stream}-${name}`), `${stream}-${name}`);
+};
+
+// All frame sets to the end. @return digests, and the sentence at the end
+const playToEnd = (core) => {
+  const digests = new Map ();
+  let outcome;
+  while ((outcome = core.call ('rc_recording_next')) === DONE)
+    addDigests (core, digests);
+  return { digests, outcome, message: core.message () };
+};
+
+const decodeFirst = (core = new Core (wasm)) => {
+  core.addUnits (joined (accessUnits (readStream ('default'))[0]));
+  assert.equal (core.decode (), DONE);
+  return core;
+};
+const memoryOf = (core) => core.memory.buffer.byteLength;
+
+for (const stream of STREAMS)
+  test (`recording ${stream} decodes to the pictures of the specification`, () => {
+    const { digests, outcome } = playToEnd (play (readStream (stream)));
+    assert.equal (outcome, END);
+    expectGolden (stream, digests);
+  });
+
+test ('access units decode as the recording does', () => {
+  for (const stream of ['default', 'temporal-entropy', 'temporal-plain']) {
+    const core = new Core (wasm), digests = new Map ();
+    for (const units of accessUnits (readStream (stream))) {
+      core.addUnits (joined (units));
+      assert.equal (core.decode (), DONE);
+      addDigests (core, digests);
+    }
+    expectGolden (stream, digests);
+  }
+});
+
+test ('slices decode one by one, in any order', () => {
+  const core = new Core (wasm), digests = new Map ();
+  for (const units of accessUnits (readStream ('packed'))) {
+    for (const unit of units.slice ().reverse ())
+      core.addUnits (unit);
+    assert.equal (core.decode (), DONE);
+    addDigests (core, digests);
+  }
+  expectGolden ('packed', digests);
+});
+
+test ('a lost slice costs its own pixels only', () => {
+  const units = accessUnits (readStream ('packed'))[0], core = new Core (wasm);
+  const lost = units.findIndex ((unit) => !isRigView (unit));
+  core.addUnits (joined (units.filter ((_, i) => i !== lost)));
+  assert.equal (core.decode (), DONE);
+  const frame = core.frame ();
+  assert.ok (frame.missingPixels > 0 && frame.points > 0);
+  assert.equal (frame.badSlices, 0);
+});
+
+test ('units without a rig are no frame set and no error', () => {
+  const core = new Core (wasm);
+  core.addUnits (joined (accessUnits (readStream ('default'))[0].filter ((unit) => !isRigView (unit))));
+  assert.equal (core.decode (), NOTHING);
+  assert.equal (core.call ('rc_rig_views'), 0);
+});
+
+test ('every prefix of a recording ends with a sentence', () => {
+  const bytes = readStream ('default'), core = new Core (wasm);
+  let cutOff = 0;
+  for (let size = 0; size < bytes.length; size += size < 300 || size > bytes.length - 100 ? 1 : 37) {
+    const { outcome, message } = playToEnd (play (bytes.slice (0, size), core));
+    if (outcome === END && message !== '') {
+      assert.match (message, /^The recording is cut off: its last frame set has \d+ of \d+ bytes\.$/);
+      cutOff++;
+    }
+    if (outcome === FAILED)
+      assert.match (message, /^(This is no recording of gst-rangecast|The recording (ends before its first whole picture|has no rig))/);
+    assert.ok (outcome === END || outcome === FAILED);
+  }
+  assert.ok (cutOff > 20);
+  assert.equal (core.renewals, 0);
+});
+
+test ('a foreign file is refused in one sentence', () => {
+  for (const bytes of [new TextEncoder ().encode ('<!doctype html><title>404</title>'.repeat (200)), crypto.randomBytes (5 << 20), new Uint8Array (0)]) {
+    const { outcome, message } = playToEnd (play (bytes));
+    assert.equal (outcome, FAILED);
+    assert.equal (message, 'This is no recording of gst-rangecast (.rcnc).');
+  }
+});
+
+test ('a future version is refused in one sentence', () => {
+  const bytes = readStream ('default');
+  const version = (bytes[4] >> 4) + 1;
+  for (let at = 0; at < bytes.length; at++)
+    if (bytes[at] === 0 && bytes[at + 1] === 0x52 && bytes[at + 2] === 0x43 && bytes[at + 3] === 0x55)
+      bytes[at + 4] = version << 4 | bytes[at + 4] & 15;
+  const { outcome, message } = playToEnd (play (bytes));
+  assert.equal (outcome, FAILED);
+  assert.equal (message, `The recording cannot be read: unit: version ${version}, expected ${version - 1}.`);
+  const core = decodeFirst ();
+  core.addUnits (joined (accessUnits (readStream ('default'))[0].map ((unit) => { unit[0] = version << 4 | unit[0] & 15; return unit; })));
+  assert.equal (core.decode (), NOTHING);
+});
+
+test ('64 views are refused in one sentence', () => {
+  const units = accessUnits (readStream ('default'))[0], view = units.find (isRigView);
+  const views = Array.from ({ length: 64 }, (_, i) => changedRigView (view, { number: i, total: 64, id: i }));
+  const slices = units.filter ((unit) => !isRigView (unit));
+  const { outcome, message } = playToEnd (play (byteStream ([[...views, ...slices], slices])));
+  assert.equal (outcome, FAILED);
+  assert.equal (message, 'The rig has 64 views; the browser shows at most 16.');
+});
+
+test ('a view of 16384 pixels is refused in one sentence', () => {
+  const units = accessUnits (readStream ('exact'))[0];
+  const made = units.map ((unit) => isRigView (unit) && unit[4] === 0 ? changedRigView (unit, { number: 0, total: unit[5], id: unit[20], width: 16384 }) : unit);
+  const { outcome, message } = playToEnd (play (byteStream ([made])));
+  assert.equal (outcome, FAILED);
+  assert.equal (message, 'View 0 has 16384x36 pixels; the browser shows at most 8192 each way.');
+});
+
+test ('a rig of more pixels than any rig has is refused in one sentence', () => {
+  const units = accessUnits (readStream ('exact'))[0];
+  const made = units.map ((unit) => isRigView (unit) ? changedRigView (unit, { number: unit[4], total: unit[5], id: unit[20], width: 16384, height: 16384 }) : unit);
+  const { outcome, message } = playToEnd (play (byteStream ([made])));
+  assert.equal (outcome, FAILED);
+  assert.match (message, /^The rig is too large: .*\.$/);
+});
+
+test ('after a refused rig the next one is shown', () => {
+  const units = accessUnits (readStream ('exact'))[0], core = new Core (wasm);
+  core.addUnits (joined (units.map ((unit) => isRigView (unit) ? changedRigView (unit, { number: unit[4], total: unit[5], id: unit[20], width: 9000 }) : unit)));
+  assert.equal (core.decode (), FAILED);
+  decodeFirst (core);
+});
+
+test ('seeking comes to the frame sets that playing comes to', () => {
+  for (const stream of ['coarse', 'temporal-packed']) {
+    const bytes = readStream (stream), core = play (bytes), shown = [];
+    while (core.call ('rc_recording_next') === DONE)
+      shown.push ({ pts: core.frame ().pts, digest: digestOfFrame (core) });
+    assert.equal (core.record ('rc_recording').duration, shown.at (-1).pts);
+    for (const { pts, digest } of shown.slice ().reverse ()) {
+      assert.equal (core.call ('rc_recording_seek', pts + 0.001), DONE);
+      do
+        assert.equal (core.call ('rc_recording_next'), DONE);
+      while (core.frame ().pts < pts);
+      assert.equal (core.frame ().pts, pts);
+      assert.equal (digestOfFrame (core), digest, `${stream} at ${pts} ms`);
+    }
+  }
+});
+
+test ('memory stays the same while a recording repeats', () => {
+  const core = new Core (wasm), bytes = readStream ('temporal-entropy');
+  const round = () => {
+    playToEnd (play (bytes, core));
+    core.call ('rc_build', BLEND, 1, 4 / 3, 0, 0, 0, 0, 0, 0, 0, 0);
+  };
+  for (let i = 0; i < 5; i++)
+    round ();
+  const before = memoryOf (core);
+  for (let i = 0; i < 200; i++)
+    round ();
+  assert.equal (memoryOf (core), before);
+});
+
+test ('the corpus of the fuzzers leaves an instance that works', () => {
+  const core = new Core (wasm), limit = 64 << 20;
+  let inputs = 0;
+  for (const { name, bytes } of ['access_unit', 'byte_stream', 'parse', 'rig', 'rtp_depay', 'slice'].flatMap (corpus)) {
+    play (bytes, core);
+    for (let frames = 0; frames < 100 && core.call ('rc_recording_next') === DONE; frames++)
+      core.call ('rc_build', frames % 2, 1, 1, 40, 10, 0, 0, 0, 0, 0, 0);
+    decodeFirst (core);
+    core.addUnits (bytes);
+    core.decode ();
+    core.call ('rc_build', BLEND, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0);
+    core.call ('rc_forget_stream');
+    assert.equal (core.renewals, 0, name);
+    assert.ok (memoryOf (core) < limit, `${name}: ${memoryOf (core)} bytes`);
+    inputs++;
+  }
+  assert.ok (inputs > 500, `${inputs} inputs`);
+});
+
+for (const target of ['access_unit', 'byte_stream', 'rig', 'slice'])
+  test (`fuzz target ${target} holds for its corpus`, () => {
+    const module = new WebAssembly.Module (fs.readFileSync (path.join (build, 'tests/web', `fuzz_${target}.wasm`)));
+    const core = new Core (module);
+    let inputs = 0;
+    for (const { name, bytes } of corpus (target)) {
+      for (let k = 1; k <= 16; k++) {
+        const part = bytes.subarray (0, Math.floor (bytes.length * k / 16));
+        const at = core.exports.malloc (Math.max (part.length, 1));
+        core.bytes (at, part.length).set (part);
+        assert.doesNotThrow (() => core.exports.LLVMFuzzerTestOneInput (at, part.length), `${name}, ${part.length} bytes`);
+        core.exports.free (at);
+      }
+      inputs++;
+    }
+    assert.ok (inputs > 0, `${inputs} inputs`);
+  });
+
+test ('an instance that runs out of memory is made anew', () => {
+  const core = decodeFirst ();
+  const left = (512 << 20) - memoryOf (core);
+  core.memory.grow (left / 65536);
+  assert.throws (() => core.memory.grow (1), RangeError); // the limit that border.hpp states
+  assert.throws (() => {
+    for (let i = 0; i < 100; i++) {
+      const units = joined (accessUnits (readStream ('exact'))[0]);
+      core.addUnits (joined (Array.from ({ length: 60 }, () => units)));
+      core.input (new Uint8Array (20 << 20));
+    }
+  }, CoreFailure);
+  assert.equal (core.renewals, 1);
+  decodeFirst (core);
+});
+
+test ('an error of the reader is reported, and the instance made anew', () => {
+  const core = play (readStream ('default'));
+  core.read = () => { throw new Error ('the file is gone'); };
+  assert.throws (() => core.call ('rc_recording_next'), /the file is gone/);
+  decodeFirst (core);
+});
+
+test ('a message longer than any access unit is refused', () => {
+  const core = new Core (wasm);
+  assert.equal (core.input (new Uint8Array ((32 << 20) + 1000)), false);
+});
+
+const buildScene = (core, mode, fits = 1, azimuth = 0) => assert.equal (core.call ('rc_build', mode, fits, 4 / 3, azimuth, 0, 0, 0, 0, 0, 0, 0), DONE);
+const stateOf = (core) => {
+  const state = core.record ('rc_scene_state');
+  return core.bytes (state.address, state.size).slice ();
+};
+
+test ('each view of a frame set has vertices in both modes', () => {
+  const core = decodeFirst ();
+  for (const [mode, size] of [[BLEND, 12], [STRIPS, 4]]) {
+    buildScene (core, mode);
+    assert.equal (core.call ('rc_layers'), 2);
+    for (let i = 0; i < 2; i++) {
+      const layer = core.record ('rc_layer', i);
+      assert.ok (layer.size > 100 * size && layer.size % size === 0);
+      assert.ok (layer.width > 0 && layer.height > 0 && layer.depthStride >= layer.width);
+    }
+    assert.equal (core.call ('rc_layer', 2), 0);
+  }
+});
+
+test ('another instance draws the scene of the first', () => {
+  const maker = decodeFirst (), camera = new Core (wasm);
+  buildScene (maker, BLEND);
+  assert.ok (camera.input (stateOf (maker)));
+  assert.equal (camera.call ('rc_camera_scene', stateOf (maker).length), DONE);
+  const at = camera.call ('rc_camera_picture', 640, 480, 0), head = camera.floats (at, 21).slice ();
+  assert.equal (head[20], 2); // layers
+  assert.equal (head[18], BLEND);
+  const [x, y, width, height] = head.slice (8, 12);
+  assert.ok (x >= 0 && y >= 0 && x + width <= 640 && y + height <= 480);
+  assert.ok (height > 0.7 * 480 || width > 0.7 * 640, 'fitted to the person');
+  assert.ok (camera.floats (at, 21 + 2 * 48).every (Number.isFinite));
+});
+
+test ('a damaged scene is refused', () => {
+  const maker = decodeFirst (), camera = new Core (wasm);
+  buildScene (maker, BLEND);
+  const state = stateOf (maker);
+  for (const size of [0, 8, 16, 40, state.length - 8, state.length - 1]) {
+    camera.input (state.subarray (0, size));
+    assert.equal (camera.call ('rc_camera_scene', size), FAILED);
+  }
+  const many = state.slice ();
+  new DataView (many.buffer).setFloat64 (24, 1e15, true); // points of the hull
+  camera.input (many);
+  assert.equal (camera.call ('rc_camera_scene', many.length), FAILED);
+  assert.equal (camera.renewals, 0);
+});
+
+test ('dragging over the whole width turns by half a circle', () => {
+  const core = new Core (wasm);
+  core.call ('rc_camera_picture', 800, 600, 0);
+  core.call ('rc_orbit_by', -800, 0);
+  assert.equal (core.record ('rc_orbit').azimuth, 180);
+  core.call ('rc_step_nearer', 1);
+  assert.ok (Math.abs (core.record ('rc_orbit').distance - 1 / 1.1) < 1e-9);
+  core.call ('rc_go_home');
+  assert.deepEqual (core.record ('rc_orbit'), { azimuth: 0, elevation: 0, distance: 0, fieldOfView: 0, panX: 0, panY: 0, panZ: 0, homeRequests: 1 });
+});
+
+test ('the point cloud has all points', () => {
+  const core = decodeFirst (), file = Buffer.from (core.ply ());
+  const end = file.indexOf ('end_header\n') + 'end_header\n'.length;
+  assert.match (file.toString ('latin1', 0, end), new RegExp (`^ply\nformat binary_little_endian 1.0\n[^]*element vertex ${core.frame ().points}\n`));
+  assert.equal (file.length - end, 15 * core.frame ().points);
+  assert.equal (new Core (wasm).ply (), null);
+});
+
+test ('shaders are for WebGL2', () => {
+  const core = new Core (wasm);
+  for (let i = 0; i < 12; i++)
+    assert.match (core.text (core.call ('rc_shader', i)), /^#version 300 es\n[^]*void main/);
+  assert.equal (core.call ('rc_shader', 12), 0);
+});
+
+test ('page and module are smaller than 150 KB, compressed', () => {
+  const folder = path.join (source, 'pipelines/web');
+  const page = fs.readdirSync (folder).filter ((name) => /\.(js|html|css)$/.test (name)).map ((name) => path.join (folder, name));
+  const size = [wasmFile, ...page].reduce ((sum, file) => sum + zlib.gzipSync (fs.readFileSync (file)).length, 0);
+  assert.ok (size < 150_000, `${size} bytes`);
+});
