@@ -38,7 +38,7 @@ packages=(
   # benchmarks
   libturbojpeg0-dev libzstd-dev libpng-dev libdraco-dev libavcodec-dev
   # rangecast.wasm, the decoder for browsers; its tests
-  clang-19 lld-19 wasi-libc libc++-19-dev-wasm32 libc++abi-19-dev-wasm32 libclang-rt-19-dev-wasm32 nodejs
+  clang-19 lld-19 wasi-libc libc++-19-dev-wasm32 libc++abi-19-dev-wasm32 libclang-rt-19-dev-wasm32 nodejs chromium
   # tests
   libgtest-dev iproute2 openssl opencv-doc valgrind xvfb xauth xdotool aravis-tools aravis-tools-cli umockdev libumockdev-dev
 )

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// The worker: decodes what a source delivers and makes vertices of the newest frame set, when the page has drawn the one before.
+//
+// A source is a class with start (), close () and, where it can, toggle () and seek (ms). It gets this stage: core to decode with,
+// decoded (due) after each frame set, discard () for one that will not be shown, position (...) and say (...).
+import { Core, DONE } from './core.js';
+import { RecordingSource } from './recording-source.js';
+
+class Stage {
+  constructor (module) {
+    this.core = new Core (module);
+    this.source = null;
+    this.view = null; // what the page looks from
+    this.drawing = false; // the page has a frame set that it has not drawn yet
+    this.waiting = null; // facts about the newest frame set, not shown yet
+    this.skipped = 0;
+    this.decodeTime = 0;
+  }
+
+  say (text, kind = 'error') { postMessage ({ type: 'say', text, kind }); }
+  position (time, duration, playing) { postMessage ({ type: 'position', time, duration, playing }); }
+
+  // decode (): an Outcome. Measures it; a failure of the core is said, and FAILED returned.
+  decode (decode) {
+    const begin = performance.now ();
+    const outcome = decode ();
+    this.decodeTime += performance.now () - begin;
+    return outcome;
+  }
+
+  // The core has a new frame set. due: when it should be seen, ms since the epoch
+  decoded (due) {
+    if (this.waiting)
+      this.skipped++;
+    this.waiting = { due };
+    this.show ();
+  }
+
+  show () {
+    if (!this.waiting || this.drawing || !this.view)
+      return;
+    const { due } = this.waiting, begin = performance.now ();
+    this.waiting = null;
+    if (!this.build ())
+      return;
+    const { core } = this, layers = [], transfer = [];
+    for (let i = 0; i < core.call ('rc_layers'); i++) {
+      const layer = core.record ('rc_layer', i);
+      const copied = { id: layer.id, vertices: core.bytes (layer.vertices, layer.size).slice () };
+      transfer.push (copied.vertices.buffer);
+      if (this.view.mode === 1) {
+        Object.assign (copied, { width: layer.width, height: layer.height,
+          depth: new Uint16Array (core.memory.buffer, layer.depth, layer.depthStride * layer.height).slice (),
+          colour: core.bytes (layer.colour, 4 * layer.colourStride * layer.height).slice () });
+        transfer.push (copied.depth.buffer, copied.colour.buffer);
+      }
+      layers.push (copied);
+    }
+    const state = this.state ();
+    this.drawing = true;
+    postMessage ({ type: 'frame', mode: this.view.mode, layers, state, ...core.frame (), due, skipped: this.skipped,
+      decodeTime: this.decodeTime, buildTime: performance.now () - begin }, [...transfer, state]);
+    this.skipped = this.decodeTime = 0;
+  }
+
+  build () {
+    const v = this.view;
+    try {
+      return this.core.call ('rc_build', v.mode, v.fit ? 1 : 0, v.aspect, v.azimuth, v.elevation, v.distance, v.fieldOfView, v.panX, v.panY, v.panZ,
+        v.homeRequests) === DONE;
+    } catch (error) {
+      this.say (error.message);
+      return false;
+    }
+  }
+  state () {
+    const { address, size } = this.core.record ('rc_scene_state');
+    return this.core.bytes (address, size).slice ().buffer;
+  }
+
+  // ---- from the page ----
+
+  shown () {
+    this.drawing = false;
+    this.show ();
+  }
+  // Of a held frame set other vertices may be needed.
+  look ({ view }) {
+    this.view = view;
+    this.again ();
+  }
+  again () {
+    if (!this.waiting && this.core.frame ().views > 0)
+      this.waiting = { due: performance.timeOrigin + performance.now () };
+    this.show ();
+  }
+  async open ({ recording, paused, time }) {
+    this.source?.close ();
+    this.source = new RecordingSource (this, recording);
+    await this.source.start (paused, time);
+  }
+  points () {
+    const file = this.core.ply ();
+    if (!file)
+      this.say (this.core.message (), 'note');
+    postMessage ({ type: 'points', file: file?.buffer });
+  }
+}
+
+let stage;
+onmessage = ({ data }) => {
+  const actions = {
+    start: () => { stage = new Stage (data.module); },
+    open: () => stage.open (data),
+    view: () => stage.look (data),
+    shown: () => stage.shown (),
+    again: () => stage.again (),
+    toggle: () => stage.source?.toggle?.(),
+    seek: () => stage.source?.seek?.(data.time),
+    points: () => stage.points (),
+  };
+  actions[data.type] ();
+};

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// The page's main thread: it owns the picture and the camera; decoder.js, a worker, owns stream, decoder and geometry. Parameters of the
+// address: src=URL of a recording; mode=blend or strips; stats; fit=0: the first camera's view; azimuth, elevation (degrees);
+// time (ms) and paused.
+import { BLEND, Core, DONE, STRIPS } from './core.js';
+import { followPointers } from './pointers.js';
+import { NoWebGL, Renderer } from './renderer.js';
+import { Stats } from './stats.js';
+
+const element = (id) => document.getElementById (id);
+const canvas = element ('picture');
+const parameters = new URLSearchParams (location.search);
+const settings = { mode: parameters.get ('mode') === 'strips' ? STRIPS : BLEND, fit: parameters.get ('fit') !== '0' };
+
+// ---- what the page says ----
+
+// kind: 'error' or 'note'; an empty text hides it
+const say = (text, kind = 'error') => {
+  const place = element ('message');
+  place.textContent = text;
+  place.className = kind;
+  place.hidden = text === '';
+  document.body.dataset.message = text;
+};
+
+const save = (blob, name) => {
+  const link = document.createElement ('a');
+  link.href = URL.createObjectURL (blob);
+  link.download = name;
+  link.click ();
+  setTimeout (() => URL.revokeObjectURL (link.href), 60000);
+};
+const timeText = (ms) => {
+  const seconds = Math.max (0, ms) / 1000;
+  return `${Math.floor (seconds / 60)}:${(seconds % 60).toFixed (1).padStart (4, '0')}`;
+};
+
+class Page {
+  constructor (module) {
+    this.camera = new Core (module);
+    this.renderer = new Renderer (canvas, (number) => this.camera.text (this.camera.call ('rc_shader', number)));
+    if (!this.renderer.canBlend && settings.mode === BLEND) {
+      settings.mode = STRIPS;
+      say ('This browser cannot draw into float textures: views are drawn as strips, not blended.', 'note');
+    }
+    this.worker = new Worker ('decoder.js', { type: 'module' });
+    this.worker.onmessage = ({ data }) => this[data.type] (data);
+    this.worker.onerror = (event) => say (`The decoder could not be started: ${event.message ?? 'its file could not be loaded'}.`);
+    this.worker.postMessage ({ type: 'start', module });
+    this.stats = new Stats (element ('stats'), parameters.has ('stats'));
+    this.pending = null; // the newest frame set, not uploaded yet
+    this.wanted = false;
+    if (parameters.has ('azimuth') || parameters.has ('elevation'))
+      this.camera.call ('rc_set_orbit', Number (parameters.get ('azimuth') ?? 0), Number (parameters.get ('elevation') ?? 0), 0, 0, 0, 0, 0);
+    this.watch ();
+    this.resize ();
+  }
+
+  // ---- from the worker ----
+
+  frame (frame) {
+    if (this.pending)
+      this.stats.skip ();
+    this.pending = frame;
+    this.draw ();
+  }
+  // The camera's default position, or what surrounds the scene, has changed.
+  scene ({ state }) {
+    this.takeScene (state);
+    this.draw ();
+  }
+  position ({ time, duration, playing }) {
+    const seek = element ('seek');
+    element ('bar').hidden = element ('welcome').hidden = false;
+    element ('welcome').hidden = true;
+    seek.max = Math.max (duration, 1);
+    seek.disabled = duration < 0;
+    if (!seek.matches (':active'))
+      seek.value = time;
+    element ('time').textContent = duration < 0 ? timeText (time) : `${timeText (time)} / ${timeText (duration)}`;
+    element ('play').textContent = playing ? 'Pause' : 'Play';
+    document.body.dataset.state = playing ? 'playing' : 'paused';
+  }
+  say ({ text, kind }) { say (text, kind); }
+  points ({ file }) {
+    if (file)
+      save (new Blob ([file], { type: 'model/ply' }), 'rangecast.ply');
+  }
+
+  // ---- drawing ----
+
+  takeScene (state) {
+    if (this.camera.input (new Uint8Array (state)))
+      this.camera.call ('rc_camera_scene', state.byteLength);
+  }
+
+  draw () {
+    if (this.wanted)
+      return;
+    this.wanted = true;
+    requestAnimationFrame (() => {
+      this.wanted = false;
+      this.paint ();
+    });
+  }
+
+  paint () {
+    const begin = performance.now (), frame = this.pending;
+    this.pending = null;
+    try {
+      if (frame) {
+        this.takeScene (frame.state);
+        this.renderer.upload (frame.mode, frame.layers);
+      }
+      const floats = 21 + 48 * this.renderer.layers.length;
+      const at = this.camera.call ('rc_camera_picture', canvas.width, canvas.height, 0);
+      this.renderer.draw (this.camera.floats (at, floats));
+    } catch (error) {
+      say (error.message);
+    }
+    if (frame) {
+      this.worker.postMessage ({ type: 'shown' });
+      this.stats.shown (frame, performance.now () - begin);
+      document.body.dataset.frameSets = Number (document.body.dataset.frameSets ?? 0) + 1;
+    }
+    this.tellWorker ();
+  }
+
+  // The camera decides which views are reduced, and the shape of the picture what fits.
+  tellWorker () {
+    const view = { ...this.camera.record ('rc_orbit'), aspect: canvas.width / canvas.height, ...settings };
+    const text = JSON.stringify (view);
+    if (text !== this.told)
+      this.worker.postMessage ({ type: 'view', view });
+    this.told = text;
+  }
+
+  // ---- from the user ----
+
+  open (recording) {
+    say ('');
+    element ('welcome').hidden = true;
+    this.worker.postMessage ({ type: 'open', recording, paused: parameters.has ('paused'), time: Number (parameters.get ('time') ?? 0) });
+  }
+
+  resize () {
+    const ratio = window.devicePixelRatio || 1;
+    const side = this.renderer.largest;
+    canvas.width = Math.max (1, Math.min (side, Math.round (canvas.clientWidth * ratio)));
+    canvas.height = Math.max (1, Math.min (side, Math.round (canvas.clientHeight * ratio)));
+    this.draw ();
+  }
+
+  move (name, ...args) {
+    this.camera.call (name, ...args);
+    this.draw ();
+  }
+  toggleMode () {
+    if (!this.renderer.canBlend)
+      return;
+    settings.mode = settings.mode === BLEND ? STRIPS : BLEND;
+    element ('mode').textContent = settings.mode === BLEND ? 'Blend' : 'Strips';
+    this.draw ();
+  }
+  key (event) {
+    const actions = {
+      ArrowLeft: () => this.move ('rc_step', -1, 0), ArrowRight: () => this.move ('rc_step', 1, 0),
+      ArrowUp: () => this.move ('rc_step', 0, 1), ArrowDown: () => this.move ('rc_step', 0, -1),
+      '+': () => this.move ('rc_step_nearer', 1), '=': () => this.move ('rc_step_nearer', 1), '-': () => this.move ('rc_step_nearer', 0),
+      Home: () => this.move ('rc_go_home'), r: () => this.move ('rc_go_home'), m: () => this.toggleMode (),
+      ' ': () => this.worker.postMessage ({ type: 'toggle' }),
+    };
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches ('input, button') || !actions[event.key])
+      return;
+    event.preventDefault ();
+    actions[event.key] ();
+  }
+
+  watch () {
+    new ResizeObserver (() => this.resize ()).observe (canvas);
+    followPointers (canvas, (name, ...args) => this.move (name, ...args));
+    addEventListener ('keydown', (event) => this.key (event));
+    canvas.addEventListener ('webglcontextlost', (event) => {
+      event.preventDefault ();
+      say ('The browser took the graphics memory away; the picture returns when it gives it back.');
+    });
+    canvas.addEventListener ('webglcontextrestored', () => {
+      this.renderer.start ();
+      say ('');
+      this.told = '';
+      this.worker.postMessage ({ type: 'again' });
+    });
+    element ('play').onclick = () => this.worker.postMessage ({ type: 'toggle' });
+    element ('seek').oninput = () => this.worker.postMessage ({ type: 'seek', time: Number (element ('seek').value) });
+    element ('home').onclick = () => this.move ('rc_go_home');
+    element ('mode').textContent = settings.mode === BLEND ? 'Blend' : 'Strips';
+    element ('mode').onclick = () => this.toggleMode ();
+    element ('save-picture').onclick = () => canvas.toBlob ((blob) => blob && save (blob, 'rangecast.png'));
+    element ('save-points').onclick = () => this.worker.postMessage ({ type: 'points' });
+    element ('file').onchange = ({ target }) => target.files[0] && this.open (target.files[0]);
+    addEventListener ('dragover', (event) => {
+      event.preventDefault ();
+      document.body.classList.add ('dropping');
+    });
+    addEventListener ('dragleave', () => document.body.classList.remove ('dropping'));
+    addEventListener ('drop', (event) => {
+      event.preventDefault ();
+      document.body.classList.remove ('dropping');
+      if (event.dataTransfer.files[0])
+        this.open (event.dataTransfer.files[0]);
+    });
+  }
+}
+
+const loadModule = async () => {
+  const answer = await fetch ('rangecast.wasm');
+  if (!answer.ok)
+    throw new Error (`The decoder could not be loaded: ${answer.status} ${answer.statusText}.`);
+  return WebAssembly.compile (await answer.arrayBuffer ()).catch ((error) => {
+    throw new Error (`This browser cannot run the decoder: ${error.message}.`);
+  });
+};
+
+try {
+  const page = new Page (await loadModule ());
+  window.rangecastPage = page; // for tests and for the curious
+  if (parameters.has ('src'))
+    page.open (new URL (parameters.get ('src'), location).href);
+  else
+    element ('welcome').hidden = false;
+} catch (error) {
+  say (error instanceof NoWebGL || error instanceof Error ? error.message : String (error));
+}

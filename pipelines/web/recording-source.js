@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Plays a recording in its own time: a File, or an address. Frame sets follow one another, as later ones may refer to earlier ones; which
+// of them are shown is the stage's business.
+import { DONE, END, NOTHING } from './core.js';
+
+export class RecordingSource {
+  constructor (stage, recording) {
+    this.stage = stage;
+    this.recording = recording;
+    this.playing = false;
+    this.timer = null;
+    this.time = 0; // of the last frame set, ms from the first
+    this.closed = false;
+  }
+
+  async start (paused = false, time = 0) {
+    let file = this.recording;
+    try {
+      if (typeof file === 'string') {
+        this.stage.say ('Loading the recording ...', 'note');
+        const answer = await fetch (file);
+        if (!answer.ok)
+          throw new Error (`${answer.status} ${answer.statusText}`);
+        file = await answer.blob ();
+      }
+    } catch (error) {
+      if (!this.closed)
+        this.stage.say (`The recording could not be loaded: ${error.message}.`);
+      return;
+    }
+    if (this.closed)
+      return;
+    this.stage.say ('');
+    const { core } = this.stage, reader = new FileReaderSync ();
+    core.read = (offset, size) => new Uint8Array (reader.readAsArrayBuffer (file.slice (offset, offset + size)));
+    this.size = file.size;
+    this.open ();
+    if (this.next () && time > 0)
+      this.seek (time);
+    if (!this.failed && !paused)
+      this.play ();
+  }
+
+  open () {
+    this.stage.core.call ('rc_recording_open', this.size);
+    this.atEnd = this.failed = false;
+    this.time = 0;
+  }
+
+  close () {
+    this.closed = true;
+    clearTimeout (this.timer);
+  }
+
+  // Decodes the next frame set. @return false at the end and after a failure, which has been said
+  next () {
+    const { core } = this.stage;
+    let outcome;
+    try {
+      outcome = this.stage.decode (() => core.call ('rc_recording_next'));
+    } catch (error) { // the instance is a new one: begin again after the damage is not possible
+      this.failed = true;
+      this.stage.say (error.message);
+      return this.stop ();
+    }
+    if (outcome === DONE) {
+      const { pts } = core.frame ();
+      this.time = pts >= 0 ? pts : this.time + (this.frameDuration () || 40);
+      this.stage.decoded (performance.timeOrigin + (this.playing ? this.dueOf (this.time) : performance.now ()));
+      this.tell ();
+      return true;
+    }
+    this.atEnd = outcome === END;
+    this.failed = !this.atEnd;
+    if (core.message () !== '' || this.failed)
+      this.stage.say (core.message (), this.atEnd ? 'note' : 'error');
+    return this.stop ();
+  }
+
+  stop () {
+    this.playing = false;
+    clearTimeout (this.timer);
+    this.tell ();
+    return false;
+  }
+
+  frameDuration () { return this.stage.core.record ('rc_recording')?.frameDuration ?? 0; }
+  dueOf (time) { return this.origin + time; }
+
+  tell () {
+    const duration = this.stage.core.record ('rc_recording')?.duration ?? -1;
+    this.stage.position (this.time, duration, this.playing);
+  }
+
+  play () {
+    if (this.failed)
+      return;
+    if (this.atEnd) {
+      this.open ();
+      if (!this.next ())
+        return;
+    }
+    this.playing = true;
+    this.origin = performance.now () - this.time;
+    this.tell ();
+    this.schedule ();
+  }
+
+  schedule () {
+    const period = this.frameDuration () || 40;
+    const wait = this.dueOf (this.time + period) - performance.now ();
+    if (wait < -1000) { // too slow: time goes on from here
+      this.stage.say ('This device is too slow to play the recording in its own time.', 'note');
+      this.origin -= wait;
+    }
+    this.timer = setTimeout (() => {
+      if (this.playing && this.next ())
+        this.schedule ();
+    }, Math.max (0, wait));
+  }
+
+  toggle () {
+    if (this.playing)
+      this.stop ();
+    else
+      this.play ();
+  }
+
+  // Shows the frame set at a time, ms.
+  seek (time) {
+    if (this.failed)
+      return;
+    const { core } = this.stage, period = this.frameDuration () || 1;
+    const wasPlaying = this.playing;
+    clearTimeout (this.timer);
+    this.playing = false;
+    if (core.call ('rc_recording_seek', time) === NOTHING) {
+      this.open ();
+    }
+    this.atEnd = false;
+    while (this.next () && this.time + period / 2 < time)
+      ;
+    if (wasPlaying && !this.atEnd)
+      this.play ();
+  }
+}

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Draws frame sets with WebGL2, as striprender does: its shaders, and numbers from the same code (rc_camera_picture). Knows nothing
+// of streams. What WebGL2 lacks: float targets and their blending are extensions (without EXT_color_buffer_float or _half_float,
+// mode strips is drawn); sums are half floats, so colours of more than 16 views would lose bits.
+import { BLEND, STRIPS } from './core.js';
+
+// rangecast::Shader
+const COVERING = 0, COLOUR = 1, STRIP = 3, BLEND_DEPTH = 6, BLEND_DEPTH_FRAGMENT = 7, BLEND_SUM = 8, BLEND_SUM_FRAGMENT = 9, DIVIDE = 10;
+// Floats of rc_camera_picture: those of the picture, and of each layer.
+const HEAD = 21, LAYER = 48;
+
+export class NoWebGL extends Error {}
+
+class Program {
+  constructor (gl, vertex, fragment) {
+    this.gl = gl;
+    this.program = gl.createProgram ();
+    for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+      const shader = gl.createShader (type);
+      gl.shaderSource (shader, source);
+      gl.compileShader (shader);
+      gl.attachShader (this.program, shader);
+      if (!gl.getShaderParameter (shader, gl.COMPILE_STATUS) && !gl.isContextLost ())
+        throw new NoWebGL (`A shader does not compile: ${gl.getShaderInfoLog (shader)}`);
+    }
+    gl.linkProgram (this.program);
+    if (!gl.getProgramParameter (this.program, gl.LINK_STATUS) && !gl.isContextLost ())
+      throw new NoWebGL (`A shader does not link: ${gl.getProgramInfoLog (this.program)}`);
+    this.places = new Map ();
+  }
+  use () { this.gl.useProgram (this.program); }
+  at (name) {
+    if (!this.places.has (name))
+      this.places.set (name, this.gl.getUniformLocation (this.program, name));
+    return this.places.get (name);
+  }
+}
+
+export class Renderer {
+  // shader (number): its source
+  constructor (canvas, shader) {
+    this.canvas = canvas;
+    this.shader = shader;
+    // Kept, so that a picture can be saved at any time.
+    this.gl = canvas.getContext ('webgl2', { alpha: false, antialias: false, depth: true, preserveDrawingBuffer: true, powerPreference: 'high-performance' });
+    if (!this.gl)
+      throw new NoWebGL ('This browser has no WebGL2, or it is switched off.');
+    this.start ();
+  }
+
+  // Also after the browser has lost the context and given it back.
+  start () {
+    const gl = this.gl;
+    this.canBlend = Boolean (gl.getExtension ('EXT_color_buffer_float') || gl.getExtension ('EXT_color_buffer_half_float'));
+    const program = (vertex, fragment) => new Program (gl, this.shader (vertex), this.shader (fragment));
+    this.depthPass = program (BLEND_DEPTH, BLEND_DEPTH_FRAGMENT);
+    this.sumPass = program (BLEND_SUM, BLEND_SUM_FRAGMENT);
+    this.divide = program (COVERING, DIVIDE);
+    this.strips = program (STRIP, COLOUR);
+    this.nothing = gl.createVertexArray ();
+    this.objects = new Map (); // by view-id
+    this.layers = [];
+    this.targets = null;
+    this.largest = gl.getParameter (gl.MAX_TEXTURE_SIZE);
+  }
+
+  // Takes the layers of a frame set: { id, vertices: Uint8Array, width, height, depth, colour } (planes in mode strips only).
+  upload (mode, layers) {
+    this.mode = mode;
+    this.layers = layers.map ((layer) => {
+      const objects = this.objectsOf (layer.id, mode);
+      this.uploadVertices (objects, layer.vertices);
+      if (mode === STRIPS)
+        this.uploadPlanes (objects, layer);
+      return { objects, count: layer.vertices.length / (mode === STRIPS ? 4 : 12) };
+    });
+  }
+
+  objectsOf (id, mode) {
+    const gl = this.gl, key = `${id} ${mode}`;
+    if (!this.objects.has (key)) {
+      const objects = { array: gl.createVertexArray (), buffer: gl.createBuffer (), capacity: 0, width: 0, height: 0 };
+      gl.bindVertexArray (objects.array);
+      gl.bindBuffer (gl.ARRAY_BUFFER, objects.buffer);
+      gl.enableVertexAttribArray (0);
+      if (mode === STRIPS) {
+        gl.vertexAttribIPointer (0, 1, gl.UNSIGNED_INT, 4, 0);
+      } else {
+        gl.enableVertexAttribArray (1);
+        gl.enableVertexAttribArray (2);
+        gl.vertexAttribPointer (0, 2, gl.SHORT, false, 12, 0);
+        gl.vertexAttribPointer (1, 1, gl.UNSIGNED_SHORT, false, 12, 4);
+        gl.vertexAttribPointer (2, 4, gl.UNSIGNED_BYTE, true, 12, 8);
+      }
+      this.objects.set (key, objects);
+    }
+    return this.objects.get (key);
+  }
+
+  uploadVertices (objects, vertices) {
+    const gl = this.gl;
+    gl.bindBuffer (gl.ARRAY_BUFFER, objects.buffer);
+    if (vertices.length > objects.capacity) {
+      objects.capacity = Math.ceil (vertices.length * 1.5);
+      gl.bufferData (gl.ARRAY_BUFFER, objects.capacity, gl.DYNAMIC_DRAW);
+    }
+    gl.bufferSubData (gl.ARRAY_BUFFER, 0, vertices);
+  }
+
+  // Textures grow in steps, so that a ROI that follows a person does not need new ones in each picture.
+  uploadPlanes (objects, { width, height, depth, colour }) {
+    const gl = this.gl, step = 64;
+    const define = (texture, internal, format, type) => {
+      gl.bindTexture (gl.TEXTURE_2D, texture);
+      gl.texImage2D (gl.TEXTURE_2D, 0, internal, objects.width, objects.height, 0, format, type, null);
+      this.setNearest ();
+    };
+    gl.activeTexture (gl.TEXTURE0);
+    if (width > objects.width || height > objects.height) {
+      objects.width = Math.min (Math.max (objects.width, Math.ceil (width / step) * step), this.largest);
+      objects.height = Math.min (Math.max (objects.height, Math.ceil (height / step) * step), this.largest);
+      objects.depth ??= gl.createTexture ();
+      objects.colour ??= gl.createTexture ();
+      define (objects.depth, gl.R16UI, gl.RED_INTEGER, gl.UNSIGNED_SHORT);
+      define (objects.colour, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE);
+    }
+    gl.pixelStorei (gl.UNPACK_ALIGNMENT, 1);
+    gl.bindTexture (gl.TEXTURE_2D, objects.depth);
+    gl.texSubImage2D (gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RED_INTEGER, gl.UNSIGNED_SHORT, depth);
+    gl.bindTexture (gl.TEXTURE_2D, objects.colour);
+    gl.texSubImage2D (gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, colour);
+  }
+
+  setNearest () {
+    const gl = this.gl;
+    for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, gl.NEAREST], [gl.TEXTURE_MAG_FILTER, gl.NEAREST],
+      [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE]])
+      gl.texParameteri (gl.TEXTURE_2D, name, value);
+  }
+
+  // picture: the floats of rc_camera_picture for the canvas's size
+  draw (picture) {
+    const gl = this.gl, { width, height } = this.canvas;
+    gl.bindFramebuffer (gl.FRAMEBUFFER, null);
+    gl.viewport (0, 0, width, height);
+    gl.disable (gl.SCISSOR_TEST);
+    gl.clearColor (picture[0], picture[1], picture[2], 1);
+    gl.clear (gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    if (this.layers.length === 0 || picture[20] !== this.layers.length)
+      return;
+    if (this.mode === BLEND)
+      this.drawBlended (picture, width, height);
+    else
+      this.drawStrips (picture);
+  }
+
+  eachLayer (picture, draw) {
+    this.layers.forEach (({ objects, count }, i) => {
+      if (count === 0)
+        return;
+      this.gl.bindVertexArray (objects.array);
+      draw (picture.subarray (HEAD + LAYER * i, HEAD + LAYER * (i + 1)), objects);
+      this.gl.drawArrays (this.gl.TRIANGLE_STRIP, 0, count);
+    });
+    this.gl.bindVertexArray (null);
+  }
+
+  // place: 0 or 1 of the layer's two
+  setPlace (program, layer, place) {
+    this.gl.uniformMatrix4fv (program.at ('u_clip_from_pixel'), false, layer.subarray (18 * place, 18 * place + 16));
+    this.gl.uniform2fv (program.at ('u_behind'), layer.subarray (18 * place + 16, 18 * place + 18));
+  }
+
+  makeTargets (width, height) {
+    const gl = this.gl;
+    if (this.targets?.width === width && this.targets.height === height)
+      return;
+    if (this.targets) {
+      gl.deleteFramebuffer (this.targets.framebuffer);
+      gl.deleteTexture (this.targets.sums);
+      gl.deleteTexture (this.targets.depth);
+    }
+    const texture = (internal, format, type) => {
+      const made = gl.createTexture ();
+      gl.bindTexture (gl.TEXTURE_2D, made);
+      gl.texImage2D (gl.TEXTURE_2D, 0, internal, width, height, 0, format, type, null);
+      this.setNearest ();
+      return made;
+    };
+    gl.activeTexture (gl.TEXTURE0);
+    this.targets = { width, height, framebuffer: gl.createFramebuffer (), sums: texture (gl.RGBA16F, gl.RGBA, gl.HALF_FLOAT),
+      depth: texture (gl.DEPTH_COMPONENT24, gl.DEPTH_COMPONENT, gl.UNSIGNED_INT) };
+    gl.bindTexture (gl.TEXTURE_2D, null);
+    gl.bindFramebuffer (gl.FRAMEBUFFER, this.targets.framebuffer);
+    gl.framebufferTexture2D (gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.targets.sums, 0);
+    gl.framebufferTexture2D (gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, this.targets.depth, 0);
+    if (gl.checkFramebufferStatus (gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE && !gl.isContextLost ())
+      throw new NoWebGL ('WebGL2 has no float framebuffer of this size.');
+  }
+
+  // As BlendPainter::draw ().
+  drawBlended (picture, width, height) {
+    const gl = this.gl;
+    const [x, y, columns, rows] = picture.subarray (8, 12);
+    this.makeTargets (width, height);
+    gl.bindFramebuffer (gl.FRAMEBUFFER, this.targets.framebuffer);
+    gl.enable (gl.SCISSOR_TEST);
+    gl.scissor (x, y, columns, rows);
+    gl.clearColor (0, 0, 0, 0);
+    gl.clear (gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable (gl.DEPTH_TEST);
+    gl.depthFunc (gl.LESS);
+    gl.colorMask (false, false, false, false);
+    this.depthPass.use ();
+    this.eachLayer (picture, (layer) => this.setPlace (this.depthPass, layer, 0));
+
+    gl.colorMask (true, true, true, true);
+    gl.depthMask (false);
+    gl.depthFunc (gl.LEQUAL);
+    gl.enable (gl.BLEND);
+    gl.blendFunc (gl.ONE, gl.ONE);
+    gl.frontFace (picture[16] ? gl.CW : gl.CCW);
+    this.sumPass.use ();
+    gl.uniform3fv (this.sumPass.at ('u_weights'), picture.subarray (4, 7));
+    this.eachLayer (picture, (layer) => {
+      this.setPlace (this.sumPass, layer, 1);
+      gl.uniform4fv (this.sumPass.at ('u_lens'), layer.subarray (36, 40));
+      gl.uniform3fv (this.sumPass.at ('u_viewer'), layer.subarray (40, 43));
+      gl.uniform1f (this.sumPass.at ('u_unit'), layer[43]);
+    });
+    gl.disable (gl.BLEND);
+    gl.depthMask (true);
+    gl.frontFace (gl.CCW);
+    gl.disable (gl.DEPTH_TEST);
+
+    gl.bindFramebuffer (gl.FRAMEBUFFER, null);
+    this.divide.use ();
+    for (const [unit, name, texture] of [[0, 'u_sum', this.targets.sums], [1, 'u_depth', this.targets.depth]]) {
+      gl.activeTexture (gl.TEXTURE0 + unit);
+      gl.bindTexture (gl.TEXTURE_2D, texture);
+      gl.uniform1i (this.divide.at (name), unit);
+    }
+    gl.uniform4i (this.divide.at ('u_part'), x, y, x + columns - 1, y + rows - 1);
+    gl.uniform3fv (this.divide.at ('u_shift'), picture.subarray (12, 15));
+    gl.uniform1f (this.divide.at ('u_outside'), picture[7]);
+    gl.uniform1i (this.divide.at ('u_reach'), picture[15]);
+    gl.uniform4fv (this.divide.at ('u_background'), picture.subarray (0, 4));
+    gl.uniform3f (this.divide.at ('u_shade'), 0, height, 0);
+    gl.bindVertexArray (this.nothing);
+    gl.drawArrays (gl.TRIANGLES, 0, 3);
+    gl.bindVertexArray (null);
+    for (const unit of [1, 0]) { // they are targets again next time
+      gl.activeTexture (gl.TEXTURE0 + unit);
+      gl.bindTexture (gl.TEXTURE_2D, null);
+    }
+    gl.disable (gl.SCISSOR_TEST);
+  }
+
+  // As StripPainter::draw ().
+  drawStrips (picture) {
+    const gl = this.gl, program = this.strips;
+    gl.enable (gl.DEPTH_TEST);
+    gl.depthFunc (gl.LESS);
+    gl.enable (gl.CULL_FACE);
+    program.use ();
+    gl.uniform1i (program.at ('u_depth'), 0);
+    gl.uniform1i (program.at ('u_colour'), 1);
+    gl.uniform1f (program.at ('u_step'), picture[19]);
+    gl.uniform1f (program.at ('u_point_size'), 1);
+    for (const side of picture[17] ? [0, 1] : [0]) {
+      gl.cullFace (Boolean (picture[16]) !== (side === 1) ? gl.FRONT : gl.BACK);
+      this.eachLayer (picture, (layer, objects) => {
+        this.setPlace (program, layer, side);
+        gl.uniform1f (program.at ('u_unit'), layer[43]);
+        gl.uniform1f (program.at ('u_focal'), layer[44]);
+        gl.uniform2i (program.at ('u_size'), layer[45], layer[46]);
+        gl.activeTexture (gl.TEXTURE1);
+        gl.bindTexture (gl.TEXTURE_2D, objects.colour);
+        gl.activeTexture (gl.TEXTURE0);
+        gl.bindTexture (gl.TEXTURE_2D, objects.depth);
+      });
+    }
+    gl.disable (gl.CULL_FACE);
+    gl.disable (gl.DEPTH_TEST);
+  }
+}

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Quality and latency of what is shown, once a second.
+export class Stats {
+  constructor (place, visible) {
+    this.place = place;
+    place.hidden = !visible;
+    this.reset ();
+  }
+  reset () {
+    this.begin = performance.now ();
+    this.count = this.skipped = this.bytes = this.decode = this.build = this.draw = 0;
+  }
+  // A frame set that a newer one replaced before it was drawn.
+  skip () { this.skipped++; }
+
+  // drawing: milliseconds on the main thread
+  shown (frame, drawing) {
+    this.count++;
+    this.skipped += frame.skipped;
+    this.bytes += frame.bytes;
+    this.decode += frame.decodeTime;
+    this.build += frame.buildTime;
+    this.draw += drawing;
+    const elapsed = performance.now () - this.begin;
+    if (elapsed < 1000 || this.place.hidden)
+      return;
+    const mean = (sum) => `${(sum / this.count).toFixed (1)} ms`;
+    this.place.textContent = [
+      `${(1000 * this.count / elapsed).toFixed (1)} frame sets/s shown, ${this.skipped} skipped`,
+      `${frame.views} views, ${frame.points} points, ${(this.bytes / this.count / 1024).toFixed (1)} KiB`,
+      `missing ${frame.missingPixels}, unknown ${frame.unknownPixels} pixels; ${frame.badSlices} damaged slices`,
+      `decode ${mean (this.decode)}, geometry ${mean (this.build)}, draw ${mean (this.draw)}`,
+      `latency ${(performance.timeOrigin + performance.now () - frame.due).toFixed (0)} ms from due to drawn`,
+    ].join ('\n');
+    this.reset ();
+  }
+}

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// The page in headless Chromium; page.sh makes the recordings and striprender's pictures.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import fs from 'node:fs';
+import { createRequire } from 'node:module';
+import path from 'node:path';
+import test, { after, before } from 'node:test';
+
+const build = process.env.RANGECAST_BUILD, source = process.env.RANGECAST_SOURCE;
+const work = path.join (build, 'web-test');
+const puppeteer = createRequire (path.join (work, 'package.json')) ('puppeteer-core');
+
+let browser, server, address;
+
+// A folder of its own, so that the page finds recordings beside itself.
+const prepareFolder = () => {
+  const folder = path.join (work, 'served');
+  fs.rmSync (folder, { recursive: true, force: true });
+  fs.cpSync (path.join (build, 'pipelines/web'), folder, { recursive: true, filter: (from) => !/\.[od]$/.test (from) });
+  for (const name of ['scene.rcnc', 'moving.rcnc', ...fs.readdirSync (work).filter ((file) => /^native-.*\.png$/.test (file))])
+    fs.copyFileSync (path.join (work, name), path.join (folder, name));
+  fs.writeFileSync (path.join (folder, 'foreign.rcnc'), 'this is a text, and no recording\n'.repeat (100));
+  const scene = fs.readFileSync (path.join (work, 'moving.rcnc'));
+  fs.writeFileSync (path.join (folder, 'cut.rcnc'), scene.subarray (0, scene.length - 20));
+  return folder;
+};
+
+before (async () => {
+  const folder = prepareFolder ();
+  server = spawn ('python3', ['-u', '-m', 'http.server', '--bind', '127.0.0.1', '--directory', folder, '0'], { stdio: ['ignore', 'pipe', 'ignore'] });
+  address = await new Promise ((resolve) => {
+    let text = '';
+    server.stdout.on ('data', (data) => {
+      text += data;
+      const port = / port (\d+) /.exec (text);
+      if (port)
+        resolve (`http://127.0.0.1:${port[1]}`);
+    });
+  });
+  browser = await puppeteer.launch ({ executablePath: process.env.CHROMIUM, headless: true,
+    args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--hide-scrollbars'] });
+});
+after (async () => {
+  await browser?.close ();
+  server?.kill ();
+});
+
+const open = async (query, viewport = { width: 640, height: 480 }, prepare = async () => {}) => {
+  const page = await browser.newPage ();
+  page.setDefaultTimeout (60000);
+  await page.setViewport (viewport);
+  await prepare (page);
+  await page.goto (`${address}/index.html?${query}`);
+  return page;
+};
+const message = (page) => page.evaluate (() => document.body.dataset.message ?? '');
+const messageMatches = (page, pattern) => page.waitForFunction ((source) => new RegExp (source).test (document.body.dataset.message ?? ''), {}, pattern);
+const framesShown = (page, count) => page.waitForFunction ((wanted) => Number (document.body.dataset.frameSets ?? 0) >= wanted, {}, count);
+// What is on the canvas once two pictures in a row are equal: the fit comes with the second.
+const picture = async (page) => {
+  let last = '';
+  for (let i = 0; i < 50; i++) {
+    const now = await page.evaluate (() => new Promise ((resolve) => requestAnimationFrame (() => requestAnimationFrame (() =>
+      resolve (document.getElementById ('picture').toDataURL ('image/png'))))));
+    if (now === last)
+      return now;
+    last = now;
+    await new Promise ((resolve) => setTimeout (resolve, 200));
+  }
+  return assert.fail ('the picture does not come to rest');
+};
+
+// In the page: mean difference in levels, and SSIM of grey (mean of 8x8 windows, step 4), of two pictures.
+const compare = (page, ours, theirs) => page.evaluate (async (a, b) => {
+  const grey = async (url) => {
+    const image = new Image ();
+    image.src = url;
+    await image.decode ();
+    const canvas = new OffscreenCanvas (image.width, image.height), context = canvas.getContext ('2d');
+    context.drawImage (image, 0, 0);
+    const { data } = context.getImageData (0, 0, image.width, image.height);
+    return { width: image.width, height: image.height, at: Float64Array.from ({ length: data.length / 4 }, (_, i) =>
+      0.299 * data[4 * i] + 0.587 * data[4 * i + 1] + 0.114 * data[4 * i + 2]) };
+  };
+  const [x, y] = [await grey (a), await grey (b)];
+  if (x.width !== y.width || x.height !== y.height)
+    return { sizes: [x.width, x.height, y.width, y.height] };
+  let difference = 0, sum = 0, windows = 0, shown = 0;
+  x.at.forEach ((value, i) => { difference += Math.abs (value - y.at[i]); shown += Math.abs (value - x.at[0]) > 4; });
+  for (let top = 0; top + 8 <= x.height; top += 4)
+    for (let left = 0; left + 8 <= x.width; left += 4) {
+      let sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0;
+      for (let v = top; v < top + 8; v++)
+        for (let u = left; u < left + 8; u++) {
+          const p = x.at[v * x.width + u], q = y.at[v * x.width + u];
+          sx += p, sy += q, sxx += p * p, syy += q * q, sxy += p * q;
+        }
+      const mx = sx / 64, my = sy / 64, vx = sxx / 64 - mx * mx, vy = syy / 64 - my * my, vxy = sxy / 64 - mx * my;
+      sum += (2 * mx * my + 6.5025) * (2 * vxy + 58.5225) / ((mx * mx + my * my + 6.5025) * (vx + vy + 58.5225));
+      windows++;
+    }
+  return { difference: difference / x.at.length, ssim: sum / windows, shown: shown / x.at.length };
+}, ours, theirs);
+
+for (const mode of ['blend', 'strips'])
+  for (const angle of [0, -30, 45, 100, 180])
+    test (`mode ${mode} at ${angle} degrees is striprender's picture`, async () => {
+      const page = await open (`src=scene.rcnc&paused&mode=${mode}&azimuth=${angle}`);
+      await framesShown (page, 1);
+      const ours = await picture (page);
+      fs.writeFileSync (path.join (work, `page-${mode}-${angle}.png`), Buffer.from (ours.split (',')[1], 'base64'));
+      const result = await compare (page, ours, `native-${mode}-${angle}.png`);
+      assert.equal (await message (page), '');
+      assert.ok (result.shown > 0.1, `a person is there: ${JSON.stringify (result)}`);
+      assert.ok (result.ssim >= 0.98 && result.difference <= 3, JSON.stringify (result));
+      await page.close ();
+    });
+
+test ('a foreign file gives its sentence', async () => {
+  const page = await open ('src=foreign.rcnc');
+  await messageMatches (page, '^This is no recording of gst-rangecast \\(\\.rcnc\\)\\.$');
+  await page.close ();
+});
+
+test ('a recording that is cut off is shown to its end, and says so', async () => {
+  const page = await open ('src=cut.rcnc');
+  await messageMatches (page, '^The recording is cut off: ');
+  assert.ok (await page.evaluate (() => Number (document.body.dataset.frameSets)) > 0);
+  await page.close ();
+});
+
+test ('a recording that is not there gives its sentence', async () => {
+  const page = await open ('src=nowhere.rcnc');
+  await messageMatches (page, '^The recording could not be loaded: 404 ');
+  await page.close ();
+});
+
+test ('a browser without WebGL2 gives its sentence', async () => {
+  const page = await open ('src=scene.rcnc', undefined, (made) => made.evaluateOnNewDocument (() => {
+    const get = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (type, ...rest) { return type === 'webgl2' ? null : get.call (this, type, ...rest); };
+  }));
+  await messageMatches (page, '^This browser has no WebGL2');
+  await page.close ();
+});
+
+test ('a file that is opened by hand is played', async () => {
+  const page = await open ('');
+  const input = await page.waitForSelector ('#file');
+  await input.uploadFile (path.join (work, 'moving.rcnc'));
+  await framesShown (page, 5);
+  await page.close ();
+});
+
+test ('seeking shows the frame set at that time, paused or not', async () => {
+  const page = await open ('src=moving.rcnc&paused&time=1000');
+  await framesShown (page, 1);
+  await page.waitForFunction (() => /^0:01\.0 /.test (document.getElementById ('time').textContent));
+  assert.equal (await page.evaluate (() => document.body.dataset.state), 'paused');
+  await page.close ();
+});
+
+test ('mouse, touch and keys move the camera', async () => {
+  const page = await open ('src=scene.rcnc&paused');
+  const orbit = () => page.evaluate (() => window.rangecastPage.camera.record ('rc_orbit'));
+  await framesShown (page, 1);
+  await page.mouse.move (320, 200);
+  await page.mouse.down ();
+  await page.mouse.move (160, 200, { steps: 4 });
+  await page.mouse.up ();
+  assert.ok (Math.abs ((await orbit ()).azimuth - 45) < 1);
+  await page.keyboard.press ('ArrowLeft');
+  assert.ok (Math.abs ((await orbit ()).azimuth - 40) < 1);
+  await page.mouse.wheel ({ deltaY: -100 });
+  await page.waitForFunction (() => window.rangecastPage.camera.record ('rc_orbit').distance > 0);
+  await page.keyboard.press ('Home');
+  assert.equal ((await orbit ()).azimuth, 0);
+  await page.close ();
+});
+
+test ('on a phone one finger orbits, and every pixel of the screen is used', async () => {
+  const page = await open ('src=scene.rcnc&paused', { width: 360, height: 640, deviceScaleFactor: 3, isMobile: true, hasTouch: true });
+  await framesShown (page, 1);
+  assert.deepEqual (await page.evaluate (() => [document.getElementById ('picture').width, document.getElementById ('picture').height]), [1080, 1920]);
+  await page.touchscreen.touchStart (180, 300);
+  await page.touchscreen.touchMove (90, 300);
+  await page.touchscreen.touchEnd ();
+  await page.waitForFunction (() => Math.abs (window.rangecastPage.camera.record ('rc_orbit').azimuth - 45) < 2);
+  fs.writeFileSync (path.join (work, 'page-phone.png'), await page.screenshot ());
+  await page.close ();
+});
+
+test ('memory stays the same over many frame sets', async () => {
+  const page = await open ('src=moving.rcnc&paused');
+  await framesShown (page, 1);
+  // As fast as they can be drawn, over and over.
+  const rounds = (count) => page.evaluate (async (seeks) => {
+    const { worker } = window.rangecastPage;
+    for (let i = 0; i < seeks; i++) {
+      const shown = Number (document.body.dataset.frameSets);
+      worker.postMessage ({ type: 'seek', time: (i * 67) % 2600 });
+      while (Number (document.body.dataset.frameSets) === shown)
+        await new Promise ((resolve) => setTimeout (resolve, 5));
+    }
+  }, count);
+  const client = await page.createCDPSession ();
+  const used = async () => {
+    await client.send ('HeapProfiler.collectGarbage');
+    return (await page.metrics ()).JSHeapUsedSize;
+  };
+  await rounds (30);
+  const first = await used ();
+  await rounds (200);
+  const last = await used ();
+  assert.ok (last < first * 1.2 + 1e6, `${first} to ${last} bytes`);
+  await page.close ();
+});
