@@ -394,7 +394,7 @@ with_size (std::vector<std::uint8_t> slice, std::size_t size, std::uint8_t fill 
 constexpr EncoderSettings
 plain (int depth_bits, int colour_bits, int depth_threshold, int colour_threshold, int size = 1200)
 {
-  return {depth_bits, colour_bits, depth_threshold, colour_threshold, size};
+  return {depth_bits, colour_bits, depth_threshold, colour_threshold, size, Profile::kPlain};
 }
 
 constexpr EncoderSettings kSettings[] = {plain (12, 8, 8, 10), plain (16, 8, 0, 0),
