@@ -2,9 +2,9 @@
 // The page's main thread: it owns the picture and the camera; decoder.js, a worker, owns stream, decoder and geometry. Parameters of the
 // address: src=URL of a recording; mode=blend or strips; stats; fit=0: the first camera's view; azimuth, elevation (degrees);
 // time (ms) and paused.
-import { BLEND, Core, DONE, STRIPS } from './core.js';
+import { BLEND, Core, STRIPS } from './core.js';
 import { followPointers } from './pointers.js';
-import { NoWebGL, Renderer } from './renderer.js';
+import { Renderer } from './renderer.js';
 import { Stats } from './stats.js';
 
 const element = (id) => document.getElementById (id);
@@ -71,7 +71,7 @@ class Page {
   }
   position ({ time, duration, playing }) {
     const seek = element ('seek');
-    element ('bar').hidden = element ('welcome').hidden = false;
+    element ('bar').hidden = false;
     element ('welcome').hidden = true;
     seek.max = Math.max (duration, 1);
     seek.disabled = duration < 0;
@@ -229,5 +229,5 @@ try {
   else
     element ('welcome').hidden = false;
 } catch (error) {
-  say (error instanceof NoWebGL || error instanceof Error ? error.message : String (error));
+  say (error.message);
 }

@@ -58,7 +58,7 @@ export class RecordingSource {
     let outcome;
     try {
       outcome = this.stage.decode (() => core.call ('rc_recording_next'));
-    } catch (error) { // the instance is a new one: begin again after the damage is not possible
+    } catch (error) { // a new instance of the core has lost the stream
       this.failed = true;
       this.stage.say (error.message);
       return this.stop ();

@@ -9,8 +9,6 @@ const COVERING = 0, COLOUR = 1, STRIP = 3, BLEND_DEPTH = 6, BLEND_DEPTH_FRAGMENT
 // Floats of rc_camera_picture: those of the picture, and of each layer.
 const HEAD = 21, LAYER = 48;
 
-export class NoWebGL extends Error {}
-
 class Program {
   constructor (gl, vertex, fragment) {
     this.gl = gl;
@@ -21,11 +19,11 @@ class Program {
       gl.compileShader (shader);
       gl.attachShader (this.program, shader);
       if (!gl.getShaderParameter (shader, gl.COMPILE_STATUS) && !gl.isContextLost ())
-        throw new NoWebGL (`A shader does not compile: ${gl.getShaderInfoLog (shader)}`);
+        throw new Error (`A shader does not compile: ${gl.getShaderInfoLog (shader)}`);
     }
     gl.linkProgram (this.program);
     if (!gl.getProgramParameter (this.program, gl.LINK_STATUS) && !gl.isContextLost ())
-      throw new NoWebGL (`A shader does not link: ${gl.getProgramInfoLog (this.program)}`);
+      throw new Error (`A shader does not link: ${gl.getProgramInfoLog (this.program)}`);
     this.places = new Map ();
   }
   use () { this.gl.useProgram (this.program); }
@@ -44,7 +42,7 @@ export class Renderer {
     // Kept, so that a picture can be saved at any time.
     this.gl = canvas.getContext ('webgl2', { alpha: false, antialias: false, depth: true, preserveDrawingBuffer: true, powerPreference: 'high-performance' });
     if (!this.gl)
-      throw new NoWebGL ('This browser has no WebGL2, or it is switched off.');
+      throw new Error ('This browser has no WebGL2, or it is switched off.');
     this.start ();
   }
 
@@ -195,7 +193,7 @@ export class Renderer {
     gl.framebufferTexture2D (gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.targets.sums, 0);
     gl.framebufferTexture2D (gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, this.targets.depth, 0);
     if (gl.checkFramebufferStatus (gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE && !gl.isContextLost ())
-      throw new NoWebGL ('WebGL2 has no float framebuffer of this size.');
+      throw new Error ('WebGL2 has no float framebuffer of this size.');
   }
 
   // As BlendPainter::draw ().
