@@ -185,7 +185,8 @@ RC_EXPORT (rc_camera_scene) std::int32_t rc_camera_scene (std::uint32_t size)
  *  whether backs are drawn; mode; depth step; number of layers. For each layer two places (matrix
  *  16, behind 2), lens (4), viewer (3), unit, fx, ROI width and height, view-id */
 RC_EXPORT (rc_camera_picture)
-const float *rc_camera_picture (std::int32_t width, std::int32_t height, std::int32_t precise)
+const float *
+rc_camera_picture (std::int32_t width, std::int32_t height, std::int32_t precise)
 {
   Camera &c = camera ();
   const Scene &scene = c.scene;
@@ -229,7 +230,8 @@ RC_EXPORT (rc_orbit) const double *rc_orbit ()
 }
 
 RC_EXPORT (rc_set_orbit)
-void rc_set_orbit (double azimuth_deg, double elevation_deg, double distance_m, double fov_deg,
+void
+rc_set_orbit (double azimuth_deg, double elevation_deg, double distance_m, double fov_deg,
     double pan_x, double pan_y, double pan_z)
 {
   camera ().motion.orbit = {azimuth_deg, elevation_deg, distance_m, fov_deg, {pan_x, pan_y, pan_z}};

@@ -78,7 +78,8 @@ write_state (Scene &s, const rangecast::SceneFrame &home)
  *  @param aspect  width / height of the picture; then the orbit, as rc_orbit() gives it
  *  @return kDone, kNothing if there is no frame set, kFailed if a view is too large */
 RC_EXPORT (rc_build)
-std::int32_t rc_build (std::int32_t mode, std::int32_t fits, double aspect, double azimuth_deg,
+std::int32_t
+rc_build (std::int32_t mode, std::int32_t fits, double aspect, double azimuth_deg,
     double elevation_deg, double distance_m, double fov_deg, double pan_x, double pan_y,
     double pan_z, std::uint32_t home_requests)
 {
