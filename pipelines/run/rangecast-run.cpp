@@ -73,6 +73,8 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
       gst_message_parse_error (message, &error, &details);
       g_printerr ("ERROR: %s: %s\n%s\n", GST_OBJECT_NAME (message->src), error->message,
           details ? details : "");
+      if (runner->stats)
+        runner->stats->take_warning (message, error->message);
       g_free (details);
       g_error_free (error);
       runner->failed = true;
@@ -81,6 +83,8 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
     case GST_MESSAGE_WARNING:
       gst_message_parse_warning (message, &error, nullptr);
       g_printerr ("WARNING: %s: %s\n", GST_OBJECT_NAME (message->src), error->message);
+      if (runner->stats)
+        runner->stats->take_warning (message, error->message);
       g_error_free (error);
       break;
     case GST_MESSAGE_LATENCY:

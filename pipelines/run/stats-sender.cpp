@@ -130,23 +130,44 @@ StatsSender::~StatsSender ()
     close (fd_);
 }
 
-void
-StatsSender::take (GstMessage *message)
+std::string
+StatsSender::begin_line (GstMessage *message) const
 {
-  const GstStructure *structure = gst_message_get_structure (message);
-  if (!structure || !gst_structure_has_name (structure, "rangecast-stats"))
-    return;
   std::string line = "{\"host\":";
   append_string (line, host_.c_str ());
   line += ",\"name\":";
   append_string (line, GST_MESSAGE_SRC_NAME (message));
   line += ",\"time\":";
   append_number (line, double (g_get_real_time ()) * 1e-6);
-  gst_structure_foreach (structure, append_field, &line);
+  return line;
+}
+
+void
+StatsSender::send (std::string line)
+{
   line += "}\n";
   const ssize_t sent = is_socket_
                            ? sendto (fd_, line.data (), line.size (), MSG_DONTWAIT | MSG_NOSIGNAL,
                                  reinterpret_cast<const sockaddr *> (&to_), to_size_)
                            : write (fd_, line.data (), line.size ());
   (void)sent; /* there may be no receiver */
+}
+
+void
+StatsSender::take (GstMessage *message)
+{
+  const GstStructure *structure = gst_message_get_structure (message);
+  if (!structure || !gst_structure_has_name (structure, "rangecast-stats"))
+    return;
+  std::string line = begin_line (message);
+  gst_structure_foreach (structure, append_field, &line);
+  send (std::move (line));
+}
+
+void
+StatsSender::take_warning (GstMessage *message, const char *text)
+{
+  std::string line = begin_line (message) + ",\"warning\":";
+  append_string (line, text);
+  send (std::move (line));
 }

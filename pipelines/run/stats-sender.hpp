@@ -24,10 +24,14 @@ public:
 
   /** Sends it if it is a rangecast-stats message. */
   void take (GstMessage *message);
+  /** Sends the text of a warning or an error of the message's source. */
+  void take_warning (GstMessage *message, const char *text);
 
 private:
   StatsSender () = default;
   bool open_socket (const std::string &host, const std::string &port, std::string &error);
+  [[nodiscard]] std::string begin_line (GstMessage *message) const;
+  void send (std::string line);
 
   int fd_ = -1;
   bool is_socket_ = false;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The worker: decodes what a source delivers and makes vertices of the newest frame set, when the page has drawn the one before.
 //
-// A source is a class with start (), close () and, where it can, toggle () and seek (ms). It gets this stage: core to decode with,
-// decoded (due) after each frame set, discard () for one that will not be shown, position (...) and say (...).
+// A source is a class with start (paused, ms), close () and, where it can, toggle () and seek (ms). It gets this stage: core to decode
+// with, decode () round each call of it, decoded (due) after each frame set, network for what it knows of that, position (...), say (...).
 import { Core, DONE } from './core.js';
+import { LiveSource } from './live-source.js';
 import { RecordingSource } from './recording-source.js';
 
 class Stage {
@@ -15,10 +16,12 @@ class Stage {
     this.waiting = null; // facts about the newest frame set, not shown yet
     this.skipped = 0;
     this.decodeTime = 0;
+    this.network = null; // of a live source: transport, dropped (by the server), lost (messages, by the network)
   }
 
-  say (text, kind = 'error') { postMessage ({ type: 'say', text, kind }); }
-  position (time, duration, playing) { postMessage ({ type: 'position', time, duration, playing }); }
+  post (message) { postMessage (message); }
+  say (text, kind = 'error') { this.post ({ type: 'say', text, kind }); }
+  position (time, duration, playing) { this.post ({ type: 'position', time, duration, playing }); }
 
   // decode (): an Outcome. Measures it; a failure of the core is said, and FAILED returned.
   decode (decode) {
@@ -59,7 +62,7 @@ class Stage {
     const state = this.state ();
     this.drawing = true;
     postMessage ({ type: 'frame', mode: this.view.mode, layers, state, ...core.frame (), due, skipped: this.skipped,
-      decodeTime: this.decodeTime, buildTime: performance.now () - begin }, [...transfer, state]);
+      network: this.network, decodeTime: this.decodeTime, buildTime: performance.now () - begin }, [...transfer, state]);
     this.skipped = this.decodeTime = 0;
   }
 
@@ -94,9 +97,10 @@ class Stage {
       this.waiting = { due: performance.timeOrigin + performance.now () };
     this.show ();
   }
-  async open ({ recording, paused, time }) {
+  async open ({ recording, live, paused, time }) {
     this.source?.close ();
-    this.source = new RecordingSource (this, recording);
+    this.network = null;
+    this.source = live ? new LiveSource (this, live) : new RecordingSource (this, recording);
     await this.source.start (paused, time);
   }
   points () {
@@ -118,6 +122,8 @@ onmessage = ({ data }) => {
     toggle: () => stage.source?.toggle?.(),
     seek: () => stage.source?.seek?.(data.time),
     points: () => stage.points (),
+    signal: () => stage.source?.signal?.(data),
+    transmit: () => stage.source?.transmit?.(data),
   };
   actions[data.type] ();
 };

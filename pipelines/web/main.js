@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The page's main thread: it owns the picture and the camera; decoder.js, a worker, owns stream, decoder and geometry. Parameters of the
-// address: src=URL of a recording; mode=blend or strips; stats; fit=0: the first camera's view; azimuth, elevation (degrees);
-// time (ms) and paused.
+// address: src=URL of a recording; server=URL of a stream (default: this page's server, if that has one); mode=blend or strips;
+// transport=websocket: no WebRTC; stats; fit=0: the first camera's view; azimuth, elevation (degrees); time (ms) and paused.
+// A token comes in the fragment (#token=...), which stays in this browser.
 import { BLEND, Core, STRIPS } from './core.js';
+import { DataChannel } from './data-channel.js';
 import { followPointers } from './pointers.js';
 import { Renderer } from './renderer.js';
+import { findServer, keepToken, takeToken } from './server.js';
 import { Stats } from './stats.js';
+import { Headset } from './xr.js';
 
 const element = (id) => document.getElementById (id);
 const canvas = element ('picture');
@@ -50,6 +54,9 @@ class Page {
     this.stats = new Stats (element ('stats'), parameters.has ('stats'));
     this.pending = null; // the newest frame set, not uploaded yet
     this.wanted = false;
+    this.server = null; // { url, token }
+    this.headset = new Headset (this, element ('headset'), say);
+    this.channel = null;
     if (parameters.has ('azimuth') || parameters.has ('elevation'))
       this.camera.call ('rc_set_orbit', Number (parameters.get ('azimuth') ?? 0), Number (parameters.get ('elevation') ?? 0), 0, 0, 0, 0, 0);
     this.watch ();
@@ -71,8 +78,7 @@ class Page {
   }
   position ({ time, duration, playing }) {
     const seek = element ('seek');
-    element ('bar').hidden = false;
-    element ('welcome').hidden = true;
+    this.showBar (false);
     seek.max = Math.max (duration, 1);
     seek.disabled = duration < 0;
     if (!seek.matches (':active'))
@@ -82,9 +88,39 @@ class Page {
     document.body.dataset.state = playing ? 'playing' : 'paused';
   }
   say ({ text, kind }) { say (text, kind); }
+  live ({ state }) {
+    document.body.dataset.state = state;
+    element ('live').hidden = state !== 'receiving';
+    element ('token').hidden = state !== 'token';
+    if (state === 'token')
+      element ('token-text').focus ();
+    if (state === 'receiving')
+      this.showBar (true);
+    if (state === 'connecting')
+      this.closeChannel ();
+  }
+  welcome ({ rtc, iceServers }) {
+    if (!rtc || parameters.get ('transport') === 'websocket')
+      return;
+    this.channel = new DataChannel (iceServers, {
+      send: (message) => this.worker.postMessage ({ type: 'signal', message }),
+      receive: (data) => this.worker.postMessage ({ type: 'transmit', data }, [data]),
+    });
+  }
+  signal ({ message }) { this.channel?.signal (message); }
   points ({ file }) {
     if (file)
       save (new Blob ([file], { type: 'model/ply' }), 'rangecast.ply');
+  }
+
+  showBar (live) {
+    element ('bar').hidden = false;
+    element ('bar').classList.toggle ('live', live);
+    element ('welcome').hidden = true;
+  }
+  closeChannel () {
+    this.channel?.close ();
+    this.channel = null;
   }
 
   // ---- drawing ----
@@ -95,8 +131,8 @@ class Page {
   }
 
   draw () {
-    if (this.wanted)
-      return;
+    if (this.wanted || this.headset.session)
+      return; // a headset asks for its pictures itself
     this.wanted = true;
     requestAnimationFrame (() => {
       this.wanted = false;
@@ -104,7 +140,8 @@ class Page {
     });
   }
 
-  paint () {
+  // show: draws one picture, or one for each eye
+  paint (show = () => this.renderer.draw (this.picture ('rc_camera_picture', canvas.width, canvas.height, 0))) {
     const begin = performance.now (), frame = this.pending;
     this.pending = null;
     try {
@@ -112,9 +149,7 @@ class Page {
         this.takeScene (frame.state);
         this.renderer.upload (frame.mode, frame.layers);
       }
-      const floats = 21 + 48 * this.renderer.layers.length;
-      const at = this.camera.call ('rc_camera_picture', canvas.width, canvas.height, 0);
-      this.renderer.draw (this.camera.floats (at, floats));
+      show ();
     } catch (error) {
       say (error.message);
     }
@@ -124,6 +159,13 @@ class Page {
       document.body.dataset.frameSets = Number (document.body.dataset.frameSets ?? 0) + 1;
     }
     this.tellWorker ();
+  }
+
+  picture (name, ...args) {
+    const at = this.camera.call (name, ...args);
+    if (!at)
+      throw new Error ('The picture has no place in its framebuffer.');
+    return this.camera.floats (at, 21 + 48 * this.renderer.layers.length);
   }
 
   // The camera decides which views are reduced, and the shape of the picture what fits.
@@ -137,9 +179,14 @@ class Page {
 
   // ---- from the user ----
 
+  openLive (url, token) {
+    this.server = { url, token };
+    this.worker.postMessage ({ type: 'open', live: this.server });
+  }
   open (recording) {
     say ('');
-    element ('welcome').hidden = true;
+    this.closeChannel ();
+    element ('welcome').hidden = element ('token').hidden = true;
     this.worker.postMessage ({ type: 'open', recording, paused: parameters.has ('paused'), time: Number (parameters.get ('time') ?? 0) });
   }
 
@@ -197,6 +244,13 @@ class Page {
     element ('mode').onclick = () => this.toggleMode ();
     element ('save-picture').onclick = () => canvas.toBlob ((blob) => blob && save (blob, 'rangecast.png'));
     element ('save-points').onclick = () => this.worker.postMessage ({ type: 'points' });
+    element ('token').onsubmit = (event) => {
+      event.preventDefault ();
+      say ('');
+      element ('token').hidden = true;
+      keepToken (element ('token-text').value);
+      this.openLive (this.server.url, element ('token-text').value);
+    };
     element ('file').onchange = ({ target }) => target.files[0] && this.open (target.files[0]);
     addEventListener ('dragover', (event) => {
       event.preventDefault ();
@@ -226,8 +280,16 @@ try {
   window.rangecastPage = page; // for tests and for the curious
   if (parameters.has ('src'))
     page.open (new URL (parameters.get ('src'), location).href);
-  else
-    element ('welcome').hidden = false;
+  else if (parameters.has ('server'))
+    page.openLive (new URL (parameters.get ('server'), location).href.replace (/^http/, 'ws'), takeToken ());
+  else {
+    const server = await findServer ();
+    if (server) {
+      document.title = server.title || document.title;
+      page.openLive (server.url, takeToken ());
+    } else
+      element ('welcome').hidden = false;
+  }
 } catch (error) {
   say (error.message);
 }

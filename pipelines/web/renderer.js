@@ -136,21 +136,26 @@ export class Renderer {
       gl.texParameteri (gl.TEXTURE_2D, name, value);
   }
 
-  // picture: the floats of rc_camera_picture for the canvas's size
-  draw (picture) {
-    const gl = this.gl, { width, height } = this.canvas;
-    gl.bindFramebuffer (gl.FRAMEBUFFER, null);
+  // picture: the floats of rc_camera_picture or rc_camera_eye for a framebuffer of that size; part: [x, y, width, height], of an eye
+  draw (picture, { framebuffer, width, height, part } = { framebuffer: null, ...this.size }) {
+    const gl = this.gl;
+    gl.bindFramebuffer (gl.FRAMEBUFFER, framebuffer);
     gl.viewport (0, 0, width, height);
-    gl.disable (gl.SCISSOR_TEST);
+    if (part) {
+      gl.enable (gl.SCISSOR_TEST);
+      gl.scissor (...part);
+    }
     gl.clearColor (picture[0], picture[1], picture[2], 1);
     gl.clear (gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    if (this.layers.length === 0 || picture[20] !== this.layers.length)
-      return;
-    if (this.mode === BLEND)
-      this.drawBlended (picture, width, height);
-    else
-      this.drawStrips (picture);
+    if (this.layers.length > 0 && picture[20] === this.layers.length) {
+      if (this.mode === BLEND)
+        this.drawBlended (picture, framebuffer, width, height);
+      else
+        this.drawStrips (picture);
+    }
+    gl.disable (gl.SCISSOR_TEST);
   }
+  get size () { return { width: this.canvas.width, height: this.canvas.height }; }
 
   eachLayer (picture, draw) {
     this.layers.forEach (({ objects, count }, i) => {
@@ -197,7 +202,7 @@ export class Renderer {
   }
 
   // As BlendPainter::draw ().
-  drawBlended (picture, width, height) {
+  drawBlended (picture, framebuffer, width, height) {
     const gl = this.gl;
     const [x, y, columns, rows] = picture.subarray (8, 12);
     this.makeTargets (width, height);
@@ -231,7 +236,7 @@ export class Renderer {
     gl.frontFace (gl.CCW);
     gl.disable (gl.DEPTH_TEST);
 
-    gl.bindFramebuffer (gl.FRAMEBUFFER, null);
+    gl.bindFramebuffer (gl.FRAMEBUFFER, framebuffer);
     this.divide.use ();
     for (const [unit, name, texture] of [[0, 'u_sum', this.targets.sums], [1, 'u_depth', this.targets.depth]]) {
       gl.activeTexture (gl.TEXTURE0 + unit);
@@ -251,7 +256,6 @@ export class Renderer {
       gl.activeTexture (gl.TEXTURE0 + unit);
       gl.bindTexture (gl.TEXTURE_2D, null);
     }
-    gl.disable (gl.SCISSOR_TEST);
   }
 
   // As StripPainter::draw ().

@@ -21,6 +21,8 @@ export class Stats {
     this.decode += frame.decodeTime;
     this.build += frame.buildTime;
     this.draw += drawing;
+    this.latency = performance.timeOrigin + performance.now () - frame.due;
+    this.network = frame.network;
     const elapsed = performance.now () - this.begin;
     if (elapsed < 1000 || this.place.hidden)
       return;
@@ -30,7 +32,8 @@ export class Stats {
       `${frame.views} views, ${frame.points} points, ${(this.bytes / this.count / 1024).toFixed (1)} KiB`,
       `missing ${frame.missingPixels}, unknown ${frame.unknownPixels} pixels; ${frame.badSlices} damaged slices`,
       `decode ${mean (this.decode)}, geometry ${mean (this.build)}, draw ${mean (this.draw)}`,
-      `latency ${(performance.timeOrigin + performance.now () - frame.due).toFixed (0)} ms from due to drawn`,
+      `latency ${this.latency.toFixed (0)} ms from ${frame.network ? 'capture' : 'due'} to drawn`,
+      ...frame.network ? [`${frame.network.transport}: ${frame.network.dropped} frame sets left out by the server, ${frame.network.lost} messages lost`] : [],
     ].join ('\n');
     this.reset ();
   }

@@ -216,3 +216,69 @@ test ('memory stays the same over many frame sets', async () => {
   assert.ok (last < first * 1.2 + 1e6, `${first} to ${last} bytes`);
   await page.close ();
 });
+
+// No headset is here: this one stands in for it, with two eyes 64 mm apart whose pictures of 320x320 pixels see 90 degrees.
+const standInHeadset = () => {
+  const projection = Float32Array.of (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1.007, -1, 0, 0, -0.2007, 0);
+  const views = [-0.032, 0.032].map ((x, i) => ({ eye: i ? 'right' : 'left', projectionMatrix: projection,
+    transform: { inverse: { matrix: Float32Array.of (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, 0, 0, 1) } } }));
+  window.XRWebGLLayer = class {
+    constructor (session, gl) {
+      this.framebuffer = gl.createFramebuffer ();
+      this.framebufferWidth = 640;
+      this.framebufferHeight = 320;
+      const colour = gl.createTexture (), depth = gl.createRenderbuffer ();
+      gl.bindTexture (gl.TEXTURE_2D, colour);
+      gl.texStorage2D (gl.TEXTURE_2D, 1, gl.RGBA8, 640, 320);
+      gl.bindRenderbuffer (gl.RENDERBUFFER, depth);
+      gl.renderbufferStorage (gl.RENDERBUFFER, gl.DEPTH_COMPONENT24, 640, 320);
+      gl.bindFramebuffer (gl.FRAMEBUFFER, this.framebuffer);
+      gl.framebufferTexture2D (gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, colour, 0);
+      gl.framebufferRenderbuffer (gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
+      window.headsetLayer = this;
+    }
+    getViewport (view) { return { x: view.eye === 'left' ? 0 : 320, y: 0, width: 320, height: 320 }; }
+  };
+  WebGL2RenderingContext.prototype.makeXRCompatible = async () => {};
+  const requestSession = async () => {
+    let ended = () => {}, over = false;
+    return { addEventListener: (name, action) => { ended = action; }, updateRenderState () {}, requestReferenceSpace: async () => 'space',
+      requestAnimationFrame: (draw) => over || setTimeout (() => over || draw (0, { getViewerPose: () => { window.headsetPictures = (window.headsetPictures ?? 0) + 1; return { views }; } }), 200),
+      end: async () => { over = true; ended (); } };
+  };
+  Object.defineProperty (navigator, 'xr', { value: { isSessionSupported: async () => true, requestSession } });
+};
+
+for (const mode of ['blend', 'strips'])
+  test (`a headset shows both eyes of one frame set, mode ${mode}`, async () => {
+    const page = await open (`src=scene.rcnc&paused&mode=${mode}`, undefined, (made) => made.evaluateOnNewDocument (standInHeadset));
+    await framesShown (page, 1);
+    await page.waitForSelector ('#headset:not([hidden])');
+    await page.click ('#headset');
+    await page.waitForFunction (() => window.headsetPictures > 2);
+    const eyes = await page.evaluate (() => {
+      const { gl } = window.rangecastPage.renderer, pixels = new Uint8Array (4 * 640 * 320);
+      gl.bindFramebuffer (gl.FRAMEBUFFER, window.headsetLayer.framebuffer);
+      gl.readPixels (0, 0, 640, 320, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+      return [0, 320].map ((left) => {
+        let count = 0, sum = 0;
+        for (let y = 0; y < 320; y++)
+          for (let x = 0; x < 320; x++) {
+            const at = 4 * (y * 640 + left + x);
+            if (Math.abs (pixels[at] - 0x20) + Math.abs (pixels[at + 1] - 0x24) + Math.abs (pixels[at + 2] - 0x2a) > 24) {
+              count++;
+              sum += x;
+            }
+          }
+        return { count, middle: sum / count };
+      });
+    });
+    assert.equal (await message (page), '');
+    const [left, right] = eyes;
+    assert.ok (left.count > 1000 && right.count > 1000, `a person is there: ${JSON.stringify (eyes)}`);
+    // 160 pixels of focal length * 0.064 m / 1.5 m
+    assert.ok (Math.abs (left.middle - right.middle - 6.8) < 2, JSON.stringify (eyes));
+    await page.click ('#headset');
+    await page.waitForFunction (() => document.getElementById ('headset').textContent === 'VR');
+    await page.close ();
+  });

@@ -164,6 +164,70 @@ write_layer (std::vector<float> &to, const Layer &layer, const Mat4 &clip_from_w
                  double (view.id)});
 }
 
+/** An array of floats: background R, G, B, A; weights max, min, inside, outside; the part of the
+ *  framebuffer that may be covered (x, y, width, height); depth shift a, b, g; reach; whether it
+ *  mirrors; whether backs are drawn; mode; depth step; number of layers. For each layer two places
+ *  (matrix 16, behind 2), lens (4), viewer (3), unit, fx, ROI width and height, view-id */
+void
+write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from_world, int width,
+    int height, const Roi &part, bool precise)
+{
+  const bool blends = scene.mode == rangecast::StripMode::kBlend;
+  const auto weights = rangecast::blend_weights (scene.rig_views, precise);
+  const Roi covered = rangecast::covered_part (clip_from_world, scene.hull, width, height, part);
+  const auto shift =
+      rangecast::depth_shift (clip_from_world, clip_from_world, rangecast::kBlendRange_m);
+  const bool backs = !blends && scene.rig_views == 1;
+  constexpr unsigned colour = rangecast::kBackgroundColour;
+  to.clear ();
+  write (to, {(colour >> 16) / 255.0, (colour >> 8 & 255) / 255.0, (colour & 255) / 255.0, 1});
+  write (to, {weights.max, weights.min, weights.inside, weights.outside ()});
+  write (to,
+      {double (covered.x), double (covered.y), double (covered.width), double (covered.height)});
+  write (to, {shift.a, shift.b, shift.g, double (rangecast::fill_reach (part.height)),
+                 double (rangecast::mirrors (clip_from_world)), double (backs), double (scene.mode),
+                 rangecast::StripSettings ().depth_step, double (scene.layers.size ())});
+  for (const Layer &layer : scene.layers)
+    write_layer (to, layer, clip_from_world, blends, backs);
+}
+
+/* ---- headsets ---- */
+
+/** Where the scene's target is before the user's eyes: ahead and below, metres. */
+constexpr double kAhead_m = 1.5, kBelow_m = 0.15;
+
+Mat4
+product (const Mat4 &a, const Mat4 &b)
+{
+  Mat4 c{};
+  for (std::size_t column = 0; column < 4; column++)
+    for (std::size_t row = 0; row < 4; row++)
+      for (std::size_t k = 0; k < 4; k++)
+        c[4 * column + row] += a[4 * k + row] * b[4 * column + k];
+  return c;
+}
+
+/* Local space of WebXR: x right, y up, -z ahead, the origin near the user's eyes. */
+Mat4
+local_from_world (const SceneFrame &home)
+{
+  const Vec3 z = home.to_first, y = home.up, x = rangecast::cross (y, z);
+  const Vec3 &t = home.target;
+  const double shift[] = {0, -kBelow_m, -kAhead_m};
+  Mat4 to{};
+  std::size_t row = 0;
+  for (const Vec3 &axis : {x, y, z}) {
+    const double in_world = rangecast::dot (axis, t);
+    to[row] = float (axis.x);
+    to[4 + row] = float (axis.y);
+    to[8 + row] = float (axis.z);
+    to[12 + row] = float (shift[row] - in_world);
+    row++;
+  }
+  to[15] = 1;
+  return to;
+}
+
 } // namespace
 
 /** Takes what rc_scene_state() of any instance gave, from the input. @return Outcome */
@@ -180,41 +244,45 @@ RC_EXPORT (rc_camera_scene) std::int32_t rc_camera_scene (std::uint32_t size)
 /** The camera's numbers for a picture of the scene, in OpenGL's coordinates (first row at the
  *  bottom). Drags count in pixels of the last such picture.
  *  @param precise  1: sums are floats of 32 bits
- *  @return an array of floats: background R, G, B, A; weights max, min, inside, outside; the part
- *  that may be covered (x, y, width, height); depth shift a, b, g; reach; whether it mirrors;
- *  whether backs are drawn; mode; depth step; number of layers. For each layer two places (matrix
- *  16, behind 2), lens (4), viewer (3), unit, fx, ROI width and height, view-id */
+ *  @return as write_picture() */
 RC_EXPORT (rc_camera_picture)
 const float *
 rc_camera_picture (std::int32_t width, std::int32_t height, std::int32_t precise)
 {
   Camera &c = camera ();
-  const Scene &scene = c.scene;
-  const bool blends = scene.mode == rangecast::StripMode::kBlend;
   const double room_m = std::max (2 * rangecast::kViewGap_m, rangecast::kBlendRange_m);
   const auto matrices = rangecast::orbit_matrices (
-      scene.home, c.motion.orbit, double (width) / height, false, {}, scene.hull, room_m);
-  const Mat4 &clip_from_world = matrices.clip_from_world;
-  c.motion.set_shown (matrices, scene.home, width, height);
-  const auto weights = rangecast::blend_weights (scene.rig_views, precise != 0);
-  const Roi covered =
-      rangecast::covered_part (clip_from_world, scene.hull, width, height, {0, 0, width, height});
-  const auto shift =
-      rangecast::depth_shift (clip_from_world, clip_from_world, rangecast::kBlendRange_m);
-  const bool backs = !blends && scene.rig_views == 1;
-  constexpr unsigned colour = rangecast::kBackgroundColour;
-  std::vector<float> &to = c.picture;
-  to.clear ();
-  write (to, {(colour >> 16) / 255.0, (colour >> 8 & 255) / 255.0, (colour & 255) / 255.0, 1});
-  write (to, {weights.max, weights.min, weights.inside, weights.outside ()});
-  write (to,
-      {double (covered.x), double (covered.y), double (covered.width), double (covered.height)});
-  write (to, {shift.a, shift.b, shift.g, double (rangecast::fill_reach (height)),
-                 double (rangecast::mirrors (clip_from_world)), double (backs), double (scene.mode),
-                 rangecast::StripSettings ().depth_step, double (scene.layers.size ())});
-  for (const Layer &layer : scene.layers)
-    write_layer (to, layer, clip_from_world, blends, backs);
-  return to.data ();
+      c.scene.home, c.motion.orbit, double (width) / height, false, {}, c.scene.hull, room_m);
+  c.motion.set_shown (matrices, c.scene.home, width, height);
+  write_picture (
+      c.picture, c.scene, matrices.clip_from_world, width, height, {0, 0, width, height}, precise);
+  return c.picture.data ();
+}
+
+/** The same for one eye of a headset, which draws into a part of a framebuffer. The input has that
+ *  eye's clip_from_local: 16 floats, column by column. The person stands before the user, turned as
+ *  the first view sees them.
+ *  @param width, height  of the framebuffer, pixels
+ *  @return nullptr if the input is not a matrix or the part does not lie in the framebuffer */
+RC_EXPORT (rc_camera_eye)
+const float *
+rc_camera_eye (std::int32_t width, std::int32_t height, std::int32_t x, std::int32_t y,
+    std::int32_t part_width, std::int32_t part_height, std::int32_t precise)
+{
+  Mat4 clip_from_local;
+  const auto bytes = web::input (sizeof clip_from_local);
+  if (bytes.size () != sizeof clip_from_local || x < 0 || y < 0 || part_width < 1 ||
+      part_height < 1 || part_width > width - x || part_height > height - y)
+    return nullptr;
+  std::memcpy (clip_from_local.data (), bytes.data (), bytes.size ());
+  Camera &c = camera ();
+  const rangecast::PicturePart part = {double (part_width) / width, double (part_height) / height,
+      (2.0 * x + part_width) / width - 1, (2.0 * y + part_height) / height - 1};
+  const Mat4 clip_from_world =
+      rangecast::in_part (product (clip_from_local, local_from_world (c.scene.home)), part);
+  write_picture (c.picture, c.scene, clip_from_world, width, height,
+      {x, y, part_width, part_height}, precise);
+  return c.picture.data ();
 }
 
 /** @return a record: azimuth, elevation (degrees), distance (metres, 0: default), field of view

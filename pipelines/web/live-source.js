@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Shows what a server sends, as it comes. A source of decoder.js.
+import { Connection } from './connection.js';
+import { DONE, FAILED } from './core.js';
+
+export class LiveSource {
+  // live: { url, token } of the server
+  constructor (stage, live) {
+    this.stage = stage;
+    this.live = live;
+  }
+
+  start () {
+    const { stage } = this;
+    this.connection = new Connection ({ ...this.live, on: {
+      frameSet: (frameSet) => this.decode (frameSet),
+      say: (text, kind) => stage.say (text, kind),
+      state: (name) => this.changed (name),
+      welcome: (message) => stage.post ({ type: 'welcome', rtc: message.rtc === true, iceServers: message.iceServers }),
+      signal: (message) => stage.post ({ type: 'signal', message }),
+    } });
+  }
+  close () { this.connection.close (); }
+
+  changed (name) {
+    if (name === 'connecting')
+      this.forget ();
+    this.stage.post ({ type: 'live', state: name });
+  }
+  forget () { this.stage.core.call ('rc_forget_stream'); }
+
+  decode (frameSet) {
+    const { core } = this.stage;
+    let outcome;
+    try {
+      outcome = this.stage.decode (() => {
+        if (frameSet.discontinuity)
+          core.call ('rc_forget_references');
+        for (const units of frameSet.units)
+          core.addUnits (units);
+        return core.decode ();
+      });
+    } catch (error) { // a new instance of the core has no rig
+      this.stage.say (error.message);
+      this.connection.reopen ();
+      return;
+    }
+    this.connection.acknowledge (frameSet);
+    if (outcome === FAILED)
+      this.stage.say (core.message ());
+    if (outcome !== DONE)
+      return;
+    if (core.frame ().unknownPixels > 0)
+      this.connection.requestKey ();
+    const { transport, dropped, lost } = frameSet;
+    this.stage.network = { transport, dropped, lost };
+    this.stage.decoded (frameSet.captured);
+  }
+
+  // ---- the page's data channel ----
+
+  signal ({ message }) { this.connection.send (message); }
+  transmit ({ data }) { this.connection.receive (data, 'WebRTC'); }
+}
