@@ -4,11 +4,18 @@ export class Stats {
   constructor (place, visible) {
     this.place = place;
     place.hidden = !visible;
+    this.latencies = []; // of the last frame sets, ms
     this.reset ();
   }
   reset () {
     this.begin = performance.now ();
     this.count = this.skipped = this.bytes = this.decode = this.build = this.draw = 0;
+  }
+  // latency: ms until the frame after the draw calls
+  seen (latency) {
+    this.latencies.push (latency);
+    if (this.latencies.length > 1000)
+      this.latencies.shift ();
   }
   // A frame set that a newer one replaced before it was drawn.
   skip () { this.skipped++; }
@@ -21,8 +28,8 @@ export class Stats {
     this.decode += frame.decodeTime;
     this.build += frame.buildTime;
     this.draw += drawing;
-    this.latency = performance.timeOrigin + performance.now () - frame.due;
     this.network = frame.network;
+    requestAnimationFrame (() => this.seen (performance.timeOrigin + performance.now () - frame.due));
     const elapsed = performance.now () - this.begin;
     if (elapsed < 1000 || this.place.hidden)
       return;
@@ -32,7 +39,7 @@ export class Stats {
       `${frame.views} views, ${frame.points} points, ${(this.bytes / this.count / 1024).toFixed (1)} KiB`,
       `missing ${frame.missingPixels}, unknown ${frame.unknownPixels} pixels; ${frame.badSlices} damaged slices`,
       `decode ${mean (this.decode)}, geometry ${mean (this.build)}, draw ${mean (this.draw)}`,
-      `latency ${this.latency.toFixed (0)} ms from ${frame.network ? 'capture' : 'due'} to drawn`,
+      `latency ${(this.latencies.at (-1) ?? 0).toFixed (0)} ms from ${frame.network ? 'capture' : 'due'} to drawn`,
       ...frame.network ? [`${frame.network.transport}: ${frame.network.dropped} frame sets left out by the server, ${frame.network.lost} messages lost`] : [],
     ].join ('\n');
     this.reset ();

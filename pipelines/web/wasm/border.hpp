@@ -17,7 +17,11 @@
 #include <string>
 #include <string_view>
 
+#ifdef __wasm__
 #define RC_EXPORT(name) extern "C" __attribute__ ((export_name (#name)))
+#else /* a benchmark */
+#define RC_EXPORT(name) extern "C"
+#endif
 
 namespace web {
 

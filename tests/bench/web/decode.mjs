@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// rangecast.wasm beside the same decoder compiled for this machine without AVX2 (RANGECAST_CPU=scalar), and with it: milliseconds of a
+// frame set, medians of rounds in turn, and the median of the rounds' ratios.
+// usage: node tests/bench/web/decode.mjs [--rounds N] [FILE.rcnc...]   (default: four views of 320x240, each profile)
+import { execFileSync } from 'node:child_process';
+import fs from 'node:fs';
+import os from 'node:os';
+import path from 'node:path';
+import { accessUnits, build, joined, wasm } from '../../web/support.js';
+import { Core, DONE } from '../../../pipelines/web/core.js';
+
+const files = process.argv.slice (2);
+let rounds = 9;
+if (files[0] === '--rounds')
+  rounds = Number (files.splice (0, 2)[1]);
+if (!(rounds >= 1 && rounds <= 1000)) {
+  console.error ('decode.mjs: --rounds: expected 1 to 1000');
+  process.exit (2);
+}
+
+const folder = fs.mkdtempSync (path.join (os.tmpdir (), 'rangecast-'));
+process.on ('exit', () => fs.rmSync (folder, { recursive: true }));
+const record = (name, ...settings) => {
+  const file = path.join (folder, name + '.rcnc');
+  execFileSync ('gst-launch-1.0', ['-q', 'avatartestsrc', 'views=4', 'num-buffers=30', 'range-person-only=true', '!', 'video/x-range,width=320,height=240', '!',
+    'neighbourcodeenc', ...settings, '!', 'neighbourcodeparse', '!', 'application/x-neighbour-code,alignment=byte-stream', '!', 'filesink', `location=${file}`],
+  { env: { ...process.env, GST_PLUGIN_PATH: path.join (build, 'gst') } });
+  return { name, file };
+};
+
+const medianOf = (values) => [...values].sort ((a, b) => a - b)[values.length >> 1];
+const native = (file, cpu) => Number (execFileSync (path.join (build, 'tests/bench/decode_bench'), [file],
+  { env: { ...process.env, ...cpu && { RANGECAST_CPU: cpu } } }));
+const core = new Core (wasm);
+const decodeAll = (frameSets) => {
+  core.call ('rc_forget_stream');
+  return frameSets.reduce ((done, units) => {
+    core.addUnits (units);
+    return done + (core.decode () === DONE);
+  }, 0);
+};
+const inNode = (file) => {
+  const frameSets = accessUnits (new Uint8Array (fs.readFileSync (file))).map (joined);
+  decodeAll (frameSets);
+  const begin = performance.now (), done = decodeAll (frameSets);
+  return (performance.now () - begin) / done;
+};
+
+const recordings = files.length > 0 ? files.map ((file) => ({ name: path.basename (file), file }))
+  : ['plain', 'packed', 'entropy'].flatMap ((profile) => [record (profile, `profile=${profile}`), record (`${profile}-temporal`, `profile=${profile}`, 'temporal=true')]);
+console.log ('| recording | wasm ms | native, scalar ms | ratio | native ms |\n|---|---|---|---|---|');
+for (const { name, file } of recordings) {
+  const rows = Array.from ({ length: rounds }, () => ({ wasm: inNode (file), scalar: native (file, 'scalar'), best: native (file) }));
+  const median = (of) => medianOf (rows.map (of)).toFixed (2);
+  console.log (`| ${name} | ${median ((row) => row.wasm)} | ${median ((row) => row.scalar)} | ${median ((row) => row.wasm / row.scalar)} | ${median ((row) => row.best)} |`);
+}

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Times rangecast.wasm's decoder, compiled for this machine: decode.mjs runs it beside the module.
+ * usage: decode_bench FILE.rcnc...: for each file prints the milliseconds of one frame set, mean of
+ * one pass after another that was not timed. */
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
+#include <rangecast/surface/view_fit.hpp>
+#include <vector>
+
+#include "../../../pipelines/web/wasm/border.hpp"
+
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/* @return the units of each access unit */
+std::vector<std::span<const std::uint8_t>>
+access_units (std::span<const std::uint8_t> bytes)
+{
+  std::vector<std::span<const std::uint8_t>> units;
+  for (auto part = rangecast::next_part (bytes, true); part.length || part.rubbish;
+       part = rangecast::next_part (bytes, true)) {
+    if (part.length)
+      units.push_back (
+          bytes.subspan (rangecast::kStreamPrefixSize, part.length - rangecast::kStreamPrefixSize));
+    bytes = bytes.subspan (part.length + part.rubbish);
+  }
+  return units;
+}
+
+/* @return frame sets that were decoded */
+int
+decode_all (const std::vector<std::span<const std::uint8_t>> &frame_sets)
+{
+  int done = 0;
+  web::forget_stream ();
+  for (const auto &units : frame_sets) {
+    web::add_units (units);
+    done += web::decode (rangecast::kNoPts) == web::kDone;
+  }
+  return done;
+}
+
+bool
+measure (const char *path)
+{
+  std::ifstream file (path, std::ios::binary);
+  const Bytes bytes{std::istreambuf_iterator<char> (file), {}};
+  const auto frame_sets = access_units (bytes);
+  decode_all (frame_sets);
+  const auto begin = std::chrono::steady_clock::now ();
+  const int done = decode_all (frame_sets);
+  const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now () - begin;
+  if (done == 0)
+    std::fprintf (stderr, "decode_bench: %s: expected a recording (.rcnc)\n", path);
+  else
+    std::printf ("%.4f\n", took.count () / done);
+  return done > 0;
+}
+
+} // namespace
+
+int
+main (int argc, char **argv)
+{
+  if (argc < 2) {
+    std::fprintf (stderr, "usage: decode_bench FILE.rcnc...\n");
+    return 2;
+  }
+  for (int i = 1; i < argc; i++)
+    if (!measure (argv[i]))
+      return 1;
+}
