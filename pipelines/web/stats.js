@@ -28,7 +28,6 @@ export class Stats {
     this.decode += frame.decodeTime;
     this.build += frame.buildTime;
     this.draw += drawing;
-    this.network = frame.network;
     requestAnimationFrame (() => this.seen (performance.timeOrigin + performance.now () - frame.due));
     const elapsed = performance.now () - this.begin;
     if (elapsed < 1000 || this.place.hidden)

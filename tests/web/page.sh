@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The page in headless Chromium, beside striprender. Exit status 77 (skipped) where Chromium, or puppeteer-core and the network that it
-# comes from, are missing. Pictures stay in build/web-test.
+# The page in headless Chromium: beside striprender, and before servers. Exit status 77 (skipped) where Chromium, or puppeteer-core and
+# the network that it comes from, are missing. Pictures stay in build/web-test.
 # usage: tests/web/page.sh [options of node --test]
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
@@ -13,10 +13,10 @@ browser=$(command -v chromium || command -v chromium-browser || true)
 [ -n "$browser" ] || skip "chromium is missing"
 work=$RANGECAST_BUILD/web-test
 mkdir -p "$work"
-if ! [ -d "$work/node_modules/puppeteer-core" ]; then
-  command -v npm >/dev/null || skip "npm is missing, which installs puppeteer-core"
-  (cd "$work" && echo '{}' >package.json && timeout 120 npm install --silent --no-audit --no-fund puppeteer-core >/dev/null 2>&1) ||
-    skip "npm cannot install puppeteer-core"
+if ! [ -d "$work/node_modules/puppeteer-core" ] || ! [ -d "$work/node_modules/ws" ]; then
+  command -v npm >/dev/null || skip "npm is missing, which installs puppeteer-core and ws"
+  (cd "$work" && echo '{}' >package.json && timeout 120 npm install --silent --no-audit --no-fund puppeteer-core ws >/dev/null 2>&1) ||
+    skip "npm cannot install puppeteer-core and ws"
 fi
 
 # The known scene, and what striprender makes of it from five angles.
@@ -34,4 +34,4 @@ for mode in blend strips; do
   done
 done
 export CHROMIUM=$browser
-exec node --test "$@" "$here/page.test.js"
+exec node --test "$@" "$here/page.test.js" "$here/server.test.js"

@@ -3,13 +3,10 @@
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import fs from 'node:fs';
-import { createRequire } from 'node:module';
 import path from 'node:path';
 import test, { after, before } from 'node:test';
-
-const build = process.env.RANGECAST_BUILD, source = process.env.RANGECAST_SOURCE;
-const work = path.join (build, 'web-test');
-const puppeteer = createRequire (path.join (work, 'package.json')) ('puppeteer-core');
+import { framesShown, launch, message, messageMatches, openPage, work } from './browser.js';
+import { build } from './support.js';
 
 let browser, server, address;
 
@@ -38,25 +35,14 @@ before (async () => {
         resolve (`http://127.0.0.1:${port[1]}`);
     });
   });
-  browser = await puppeteer.launch ({ executablePath: process.env.CHROMIUM, headless: true,
-    args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--hide-scrollbars'] });
+  browser = await launch ();
 });
 after (async () => {
   await browser?.close ();
   server?.kill ();
 });
 
-const open = async (query, viewport = { width: 640, height: 480 }, prepare = async () => {}) => {
-  const page = await browser.newPage ();
-  page.setDefaultTimeout (60000);
-  await page.setViewport (viewport);
-  await prepare (page);
-  await page.goto (`${address}/index.html?${query}`);
-  return page;
-};
-const message = (page) => page.evaluate (() => document.body.dataset.message ?? '');
-const messageMatches = (page, pattern) => page.waitForFunction ((source) => new RegExp (source).test (document.body.dataset.message ?? ''), {}, pattern);
-const framesShown = (page, count) => page.waitForFunction ((wanted) => Number (document.body.dataset.frameSets ?? 0) >= wanted, {}, count);
+const open = (query, ...rest) => openPage (browser, `${address}/index.html?${query}`, ...rest);
 // What is on the canvas once two pictures in a row are equal: the fit comes with the second.
 const picture = async (page) => {
   let last = '';

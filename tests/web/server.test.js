@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// The page before servers that break docs/formats/web-protocol.md, go away, or send streams that no page can show. rangewebsink
+// does none of that: a script of each test plays the server here.
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import http from 'node:http';
+import path from 'node:path';
+import test, { after, before } from 'node:test';
+import { framesShown, frameSets, launch, message, messageMatches, openPage, required, sleep } from './browser.js';
+import { accessUnits, build, changedRigView, corpus, isRigView, joined, readStream } from './support.js';
+
+const { WebSocketServer } = required ('ws');
+const folder = path.join (build, 'pipelines/web');
+const types = { html: 'text/html', js: 'text/javascript', css: 'text/css', wasm: 'application/wasm' };
+
+let browser;
+before (async () => { browser = await launch (); });
+after (() => browser?.close ());
+
+// A page and, for each connection to its server, script (client), where client has next () for messages, send (), welcome (), frameSet ().
+const withServer = async (script, use) => {
+  const server = http.createServer ((request, answer) => {
+    const name = new URL (request.url, 'http://here').pathname.slice (1) || 'index.html', file = path.join (folder, path.basename (name));
+    if (name === 'server.json' || !fs.existsSync (file)) {
+      answer.writeHead (name === 'server.json' ? 200 : 404, { 'Content-Type': 'application/json' });
+      answer.end (JSON.stringify ({ version: 1, token: false, title: 'a script' }));
+    } else {
+      answer.writeHead (200, { 'Content-Type': types[name.split ('.').pop ()] });
+      fs.createReadStream (file).pipe (answer);
+    }
+  });
+  const sockets = new WebSocketServer ({ server, path: '/stream', handleProtocols: (protocols) => protocols.has ('rangecast.v1') ? 'rangecast.v1' : false });
+  const errors = [];
+  let connections = 0;
+  sockets.on ('connection', (socket) => script (clientOf (socket), connections++).catch ((error) => socket.readyState === 1 && errors.push (error)));
+  await new Promise ((resolve) => server.listen (0, '127.0.0.1', resolve));
+  const page = await openPage (browser, `http://127.0.0.1:${server.address ().port}/`);
+  try {
+    await use (page, { connections: () => connections });
+    assert.deepEqual (errors, []);
+  } finally {
+    await page.close ();
+    for (const socket of sockets.clients)
+      socket.terminate ();
+    server.close ();
+    server.closeAllConnections ();
+  }
+};
+
+const clientOf = (socket) => {
+  const received = [], waiting = [];
+  socket.on ('error', () => {});
+  socket.on ('message', (data) => {
+    const parsed = JSON.parse (String (data));
+    if (parsed.type === 'ping')
+      return;
+    if (waiting.length > 0)
+      waiting.shift () (parsed);
+    else
+      received.push (parsed);
+  });
+  let number = 0;
+  const client = {
+    socket, send: (data) => socket.send (typeof data === 'string' || data instanceof Uint8Array ? data : JSON.stringify (data)),
+    next: () => received.length > 0 ? Promise.resolve (received.shift ()) : new Promise ((resolve) => waiting.push (resolve)),
+    welcome: async () => {
+      const hello = await client.next ();
+      assert.equal (hello.type, 'hello');
+      assert.equal (hello.version, 1);
+      client.send ({ type: 'welcome', version: 1, window: 3, rtc: false });
+    },
+    // Resolves when it is acknowledged.
+    frameSet: async (units, frameSet = number, { flags = 1, dropped = 0 } = {}) => {
+      const header = Buffer.alloc (32);
+      header.writeUInt8 (1, 0);
+      header.writeUInt8 (flags, 1);
+      header.writeUInt16LE (1, 2);
+      header.writeUInt32LE (frameSet >>> 0, 4);
+      header.writeUInt32LE (number++, 12);
+      header.writeUInt32LE (dropped, 16);
+      header.writeUInt32LE (0xffffffff, 20);
+      client.send (Buffer.concat ([header, units]));
+      for (let answer; answer?.frameSet !== frameSet >>> 0 || answer.type !== 'ack';)
+        answer = await client.next ();
+    },
+  };
+  return client;
+};
+
+const scene = accessUnits (readStream ('packed')), first = joined (scene[0]);
+const forever = async (client) => {
+  for (let i = 0; client.socket.readyState === 1; i++) {
+    await client.frameSet (joined (scene[i % scene.length]));
+    await sleep (50);
+  }
+};
+
+const refused = [
+  ['text that is no message', (client) => client.send ('rubbish'), '^The server sent what is no message of the protocol\\.$'],
+  ['a frame set before its welcome', (client) => client.frameSet (first), "^The server sent a frame set before 'welcome'\\.$"],
+  ['another version', (client) => client.send ({ type: 'welcome', version: 2 }), '^The server speaks another version of the protocol; reload this page\\.$'],
+  ['a binary message that is no frame set', async (client) => { await client.welcome (); client.send (new Uint8Array (31)); },
+    '^The server sent what is no frame set\\.$'],
+  ['40 MB in one message', async (client) => { await client.welcome (); client.send (Buffer.concat ([Buffer.from ([1, 1, 1, 0]), Buffer.alloc (40e6)])); },
+    '^The server sent 40000004 bytes in one message, more than a frame set may have\\.$'],
+  ['4429', async (client) => { await client.next (); client.socket.close (4429, 'at most 2 clients'); }, '^The server has too many viewers: at most 2 clients; trying again\\.$'],
+  ['4406', async (client) => { await client.next (); client.socket.close (4406, 'expected version 9'); },
+    '^The server speaks another version of the protocol; reload this page: expected version 9\\.$'],
+];
+for (const [what, script, sentence] of refused)
+  test (`${what} gives its sentence`, () => withServer (async (client) => script (client), async (page) => {
+    await messageMatches (page, sentence);
+  }));
+
+test ('a server without a stream gives its sentence, and the picture when it has one', () => withServer (async (client) => {
+  await client.welcome ();
+  await sleep (4000);
+  await forever (client);
+}, async (page) => {
+  await messageMatches (page, '^The server has no stream at the moment');
+  await framesShown (page, 3);
+  assert.equal (await message (page), '');
+}));
+
+test ('a token is asked for, sent, and kept for the next time', () => {
+  const tokens = [];
+  return withServer (async (client) => {
+    const hello = await client.next ();
+    tokens.push (hello.token);
+    if (hello.token !== 'secret')
+      return client.socket.close (4401, 'wrong or missing token');
+    client.send ({ type: 'welcome', version: 1, window: 3, rtc: false });
+    await forever (client);
+  }, async (page) => {
+    await page.waitForSelector ('#token:not([hidden])');
+    await page.type ('#token-text', 'guess');
+    await page.keyboard.press ('Enter');
+    await page.waitForFunction (() => document.body.dataset.state === 'token' && document.getElementById ('token').hidden === false);
+    await page.waitForSelector ('#token:not([hidden])');
+    await page.$eval ('#token-text', (input) => { input.value = ''; });
+    await page.type ('#token-text', 'secret');
+    await page.keyboard.press ('Enter');
+    await framesShown (page, 1);
+    assert.deepEqual (tokens, [undefined, 'guess', 'secret']);
+    await page.reload ();
+    await framesShown (page, 1);
+    assert.equal (tokens.at (-1), 'secret');
+    await page.goto (`${page.url ()}#token=other`);
+    await page.reload ();
+    await page.waitForSelector ('#token:not([hidden])');
+    assert.equal (tokens.at (-1), 'other');
+    assert.equal (await page.evaluate (() => location.hash), '');
+  });
+});
+
+test ('a connection that breaks is made again, and the picture goes on', () => withServer (async (client, connection) => {
+  await client.welcome ();
+  await client.frameSet (first); // numbers begin anew
+  await sleep (500);
+  if (connection < 2)
+    client.socket.terminate ();
+  else
+    await forever (client);
+}, async (page, { connections }) => {
+  await messageMatches (page, '^The connection was lost; trying again\\.$');
+  await framesShown (page, 5);
+  assert.ok (connections () >= 3);
+  assert.equal (await message (page), '');
+}));
+
+test ('a rig of 64 views and a view of 16384 pixels give their sentences', async () => {
+  const rig = scene[0].filter (isRigView), rest = scene[0].filter ((unit) => !isRigView (unit));
+  const many = Array.from ({ length: 64 }, (_, i) => changedRigView (rig[0], { number: i, total: 64, id: i }));
+  const wide = rig.map ((unit, i) => changedRigView (unit, { number: i, total: rig.length, id: i, width: 16384 }));
+  for (const [units, sentence] of [[many, '^The rig has 64 views; the browser shows at most 16\\.$'], [wide, 'has 16384x\\d+ pixels; the browser shows at most 8192']])
+    await withServer (async (client) => {
+      await client.welcome ();
+      await client.frameSet (joined ([...units, ...rest]));
+    }, (page) => messageMatches (page, sentence));
+});
+
+test ('units of the fuzz corpus do no harm, and the stream after them is shown', () => withServer (async (client) => {
+  await client.welcome ();
+  for (const { bytes } of [...corpus ('access_unit'), ...corpus ('slice')])
+    if (bytes.length > 0)
+      await client.frameSet (bytes);
+  await forever (client);
+}, async (page) => {
+  await framesShown (page, 5);
+  await page.waitForFunction (() => document.body.dataset.state === 'receiving');
+}));
+
+test ('frame sets that the server leaves out are counted, and most of them left out gives its sentence', () => withServer (async (client) => {
+  await client.welcome ();
+  for (let i = 0; i < 40; i++)
+    await client.frameSet (joined (scene[i % scene.length]), 4 * i, { dropped: 3 * i });
+  await sleep (60000);
+}, async (page) => {
+  await messageMatches (page, '^The connection or this device is too slow: 7\\d of 10\\d frame sets were left out\\.$');
+}));
+
+test ('memory stays the same over 10000 frame sets that come faster than they can be drawn', () => {
+  let sent = 0;
+  return withServer (async (client) => {
+    await client.welcome ();
+    await client.frameSet (first);
+    for (; sent < 10000 && client.socket.readyState === 1; sent++)
+      await client.frameSet (joined (scene[sent % scene.length]));
+    await sleep (60000);
+  }, async (page) => {
+    const session = await page.createCDPSession ();
+    const used = async () => {
+      await session.send ('HeapProfiler.collectGarbage');
+      return (await page.metrics ()).JSHeapUsedSize;
+    };
+    const until = async (count) => {
+      for (let i = 0; sent < count && i < 3000; i++)
+        await sleep (100);
+      assert.ok (sent >= count, `${sent} of ${count} frame sets`);
+    };
+    await until (1000);
+    const early = await used (), shown = await frameSets (page);
+    await until (10000);
+    const late = await used ();
+    assert.ok (late < early * 1.2 + 1e6, `${early} to ${late} bytes`);
+    assert.ok (await frameSets (page) > shown);
+  });
+});
