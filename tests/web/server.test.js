@@ -3,94 +3,20 @@
 // does none of that: a script of each test plays the server here.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
-import http from 'node:http';
 import path from 'node:path';
 import test, { after, before } from 'node:test';
-import { framesShown, frameSets, launch, message, messageMatches, openPage, required, sleep } from './browser.js';
-import { accessUnits, build, changedRigView, corpus, isRigView, joined, readStream } from './support.js';
-
-const { WebSocketServer } = required ('ws');
-const folder = path.join (build, 'pipelines/web');
-const types = { html: 'text/html', js: 'text/javascript', css: 'text/css', wasm: 'application/wasm' };
+import { framesShown, frameSets, launch, message, messageMatches, sleep, work } from './browser.js';
+import { withServer } from './scripted.js';
+import { accessUnits, changedRigView, corpus, isRigView, joined, readStream } from './support.js';
 
 let browser;
 before (async () => { browser = await launch (); });
 after (() => browser?.close ());
 
-// A page and, for each connection to its server, script (client), where client has next () for messages, send (), welcome (), frameSet ().
-const withServer = async (script, use) => {
-  const server = http.createServer ((request, answer) => {
-    const name = new URL (request.url, 'http://here').pathname.slice (1) || 'index.html', file = path.join (folder, path.basename (name));
-    if (name === 'server.json' || !fs.existsSync (file)) {
-      answer.writeHead (name === 'server.json' ? 200 : 404, { 'Content-Type': 'application/json' });
-      answer.end (JSON.stringify ({ version: 1, token: false, title: 'a script' }));
-    } else {
-      answer.writeHead (200, { 'Content-Type': types[name.split ('.').pop ()] });
-      fs.createReadStream (file).pipe (answer);
-    }
-  });
-  const sockets = new WebSocketServer ({ server, path: '/stream', handleProtocols: (protocols) => protocols.has ('rangecast.v1') ? 'rangecast.v1' : false });
-  const errors = [];
-  let connections = 0;
-  sockets.on ('connection', (socket) => script (clientOf (socket), connections++).catch ((error) => socket.readyState === 1 && errors.push (error)));
-  await new Promise ((resolve) => server.listen (0, '127.0.0.1', resolve));
-  const page = await openPage (browser, `http://127.0.0.1:${server.address ().port}/`);
-  try {
-    await use (page, { connections: () => connections });
-    assert.deepEqual (errors, []);
-  } finally {
-    await page.close ();
-    for (const socket of sockets.clients)
-      socket.terminate ();
-    server.close ();
-    server.closeAllConnections ();
-  }
-};
-
-const clientOf = (socket) => {
-  const received = [], waiting = [];
-  socket.on ('error', () => {});
-  socket.on ('message', (data) => {
-    const parsed = JSON.parse (String (data));
-    if (parsed.type === 'ping')
-      return;
-    if (waiting.length > 0)
-      waiting.shift () (parsed);
-    else
-      received.push (parsed);
-  });
-  let number = 0;
-  const client = {
-    socket, send: (data) => socket.send (typeof data === 'string' || data instanceof Uint8Array ? data : JSON.stringify (data)),
-    next: () => received.length > 0 ? Promise.resolve (received.shift ()) : new Promise ((resolve) => waiting.push (resolve)),
-    welcome: async () => {
-      const hello = await client.next ();
-      assert.equal (hello.type, 'hello');
-      assert.equal (hello.version, 1);
-      client.send ({ type: 'welcome', version: 1, window: 3, rtc: false });
-    },
-    // Resolves when it is acknowledged.
-    frameSet: async (units, frameSet = number, { flags = 1, dropped = 0 } = {}) => {
-      const header = Buffer.alloc (32);
-      header.writeUInt8 (1, 0);
-      header.writeUInt8 (flags, 1);
-      header.writeUInt16LE (1, 2);
-      header.writeUInt32LE (frameSet >>> 0, 4);
-      header.writeUInt32LE (number++, 12);
-      header.writeUInt32LE (dropped, 16);
-      header.writeUInt32LE (0xffffffff, 20);
-      client.send (Buffer.concat ([header, units]));
-      for (let answer; answer?.frameSet !== frameSet >>> 0 || answer.type !== 'ack';)
-        answer = await client.next ();
-    },
-  };
-  return client;
-};
-
 const scene = accessUnits (readStream ('packed')), first = joined (scene[0]);
-const forever = async (client) => {
+const forever = async (client, units = scene) => {
   for (let i = 0; client.socket.readyState === 1; i++) {
-    await client.frameSet (joined (scene[i % scene.length]));
+    await client.frameSet (joined (units[i % units.length]));
     await sleep (50);
   }
 };
@@ -108,11 +34,11 @@ const refused = [
     '^The server speaks another version of the protocol; reload this page: expected version 9\\.$'],
 ];
 for (const [what, script, sentence] of refused)
-  test (`${what} gives its sentence`, () => withServer (async (client) => script (client), async (page) => {
+  test (`${what} gives its sentence`, () => withServer (browser, async (client) => script (client), async (page) => {
     await messageMatches (page, sentence);
   }));
 
-test ('a server without a stream gives its sentence, and the picture when it has one', () => withServer (async (client) => {
+test ('a server without a stream gives its sentence, and the picture when it has one', () => withServer (browser, async (client) => {
   await client.welcome ();
   await sleep (4000);
   await forever (client);
@@ -124,7 +50,7 @@ test ('a server without a stream gives its sentence, and the picture when it has
 
 test ('a token is asked for, sent, and kept for the next time', () => {
   const tokens = [];
-  return withServer (async (client) => {
+  return withServer (browser, async (client) => {
     const hello = await client.next ();
     tokens.push (hello.token);
     if (hello.token !== 'secret')
@@ -153,7 +79,7 @@ test ('a token is asked for, sent, and kept for the next time', () => {
   });
 });
 
-test ('a connection that breaks is made again, and the picture goes on', () => withServer (async (client, connection) => {
+test ('a connection that breaks is made again, and the picture goes on', () => withServer (browser, async (client, connection) => {
   await client.welcome ();
   await client.frameSet (first); // numbers begin anew
   await sleep (500);
@@ -173,13 +99,13 @@ test ('a rig of 64 views and a view of 16384 pixels give their sentences', async
   const many = Array.from ({ length: 64 }, (_, i) => changedRigView (rig[0], { number: i, total: 64, id: i }));
   const wide = rig.map ((unit, i) => changedRigView (unit, { number: i, total: rig.length, id: i, width: 16384 }));
   for (const [units, sentence] of [[many, '^The rig has 64 views; the browser shows at most 16\\.$'], [wide, 'has 16384x\\d+ pixels; the browser shows at most 8192']])
-    await withServer (async (client) => {
+    await withServer (browser, async (client) => {
       await client.welcome ();
       await client.frameSet (joined ([...units, ...rest]));
     }, (page) => messageMatches (page, sentence));
 });
 
-test ('units of the fuzz corpus do no harm, and the stream after them is shown', () => withServer (async (client) => {
+test ('units of the fuzz corpus do no harm, and the stream after them is shown', () => withServer (browser, async (client) => {
   await client.welcome ();
   for (const { bytes } of [...corpus ('access_unit'), ...corpus ('slice')])
     if (bytes.length > 0)
@@ -190,7 +116,7 @@ test ('units of the fuzz corpus do no harm, and the stream after them is shown',
   await page.waitForFunction (() => document.body.dataset.state === 'receiving');
 }));
 
-test ('frame sets that the server leaves out are counted, and most of them left out gives its sentence', () => withServer (async (client) => {
+test ('frame sets that the server leaves out are counted, and most of them left out gives its sentence', () => withServer (browser, async (client) => {
   await client.welcome ();
   for (let i = 0; i < 40; i++)
     await client.frameSet (joined (scene[i % scene.length]), 4 * i, { dropped: 3 * i });
@@ -201,7 +127,7 @@ test ('frame sets that the server leaves out are counted, and most of them left 
 
 test ('memory stays the same over 10000 frame sets that come faster than they can be drawn', () => {
   let sent = 0;
-  return withServer (async (client) => {
+  return withServer (browser, async (client) => {
     await client.welcome ();
     await client.frameSet (first);
     for (; sent < 10000 && client.socket.readyState === 1; sent++)
@@ -226,3 +152,27 @@ test ('memory stays the same over 10000 frame sets that come faster than they ca
     assert.ok (await frameSets (page) > shown);
   });
 });
+
+test ('the dashboard shows views, elements and warnings, and takes rows of any shape', () => withServer (browser, async (client) => {
+  const { want } = await client.next ();
+  assert.deepEqual (want, ['stream', 'stats']);
+  client.send ({ type: 'welcome', version: 1, window: 3, rtc: false });
+  const row = { host: 'camera0', element: 'stereodepth', name: 'depth', 'view-ids': [0], fps: 15, 'latency-p50': 16400000, clock: 0.0021, age: 0.5 };
+  client.send ({ type: 'stats', rows: [row, { ...row, host: 'parent', element: 'rangemux', name: 'mux', pad: 'sink_2', fps: 0, lost: 12 },
+    { host: 'camera1', name: 'source', warning: 'The camera is gone', time: 1e9 }, null, 7, 'x', [], { host: {}, fps: 'many', 'view-ids': 3, lost: [] }] });
+  await forever (client, accessUnits (new Uint8Array (fs.readFileSync (path.join (work, 'moving.rcnc'))))); // four views, by page.sh
+}, async (page) => {
+  await framesShown (page, 10);
+  await page.waitForFunction (() => document.querySelectorAll ('#views tbody tr').length === 4);
+  const cells = (table) => page.$$eval (`#${table} tbody tr`, (rows) => rows.map ((tr) => [...tr.cells].map ((td) => td.textContent)));
+  const views = await cells ('views'), elements = await cells ('elements');
+  assert.deepEqual (views.map ((view) => view[0]), ['0', '1', '2', '3']);
+  assert.ok (views.every ((view) => Number (view[4]) > 0), JSON.stringify (views));
+  assert.deepEqual (elements.find (([host]) => host === 'camera0').slice (0, 4), ['camera0', 'depth', '0', '15.0']);
+  assert.equal (elements.find (([host]) => host === 'parent')[1], 'mux.sink_2');
+  assert.match (await page.$eval ('#warnings', (list) => list.textContent), /camera1 source: The camera is gone/);
+  assert.equal (await message (page), '');
+  await page.setViewport ({ width: 1280, height: 800 });
+  await sleep (1000);
+  fs.writeFileSync (path.join (work, 'page-rig.png'), await page.screenshot ());
+}, 'rig.html'));
