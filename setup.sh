@@ -33,6 +33,8 @@ packages=(
 [ "${targets[0]}" = demo ] || packages+=(
   # calibration, cameras, RTSP server
   libopencv-contrib-dev libceres-dev libaravis-dev libusb-1.0-0-dev libgstrtspserver-1.0-dev
+  # rangewebsink
+  libsoup-3.0-dev libjson-glib-dev gstreamer1.0-nice
   # language bindings of libgstrange
   libgirepository1.0-dev python3-gst-1.0 python3-numpy
   # benchmarks

@@ -134,7 +134,7 @@ class Dashboard {
   report (rows) {
     const now = performance.now () / 1000;
     for (const row of rows) {
-      if (typeof row !== 'object' || row === null)
+      if (typeof row?.host !== 'string' || typeof row.name !== 'string')
         continue;
       if (typeof row.warning === 'string')
         this.warn (row);

@@ -1,0 +1,244 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "client.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "category.hpp"
+
+namespace web {
+
+namespace {
+
+/** Without an acknowledgement for so long a client is gone, microseconds. */
+constexpr gint64 kMaxSilence_us = 60 * G_USEC_PER_SEC;
+
+} // namespace
+
+Client::Client (GstObject *log, Host &host, const Settings &settings,
+    SoupWebsocketConnection *socket, std::string address)
+    : log_ (log), host_ (host), settings_ (settings),
+      socket_ (SOUP_WEBSOCKET_CONNECTION (g_object_ref (socket))), address_ (std::move (address)),
+      label_ (address_), opened_us_ (g_get_monotonic_time ()), heard_us_ (opened_us_)
+{
+  soup_websocket_connection_set_max_incoming_payload_size (socket_, kMaxMessage);
+  soup_websocket_connection_set_keepalive_interval (socket_, 20);
+  g_signal_connect (socket_, "message", G_CALLBACK (on_message), this);
+  g_signal_connect (socket_, "closed", G_CALLBACK (on_closed), this);
+}
+
+Client::~Client ()
+{
+  g_signal_handlers_disconnect_by_data (socket_, this);
+  g_object_unref (socket_);
+}
+
+/* ---- the connection ---- */
+
+void
+Client::on_message (SoupWebsocketConnection *, gint type, GBytes *message, gpointer self)
+{
+  auto client = static_cast<Client *> (self);
+  if (client->closing_)
+    return;
+  gsize size = 0;
+  const auto text = static_cast<const char *> (g_bytes_get_data (message, &size));
+  if (type != SOUP_WEBSOCKET_DATA_TEXT)
+    client->refuse (kCloseUnsupported, "expected text messages");
+  else if (client->is_too_fast ())
+    client->refuse (
+        kCloseLimit, "at most " + std::to_string (kMaxMessageRate) + " messages a second");
+  else
+    client->handle ({text, size});
+}
+
+void
+Client::on_closed (SoupWebsocketConnection *socket, gpointer self)
+{
+  auto client = static_cast<Client *> (self);
+  GST_INFO_OBJECT (client->log_, "%s left (%u)", client->label_.c_str (),
+      soup_websocket_connection_get_close_code (socket));
+  client->host_.closed (*client); /* deletes it */
+}
+
+void
+Client::close (gushort code, const std::string &reason)
+{
+  closing_ = true;
+  if (soup_websocket_connection_get_state (socket_) == SOUP_WEBSOCKET_STATE_OPEN)
+    soup_websocket_connection_close (socket_, code, reason.c_str ());
+}
+
+void
+Client::refuse (gushort code, const std::string &reason)
+{
+  GST_WARNING_OBJECT (log_, "closing the connection of %s: %s", label_.c_str (), reason.c_str ());
+  close (code, reason);
+}
+
+void
+Client::send_text (const std::string &json)
+{
+  if (entered_ && !closing_ &&
+      soup_websocket_connection_get_state (socket_) == SOUP_WEBSOCKET_STATE_OPEN)
+    soup_websocket_connection_send_text (socket_, json.c_str ());
+}
+
+void
+Client::check_silence ()
+{
+  const gint64 now = g_get_monotonic_time ();
+  if (closing_)
+    return;
+  if (!entered_ && now - opened_us_ > gint64 (settings_.hello_timeout_ms) * 1000)
+    refuse (kCloseTimeout, "no hello in time");
+  else if (!in_flight_.empty () && now - heard_us_ > kMaxSilence_us)
+    refuse (kCloseTimeout, "no acknowledgement for 60 s");
+}
+
+bool
+Client::is_too_fast ()
+{
+  const gint64 now = g_get_monotonic_time ();
+  if (now - rate_since_us_ >= G_USEC_PER_SEC) {
+    rate_since_us_ = now;
+    messages_in_second_ = 0;
+  }
+  return ++messages_in_second_ > kMaxMessageRate;
+}
+
+/* ---- messages ---- */
+
+void
+Client::handle (std::string_view text)
+{
+  const auto message = JsonMessage::parse (text);
+  const auto type = message ? message->text ("type") : std::nullopt;
+  if (!type)
+    return refuse (kCloseBadMessage, "expected a JSON object with a string 'type'");
+  if (!entered_)
+    return enter (*message);
+  if (*type == "ack")
+    acknowledge (*message);
+  else if (*type == "key")
+    host_.request_key (*this);
+  else if (*type == "ping") {
+    const auto time = message->number ("time");
+    if (!time)
+      return refuse (kCloseBadMessage, "ping: time: expected a number");
+    gchar number[G_ASCII_DTOSTR_BUF_SIZE];
+    g_ascii_dtostr (number, sizeof number, *time);
+    send_text (std::string ("{\"type\":\"pong\",\"time\":") + number +
+               ",\"server\":" + std::to_string (g_get_monotonic_time ()) + "}");
+  } else
+    GST_DEBUG_OBJECT (log_, "%s: ignoring a message '%s'", label_.c_str (), type->c_str ());
+}
+
+void
+Client::enter (const JsonMessage &message)
+{
+  std::string error;
+  const auto hello = parse_hello (message, error);
+  if (!hello)
+    return refuse (kCloseBadMessage, error);
+  if (hello->version != kProtocolVersion)
+    return refuse (kCloseVersion, "expected version " + std::to_string (kProtocolVersion));
+  if (!host_.admit (hello->token, user_))
+    return refuse (kCloseUnauthorized, "wrong or missing token");
+  hello_ = *hello;
+  hello_.token.clear ();
+  label_ += user_.empty () ? "" : " (" + user_ + ")";
+  entered_ = true;
+  GST_INFO_OBJECT (log_, "%s entered", label_.c_str ());
+  send_text (host_.welcome ());
+  host_.entered (*this);
+}
+
+void
+Client::acknowledge (const JsonMessage &message)
+{
+  const auto number = message.number ("frameSet");
+  if (!number || !(*number >= 0 && *number <= G_MAXUINT32))
+    return refuse (kCloseBadMessage, "ack: frameSet: expected a number of a frame set");
+  const auto acknowledged = static_cast<guint32> (*number);
+  heard_us_ = g_get_monotonic_time ();
+  while (!in_flight_.empty () && gint32 (acknowledged - in_flight_.front ().number) >= 0) {
+    in_flight_bytes_ -= in_flight_.front ().bytes;
+    in_flight_.pop_front ();
+  }
+}
+
+/* ---- frame sets ---- */
+
+/* One frame set is sent however large it is. */
+bool
+Client::has_room (gsize bytes) const
+{
+  return in_flight_.empty () || (in_flight_.size () < settings_.window &&
+                                    in_flight_bytes_ + bytes <= settings_.max_queued_bytes);
+}
+
+void
+Client::send (const FrameSet &frame_set)
+{
+  if (!entered_ || closing_ || !hello_.stream ||
+      soup_websocket_connection_get_state (socket_) != SOUP_WEBSOCKET_STATE_OPEN)
+    return;
+  if (!any_)
+    first_ = frame_set.number;
+  else if (frame_set.number != last_ + 1) /* the server was too busy for one */
+    needs_key_ = true;
+  any_ = true;
+  last_ = frame_set.number;
+  gsize size = 0;
+  const gconstpointer units = g_bytes_get_data (frame_set.units.get (), &size);
+  const bool new_rig = rig_units_ != frame_set.rig_units;
+  const gsize rig_size = new_rig ? frame_set.rig_units->size () : 0;
+  const gsize whole = MessageHeader::kSize + rig_size + size;
+  if (!has_room (whole)) {
+    GST_LOG_OBJECT (log_, "%s: leaving out frame set %u", label_.c_str (), frame_set.number);
+    needs_key_ = true;
+    return;
+  }
+  if (needs_key_ && !frame_set.key)
+    return host_.request_key (*this);
+
+  const gint64 now = g_get_monotonic_time ();
+  MessageHeader header;
+  header.key = frame_set.key;
+  header.discontinuity = needs_key_ || new_rig;
+  header.frame_set = frame_set.number;
+  header.message = sent_;
+  header.dropped = frame_set.number - first_ - sent_;
+  header.sent_us = guint64 (now);
+  if (frame_set.captured_us >= 0)
+    header.delay_us = guint32 (std::clamp<gint64> (now - frame_set.captured_us, 0, G_MAXINT32));
+  auto message = static_cast<guint8 *> (g_malloc (whole));
+  header.write (message);
+  if (new_rig)
+    std::memcpy (message + MessageHeader::kSize, frame_set.rig_units->data (), rig_size);
+  std::memcpy (message + MessageHeader::kSize + rig_size, units, size);
+  const BytesPtr bytes (g_bytes_new_take (message, whole));
+  if (in_flight_.empty ())
+    heard_us_ = now;
+  soup_websocket_connection_send_message (socket_, SOUP_WEBSOCKET_DATA_BINARY, bytes.get ());
+  in_flight_.push_back ({frame_set.number, whole});
+  in_flight_bytes_ += whole;
+  rig_units_ = frame_set.rig_units;
+  needs_key_ = false;
+  sent_++;
+  bytes_ += whole;
+}
+
+GstStructure *
+Client::stats () const
+{
+  const guint32 passed = any_ ? last_ - first_ + 1 : 0;
+  return gst_structure_new ("client", "address", G_TYPE_STRING, address_.c_str (), "user",
+      G_TYPE_STRING, user_.c_str (), "transport", G_TYPE_STRING, "websocket", "frame-sets",
+      G_TYPE_UINT64, guint64 (sent_), "dropped", G_TYPE_UINT64, guint64 (passed - sent_),
+      "unacknowledged", G_TYPE_UINT, guint (in_flight_.size ()), "bytes", G_TYPE_UINT64, bytes_,
+      nullptr);
+}
+
+} // namespace web

@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#pragma once
+
+#include <gst/gst.h>
+#include <libsoup/soup.h>
+
+#include <deque>
+#include <memory>
+#include <string>
+
+#include "protocol.hpp"
+#include "settings.hpp"
+
+namespace web {
+
+struct BytesUnref {
+  void operator() (GBytes *bytes) const { g_bytes_unref (bytes); }
+};
+using BytesPtr = std::unique_ptr<GBytes, BytesUnref>;
+
+/** A coded frame set on its way to all clients. */
+struct FrameSet {
+  BytesPtr units;
+  std::shared_ptr<const std::string> rig_units; ///< of the rig that it belongs to
+  bool key;                                     ///< refers to no earlier frame set
+  guint32 number;
+  gint64 captured_us; ///< on g_get_monotonic_time(); -1: unknown
+};
+
+/** One WebSocket of a browser. The server's thread only. */
+class Client {
+public:
+  /** What a client needs from the server. */
+  class Host {
+  public:
+    virtual ~Host () = default;
+    /** @return whether the token lets the client in
+     *  @param[out] name  of the user, if tokens have names */
+    virtual bool admit (const std::string &token, std::string &name) = 0;
+    virtual void request_key (Client &client) = 0;
+    virtual std::string welcome () = 0; ///< the message
+    virtual void entered (Client &client) = 0;
+    virtual void closed (Client &client) = 0;
+  };
+
+  Client (GstObject *log, Host &host, const Settings &settings, SoupWebsocketConnection *socket,
+      std::string address);
+  ~Client ();
+  Client (const Client &) = delete;
+  Client &operator= (const Client &) = delete;
+
+  /** Sends it, if the client is ready for it. */
+  void send (const FrameSet &frame_set);
+  /** Sends a text message, if the client was let in. */
+  void send_text (const std::string &json);
+  void close (gushort code, const std::string &reason);
+  /** Once a second: closes clients that have been silent for too long. */
+  void check_silence ();
+
+  [[nodiscard]] bool wants_stats () const { return entered_ && hello_.stats; }
+  [[nodiscard]] const std::string &label () const { return label_; }
+  /** Structure "client". Returns: (transfer full) */
+  [[nodiscard]] GstStructure *stats () const;
+  [[nodiscard]] guint64 bytes () const { return bytes_; }
+  guint64 stats_sent = 0; ///< see StatsBoard::message()
+
+private:
+  struct InFlight {
+    guint32 number;
+    gsize bytes;
+  };
+
+  static void on_message (SoupWebsocketConnection *, gint type, GBytes *message, gpointer self);
+  static void on_closed (SoupWebsocketConnection *, gpointer self);
+  void handle (std::string_view text);
+  void enter (const JsonMessage &message);
+  void acknowledge (const JsonMessage &message);
+  [[nodiscard]] bool is_too_fast ();
+  [[nodiscard]] bool has_room (gsize bytes) const;
+  void refuse (gushort code, const std::string &reason);
+
+  GstObject *log_;
+  Host &host_;
+  const Settings &settings_;
+  SoupWebsocketConnection *socket_;
+  std::string address_, label_, user_;
+  Hello hello_;
+  bool entered_ = false, closing_ = false;
+  guint64 entered_us_ = 0;
+  gint64 opened_us_, heard_us_, rate_since_us_ = 0;
+  guint messages_in_second_ = 0;
+
+  /* frame sets */
+  bool any_ = false;      /* the counts below have begun */
+  bool needs_key_ = true; /* an earlier frame set was not sent */
+  guint32 first_ = 0;     /* number of the first frame set since welcome */
+  guint32 last_ = 0;      /* of the last one that came by */
+  guint32 sent_ = 0;      /* frame sets = messages */
+  guint64 bytes_ = 0;
+  gsize in_flight_bytes_ = 0;
+  std::deque<InFlight> in_flight_;
+  std::shared_ptr<const std::string> rig_units_; /* that the client has */
+};
+
+} // namespace web

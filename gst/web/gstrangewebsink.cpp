@@ -1,0 +1,348 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/**
+ * SECTION:element-rangewebsink
+ * @title: rangewebsink
+ *
+ * Serves coded frame sets to browsers: a page that shows the person in 3D, a dashboard of the rig
+ * (/rig), and the stream over WebSockets, as docs/formats/web-protocol.md specifies. Clients that
+ * cannot keep up are sent fewer frame sets; they never delay the pipeline or other clients.
+ *
+ * By default only this machine can connect. An @address that others can reach needs a @token, a
+ * @token-file, or @anonymous=true; use @certificate there, too.
+ *
+ * When it listens, it posts an element message `rangewebsink-address` with the field `url`
+ * (string), the address of the page.
+ *
+ * ## Example launch line
+ * |[
+ * gst-launch-1.0 avatartestsrc is-live=true ! video/x-range,framerate=15/1 ! neighbourcodeenc !
+ * rangewebsink port=8080
+ * ]|
+ *
+ * Since: 0.1
+ */
+#include "gstrangewebsink.h"
+
+#include <gst/video/video.h>
+
+#include <atomic>
+#include <gstrange/gstrangeinfo.hpp>
+#include <gstrange/gstrangemeta.h>
+#include <gstrange/gstrangestatus.hpp>
+#include <memory>
+#include <mutex>
+#include <rangecast/neighbourcode/bitstream/unit.hpp>
+#include <string>
+#include <vector>
+
+#include "category.hpp"
+#include "common/capserrors.hpp"
+#include "common/elementproperties.hpp"
+#include "server.hpp"
+
+using rangecast::Status;
+using web::Settings;
+
+GST_DEBUG_CATEGORY (gst_range_web_sink_debug);
+
+struct GstRangeWebSinkPrivate {
+  std::mutex lock; /* guards settings, and which server there is; not held while the server starts,
+                      stops or is given frame sets */
+  Settings settings;
+  std::shared_ptr<web::Server> server; /* from start() to stop() */
+  StatsReporter reporter;
+
+  /* streaming thread only */
+  CapsErrors caps_errors;
+};
+
+struct _GstRangeWebSink {
+  GstBaseSink parent;
+  GstRangeWebSinkPrivate *priv;
+};
+
+static GstStaticPadTemplate sink_template =
+    GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
+        GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
+            ", version = (int) 2, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
+
+G_DEFINE_TYPE_WITH_CODE (GstRangeWebSink, gst_range_web_sink, GST_TYPE_BASE_SINK,
+    GST_DEBUG_CATEGORY_INIT (gst_range_web_sink_debug, "rangewebsink", 0, "Range web sink"))
+GST_ELEMENT_REGISTER_DEFINE (rangewebsink, "rangewebsink", GST_RANK_NONE, GST_TYPE_RANGE_WEB_SINK)
+
+static std::shared_ptr<web::Server>
+current_server (GstRangeWebSinkPrivate *priv)
+{
+  std::lock_guard guard (priv->lock);
+  return priv->server;
+}
+
+/* ---- the stream ---- */
+
+static gboolean
+gst_range_web_sink_set_caps (GstBaseSink *base, GstCaps *caps)
+{
+  GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (base)->priv;
+  gstrange::RangeInfo info;
+  if (!priv->caps_errors.accept (GST_ELEMENT (base), gstrange::parse_caps (caps, info)))
+    return FALSE;
+  GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
+  priv->reporter.set_views (info.rig);
+  std::vector<guint8> rig;
+  rangecast::write_rig_units ({info.rig, info.fps_n, info.fps_d}, rig);
+  GstCaps *without_rig = gst_caps_copy (caps);
+  gst_structure_remove_field (gst_caps_get_structure (without_rig, 0), "rig");
+  g_autofree gchar *text = gst_caps_to_string (without_rig);
+  gst_caps_unref (without_rig);
+  current_server (priv)->set_stream (text, std::string (rig.begin (), rig.end ()));
+  return TRUE;
+}
+
+/* When the frame set was captured, on g_get_monotonic_time(); -1: unknown. */
+static gint64
+capture_time_us (GstElement *element, GstBuffer *buffer)
+{
+  const GstClockTime captured = gst_range_buffer_get_capture_time (buffer);
+  GstClock *clock = gst_element_get_clock (element);
+  if (!clock || !GST_CLOCK_TIME_IS_VALID (captured)) {
+    gst_clear_object (&clock);
+    return -1;
+  }
+  const GstClockTimeDiff age = GST_CLOCK_DIFF (captured, gst_clock_get_time (clock));
+  gst_object_unref (clock);
+  /* otherwise the time is of another clock */
+  return ABS (age) < 10 * GstClockTimeDiff (GST_SECOND) ? g_get_monotonic_time () - age / 1000 : -1;
+}
+
+static GstFlowReturn
+gst_range_web_sink_render (GstBaseSink *base, GstBuffer *buffer)
+{
+  GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (base)->priv;
+  gpointer units = nullptr;
+  gsize size = 0;
+  gst_buffer_extract_dup (buffer, 0, gst_buffer_get_size (buffer), &units, &size);
+  GST_LOG_OBJECT (base, "%" G_GSIZE_FORMAT " bytes of %" GST_TIME_FORMAT, size,
+      GST_TIME_ARGS (GST_BUFFER_PTS (buffer)));
+  current_server (priv)->push (web::BytesPtr (g_bytes_new_take (units, size)),
+      !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT),
+      capture_time_us (GST_ELEMENT (base), buffer));
+  priv->reporter.passed (GST_ELEMENT (base), buffer);
+  return GST_FLOW_OK;
+}
+
+static gboolean
+gst_range_web_sink_event (GstBaseSink *base, GstEvent *event)
+{
+  GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (base)->priv;
+  const bool ended = GST_EVENT_TYPE (event) == GST_EVENT_EOS;
+  /* waits until the last frame set was rendered */
+  const gboolean handled =
+      GST_BASE_SINK_CLASS (gst_range_web_sink_parent_class)->event (base, event);
+  if (ended && handled) {
+    if (const auto server = current_server (priv))
+      server->end ();
+    priv->reporter.finish ();
+  }
+  return handled;
+}
+
+/* On the server's thread. */
+static void
+request_key (GstObject *element)
+{
+  GST_DEBUG_OBJECT (element, "requesting a key frame set");
+  gst_pad_push_event (GST_BASE_SINK_PAD (element),
+      gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE, TRUE, 0));
+}
+
+/* ---- life ---- */
+
+/* The page of the build folder that this plugin was built in, or else the installed one. */
+static std::string
+default_root (GstElement *element)
+{
+  std::string root = RANGECAST_WEB_FOLDER;
+  GstPlugin *plugin =
+      gst_plugin_feature_get_plugin (GST_PLUGIN_FEATURE (gst_element_get_factory (element)));
+  const gchar *file = plugin ? gst_plugin_get_filename (plugin) : nullptr;
+  if (file) {
+    g_autofree gchar *folder = g_path_get_dirname (file);
+    const std::string built = std::string (folder) + "/../../pipelines/web";
+    if (g_file_test ((built + "/index.html").c_str (), G_FILE_TEST_IS_REGULAR))
+      root = built;
+  }
+  gst_clear_object (&plugin);
+  return root;
+}
+
+static gboolean
+gst_range_web_sink_start (GstBaseSink *base)
+{
+  GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (base)->priv;
+  Settings settings;
+  {
+    std::lock_guard guard (priv->lock);
+    settings = priv->settings;
+  }
+  if (settings.root.empty ())
+    settings.root = default_root (GST_ELEMENT (base));
+  priv->caps_errors.reset ();
+  auto server = std::make_shared<web::Server> (GST_OBJECT (base), settings, request_key);
+  if (const Status status = server->start ();
+      gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
+    return FALSE;
+  {
+    std::lock_guard guard (priv->lock);
+    priv->settings.url = server->url ();
+    priv->server = server;
+  }
+  GST_INFO_OBJECT (base, "listening at %s", server->url ().c_str ());
+  gst_element_post_message (
+      GST_ELEMENT (base), gst_message_new_element (GST_OBJECT (base),
+                              gst_structure_new ("rangewebsink-address", "url", G_TYPE_STRING,
+                                  server->url ().c_str (), nullptr)));
+  return TRUE;
+}
+
+static gboolean
+gst_range_web_sink_stop (GstBaseSink *base)
+{
+  GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (base)->priv;
+  std::shared_ptr<web::Server> server;
+  {
+    std::lock_guard guard (priv->lock);
+    server.swap (priv->server);
+    priv->settings.url.clear ();
+  }
+  return TRUE; /* the server stops here, without the lock */
+}
+
+static std::vector<StatsRow>
+collect_stats (GstElement *element)
+{
+  const auto server = current_server (GST_RANGE_WEB_SINK (element)->priv);
+  const auto counters = server ? server->counters () : web::Server::Counters{};
+  return {{.counters = {.frames = counters.frame_sets, .bytes = counters.bytes}}};
+}
+
+static GstStateChangeReturn
+gst_range_web_sink_change_state (GstElement *element, GstStateChange transition)
+{
+  GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (element)->priv;
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+    priv->reporter.start (element, collect_stats);
+  const GstStateChangeReturn result =
+      GST_ELEMENT_CLASS (gst_range_web_sink_parent_class)->change_state (element, transition);
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY ||
+      (transition == GST_STATE_CHANGE_READY_TO_PAUSED && result == GST_STATE_CHANGE_FAILURE))
+    priv->reporter.stop ();
+  return result;
+}
+
+/* With the lock held. */
+static GstStructure *
+make_stats (GstRangeWebSinkPrivate *priv)
+{
+  const auto counters = priv->server ? priv->server->counters () : web::Server::Counters{};
+  GstStructure *stats = gst_structure_new ("stats", "clients", G_TYPE_UINT, counters.clients,
+      "connections", G_TYPE_UINT64, counters.connections, "refused", G_TYPE_UINT64,
+      counters.refused, "frame-sets", G_TYPE_UINT64, counters.frame_sets, "key-requests",
+      G_TYPE_UINT64, counters.key_requests, "bytes", G_TYPE_UINT64, counters.bytes, nullptr);
+  GValue list = G_VALUE_INIT;
+  g_value_init (&list, GST_TYPE_ARRAY);
+  if (priv->server)
+    priv->server->take_client_stats (&list);
+  gst_structure_take_value (stats, "client", &list);
+  return stats;
+}
+
+static PropertyTable<Settings> &
+web_properties ()
+{
+  using P = PropertyTable<Settings>;
+  static P table = {
+      P::text<&Settings::address> ("address", "Address",
+          "IP address to listen at; one that other machines can reach needs token, token-file or "
+          "anonymous",
+          kMutableReady),
+      P::number<&Settings::port> (
+          "port", "Port", "TCP port (0 = any that is free)", 0, 65535, kMutableReady),
+      P::text<&Settings::url> ("url", "URL", "Address of the page; null before PAUSED", kReadOnly),
+      P::text<&Settings::root> (
+          "root", "Root", "Folder of the page (default: the installed page)", kMutableReady),
+      P::text<&Settings::title> ("title", "Title", "Title of the page", kMutableReady),
+      P::text<&Settings::certificate> ("certificate", "Certificate",
+          "PEM file of the TLS certificate, and of those that signed it; null: no TLS",
+          kMutableReady),
+      P::text<&Settings::private_key> ("private-key", "Private key",
+          "PEM file of the certificate's private key; null: it is in the certificate's file",
+          kMutableReady),
+      P::text<&Settings::token> ("token", "Token", "Text that clients must know; null: none",
+          GParamFlags (G_PARAM_WRITABLE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)),
+      P::text<&Settings::token_file> ("token-file", "Token file",
+          "File of lines `name token`, one for each user; read whenever a client enters",
+          kMutableReady),
+      P::boolean<&Settings::anonymous> ("anonymous", "Anonymous",
+          "Serve without a token also where other machines can connect", kMutableReady),
+      P::text<&Settings::origins> ("origins", "Origins",
+          "Origins (https://HOST:PORT) of other servers' pages that may connect, separated by "
+          "spaces",
+          kMutableReady),
+      P::number<&Settings::max_clients> (
+          "max-clients", "Max clients", "Maximum number of clients", 1, 10000, kMutableReady),
+      P::number<&Settings::window> ("window", "Window",
+          "Maximum number of frame sets on the way to a client, not acknowledged yet", 1, 1000,
+          kMutableReady),
+      P::number<&Settings::max_queued_bytes> ("max-queued-bytes", "Max queued bytes",
+          "Maximum number of bytes on the way to a client, unless one frame set has more", 1,
+          G_MAXINT64, kMutableReady),
+      P::number<&Settings::hello_timeout_ms> ("hello-timeout", "Hello timeout",
+          "Milliseconds within which a client must introduce itself", 100, 600000, kMutableReady),
+      P::number<&Settings::key_unit_interval_ms> ("key-unit-interval", "Key unit interval",
+          "Minimum time in milliseconds between two requests for a key frame set, of all clients "
+          "together",
+          0, 600000, kMutableReady),
+      P::text<&Settings::stats_address> ("stats-address", "Stats address",
+          "udp://ADDRESS:PORT where hosts send their statistics for the dashboard; null: none",
+          kMutableReady),
+  };
+  return table;
+}
+
+static void
+gst_range_web_sink_finalize (GObject *object)
+{
+  delete GST_RANGE_WEB_SINK (object)->priv;
+  G_OBJECT_CLASS (gst_range_web_sink_parent_class)->finalize (object);
+}
+
+static void
+gst_range_web_sink_init (GstRangeWebSink *self)
+{
+  self->priv = new GstRangeWebSinkPrivate;
+}
+
+static void
+gst_range_web_sink_class_init (GstRangeWebSinkClass *klass)
+{
+  auto object_class = G_OBJECT_CLASS (klass);
+  auto element_class = GST_ELEMENT_CLASS (klass);
+  auto base_class = GST_BASE_SINK_CLASS (klass);
+
+  object_class->finalize = GST_DEBUG_FUNCPTR (gst_range_web_sink_finalize);
+  install_properties<GstRangeWebSink, web_properties, make_stats> (object_class,
+      "clients (uint), connections, refused, frame-sets, key-requests, bytes (guint64), client "
+      "(array of structures: address, user, transport (string), frame-sets, dropped, bytes "
+      "(guint64), unacknowledged (uint); at most a second old)");
+
+  gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_set_static_metadata (element_class, "Range web sink", "Sink/Network",
+      "Serves coded frame sets, and a page that shows them, to browsers", "gst-rangecast");
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_range_web_sink_change_state);
+
+  base_class->start = GST_DEBUG_FUNCPTR (gst_range_web_sink_start);
+  base_class->stop = GST_DEBUG_FUNCPTR (gst_range_web_sink_stop);
+  base_class->set_caps = GST_DEBUG_FUNCPTR (gst_range_web_sink_set_caps);
+  base_class->event = GST_DEBUG_FUNCPTR (gst_range_web_sink_event);
+  base_class->render = GST_DEBUG_FUNCPTR (gst_range_web_sink_render);
+}

@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "protocol.hpp"
+
+#include <gst/gst.h>
+
+#include <algorithm>
+#include <sstream>
+
+namespace web {
+
+/* ---- JSON ---- */
+
+/* The parser recurses. */
+static bool
+is_nested_deeply (std::string_view text)
+{
+  constexpr int kMaxDepth = 16;
+  int depth = 0;
+  bool quoted = false;
+  for (gsize i = 0; i < text.size (); i++) {
+    const char c = text[i];
+    if (quoted && c == '\\')
+      i++;
+    else if (c == '"')
+      quoted = !quoted;
+    else if (!quoted)
+      depth += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
+    if (depth > kMaxDepth)
+      return true;
+  }
+  return false;
+}
+
+std::optional<JsonMessage>
+JsonMessage::parse (std::string_view text)
+{
+  JsonMessage message;
+  if (is_nested_deeply (text))
+    return {};
+  message.root_.reset (json_from_string (std::string (text).c_str (), nullptr));
+  if (!message.root_ || !JSON_NODE_HOLDS_OBJECT (message.root_.get ()))
+    return {};
+  return message;
+}
+
+bool
+JsonMessage::has (const char *name) const
+{
+  return json_object_has_member (object (), name);
+}
+
+std::optional<std::string>
+JsonMessage::text (const char *name) const
+{
+  JsonNode *node = json_object_get_member (object (), name);
+  if (!node || !JSON_NODE_HOLDS_VALUE (node) || json_node_get_value_type (node) != G_TYPE_STRING)
+    return {};
+  return json_node_get_string (node);
+}
+
+std::optional<double>
+JsonMessage::number (const char *name) const
+{
+  JsonNode *node = json_object_get_member (object (), name);
+  if (!node || !JSON_NODE_HOLDS_VALUE (node))
+    return {};
+  const GType type = json_node_get_value_type (node);
+  if (type != G_TYPE_INT64 && type != G_TYPE_DOUBLE)
+    return {};
+  return json_node_get_double (node);
+}
+
+/* ---- hello ---- */
+
+static bool
+parse_want (const JsonMessage &message, Hello &hello)
+{
+  JsonNode *node = json_object_get_member (message.object (), "want");
+  if (!node)
+    return true;
+  if (!JSON_NODE_HOLDS_ARRAY (node))
+    return false;
+  JsonArray *array = json_node_get_array (node);
+  hello.stream = hello.stats = false;
+  for (guint i = 0; i < json_array_get_length (array); i++) {
+    JsonNode *item = json_array_get_element (array, i);
+    if (!JSON_NODE_HOLDS_VALUE (item) || json_node_get_value_type (item) != G_TYPE_STRING)
+      return false;
+    const std::string_view name = json_node_get_string (item);
+    hello.stream |= name == "stream";
+    hello.stats |= name == "stats";
+  }
+  return true;
+}
+
+std::optional<Hello>
+parse_hello (const JsonMessage &message, std::string &error)
+{
+  Hello hello;
+  const auto version = message.number ("version");
+  const auto token = message.text ("token");
+  if (message.text ("type") != "hello")
+    error = "expected type 'hello' first";
+  else if (!version || *version != static_cast<int> (std::clamp (*version, 0.0, 1e6)))
+    error = "version: expected a whole number";
+  else if (!token && message.has ("token"))
+    error = "token: expected a string";
+  else if (!parse_want (message, hello))
+    error = "want: expected an array of strings";
+  if (!error.empty ())
+    return {};
+  hello.version = static_cast<int> (*version);
+  hello.token = token.value_or ("");
+  return hello;
+}
+
+/* ---- frame sets ---- */
+
+void
+MessageHeader::write (guint8 *to) const
+{
+  to[0] = 1;
+  to[1] = static_cast<guint8> ((key ? 1 : 0) | (discontinuity ? 2 : 0));
+  GST_WRITE_UINT16_LE (to + 2, count);
+  GST_WRITE_UINT32_LE (to + 4, frame_set);
+  GST_WRITE_UINT16_LE (to + 8, index);
+  GST_WRITE_UINT16_LE (to + 10, 0);
+  GST_WRITE_UINT32_LE (to + 12, message);
+  GST_WRITE_UINT32_LE (to + 16, dropped);
+  GST_WRITE_UINT32_LE (to + 20, delay_us);
+  GST_WRITE_UINT64_LE (to + 24, sent_us);
+}
+
+/* ---- tokens ---- */
+
+/* Digests have one length whatever the tokens have. */
+static void
+digest_of (std::string_view text, guint8 (&digest)[32])
+{
+  GChecksum *checksum = g_checksum_new (G_CHECKSUM_SHA256);
+  gsize size = sizeof digest;
+  g_checksum_update (
+      checksum, reinterpret_cast<const guchar *> (text.data ()), gssize (text.size ()));
+  g_checksum_get_digest (checksum, digest, &size);
+  g_checksum_free (checksum);
+}
+
+bool
+equal_tokens (std::string_view a, std::string_view b)
+{
+  guint8 one[32], other[32];
+  digest_of (a, one);
+  digest_of (b, other);
+  guint8 difference = 0;
+  for (gsize i = 0; i < sizeof one; i++)
+    difference = guint8 (difference | (one[i] ^ other[i]));
+  return difference == 0;
+}
+
+std::optional<std::string>
+find_token (const std::string &path, std::string_view token, std::string &error)
+{
+  g_autofree gchar *contents = nullptr;
+  g_autoptr (GError) failure = nullptr;
+  if (!g_file_get_contents (path.c_str (), &contents, nullptr, &failure)) {
+    error = failure->message;
+    return {};
+  }
+  std::istringstream lines (contents);
+  std::optional<std::string> found;
+  for (std::string line; std::getline (lines, line);) {
+    std::istringstream words (line);
+    std::string name, word;
+    if (words >> name >> word && name.front () != '#' && equal_tokens (word, token))
+      found = name;
+  }
+  return found;
+}
+
+} // namespace web

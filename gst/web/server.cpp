@@ -1,0 +1,556 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "server.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <string_view>
+
+#include "category.hpp"
+
+using rangecast::Status;
+using rangecast::StatusCode;
+
+namespace web {
+
+namespace {
+
+/** Frame sets that wait for the server's thread; more would be late. */
+constexpr std::size_t kMaxQueue = 8;
+constexpr guint kTick_ms = 1000, kStats_ms = 250;
+/** Time for clients to take the message that closes their connection. */
+constexpr gint64 kFarewell_us = 300 * 1000;
+
+struct FileType {
+  const char *suffix, *type;
+};
+constexpr std::array<FileType, 4> kFileTypes = {
+    {{".html", "text/html; charset=utf-8"}, {".js", "text/javascript; charset=utf-8"},
+        {".css", "text/css; charset=utf-8"}, {".wasm", "application/wasm"}}};
+
+/* A name in the page's folder, without a path.
+ * @return its type, or nullptr for any other name */
+const char *
+type_of (std::string_view name)
+{
+  const auto allowed = [] (char c) { return g_ascii_isalnum (c) || c == '-' || c == '.'; };
+  if (name.empty () || name.front () == '.' || !std::ranges::all_of (name, allowed))
+    return nullptr;
+  for (const FileType &file : kFileTypes)
+    if (name.ends_with (file.suffix))
+      return file.type;
+  return nullptr;
+}
+
+void
+append_json_string (std::string &json, const std::string &text)
+{
+  JsonNode *node = json_node_alloc ();
+  json_node_init_string (node, text.c_str ());
+  g_autofree gchar *quoted = json_to_string (node, FALSE);
+  json_node_unref (node);
+  json += quoted;
+}
+
+/* HOST and PORT of udp://HOST:PORT; [HOST] for IPv6. Returns: (transfer full) (nullable) */
+GSocketAddress *
+parse_udp (const std::string &address)
+{
+  g_autofree gchar *host = nullptr;
+  gint port = -1;
+  if (!g_uri_split_network (address.c_str (), G_URI_FLAGS_NONE, nullptr, &host, &port, nullptr) ||
+      !address.starts_with ("udp://") || port < 0 || port > 65535)
+    return nullptr;
+  return g_inet_socket_address_new_from_string (host && *host ? host : "0.0.0.0", guint (port));
+}
+
+GSource *
+add_timer (GMainContext *context, guint interval_ms, GSourceFunc call, gpointer data)
+{
+  GSource *source = g_timeout_source_new (interval_ms);
+  g_source_set_callback (source, call, data, nullptr);
+  g_source_attach (source, context);
+  return source;
+}
+
+} // namespace
+
+Server::Server (GstObject *element, Settings settings, RequestKey request_key)
+    : element_ (element), settings_ (std::move (settings)), request_key_ (request_key),
+      context_ (g_main_context_new ()), loop_ (g_main_loop_new (context_, FALSE)),
+      key_requested_us_ (g_get_monotonic_time () - G_MAXINT32)
+{
+}
+
+Server::~Server ()
+{
+  if (thread_.joinable ()) {
+    const auto quit = [] (gpointer self) -> gboolean {
+      static_cast<Server *> (self)->close_all ();
+      return G_SOURCE_REMOVE;
+    };
+    g_main_context_invoke (context_, quit, this);
+    thread_.join ();
+  }
+  for (GSource *timer : timers_) {
+    g_source_destroy (timer);
+    g_source_unref (timer);
+  }
+  g_main_context_push_thread_default (context_);
+  clients_.clear ();
+  g_clear_object (&soup_);
+  g_clear_object (&stats_socket_);
+  g_main_context_pop_thread_default (context_);
+  for (GstStructure *structure : client_stats_)
+    gst_structure_free (structure);
+  g_main_loop_unref (loop_);
+  g_main_context_unref (context_);
+}
+
+/* ---- starting ---- */
+
+Status
+Server::load_certificate ()
+{
+  if (settings_.certificate.empty ())
+    return {};
+  const std::string &key =
+      settings_.private_key.empty () ? settings_.certificate : settings_.private_key;
+  g_autoptr (GError) error = nullptr;
+  g_autoptr (GTlsCertificate) certificate =
+      g_tls_certificate_new_from_files (settings_.certificate.c_str (), key.c_str (), &error);
+  if (!certificate)
+    return {StatusCode::kNotFound, "certificate and private-key: expected PEM files; '" +
+                                       settings_.certificate + "' and '" + key +
+                                       "': " + error->message};
+  soup_server_set_tls_certificate (soup_, certificate);
+  return {};
+}
+
+Status
+Server::listen ()
+{
+  g_autoptr (GSocketAddress) address = g_inet_socket_address_new_from_string (
+      settings_.address == "localhost" ? "127.0.0.1" : settings_.address.c_str (), settings_.port);
+  if (!address)
+    return {StatusCode::kBadValue,
+        "address: expected an IP address of this machine, got '" + settings_.address + "'"};
+  GInetAddress *host = g_inet_socket_address_get_address (G_INET_SOCKET_ADDRESS (address));
+  if (!g_inet_address_get_is_loopback (host) && !settings_.has_token () && !settings_.anonymous)
+    return {StatusCode::kBadValue, "address=" + settings_.address +
+                                       " can be reached from other machines; expected token, "
+                                       "token-file, or anonymous=true for a stream that anybody "
+                                       "may see"};
+  g_autoptr (GError) error = nullptr;
+  const bool tls = !settings_.certificate.empty ();
+  if (!soup_server_listen (
+          soup_, address, tls ? SOUP_SERVER_LISTEN_HTTPS : SoupServerListenOptions (0), &error))
+    return {StatusCode::kNotFound, "address=" + settings_.address +
+                                       " port=" + std::to_string (settings_.port) +
+                                       ": cannot listen there: " + error->message};
+  GSList *uris = soup_server_get_uris (soup_);
+  g_autofree gchar *url = g_uri_to_string (static_cast<GUri *> (uris->data));
+  url_ = url;
+  g_slist_free_full (uris, reinterpret_cast<GDestroyNotify> (g_uri_unref));
+  return {};
+}
+
+Status
+Server::open_stats ()
+{
+  if (settings_.stats_address.empty ())
+    return {};
+  g_autoptr (GSocketAddress) address = parse_udp (settings_.stats_address);
+  if (!address)
+    return {StatusCode::kBadValue,
+        "stats-address: expected udp://ADDRESS:PORT, got '" + settings_.stats_address + "'"};
+  g_autoptr (GError) error = nullptr;
+  stats_socket_ = g_socket_new (
+      g_socket_address_get_family (address), G_SOCKET_TYPE_DATAGRAM, G_SOCKET_PROTOCOL_UDP, &error);
+  if (!stats_socket_ || !g_socket_bind (stats_socket_, address, FALSE, &error))
+    return {StatusCode::kNotFound,
+        "stats-address=" + settings_.stats_address + ": cannot listen there: " + error->message};
+  g_socket_set_blocking (stats_socket_, FALSE);
+  GSource *source = g_socket_create_source (stats_socket_, G_IO_IN, nullptr);
+  const GSocketSourceFunc read = [] (GSocket *, GIOCondition, gpointer self) -> gboolean {
+    static_cast<Server *> (self)->read_stats ();
+    return G_SOURCE_CONTINUE;
+  };
+  g_source_set_callback (source, G_SOURCE_FUNC (read), this, nullptr);
+  g_source_attach (source, context_);
+  timers_.push_back (source);
+  return {};
+}
+
+Status
+Server::start ()
+{
+  const std::string index = settings_.root + "/index.html";
+  if (!g_file_test (index.c_str (), G_FILE_TEST_IS_REGULAR))
+    return {StatusCode::kNotFound,
+        "root: expected the folder of the page, but there is no '" + index + "'"};
+  g_main_context_push_thread_default (context_);
+  soup_ = soup_server_new ("server-header", "rangewebsink", nullptr);
+  Status status = load_certificate ();
+  if (status.ok ())
+    status = listen ();
+  if (status.ok ())
+    status = open_stats ();
+  g_main_context_pop_thread_default (context_);
+  if (!status.ok ())
+    return status;
+  add_handlers ();
+  const auto tick = [] (gpointer self) -> gboolean {
+    static_cast<Server *> (self)->tick ();
+    return G_SOURCE_CONTINUE;
+  };
+  const auto stats = [] (gpointer self) -> gboolean {
+    static_cast<Server *> (self)->send_stats ();
+    return G_SOURCE_CONTINUE;
+  };
+  timers_.push_back (add_timer (context_, kTick_ms, tick, this));
+  timers_.push_back (add_timer (context_, kStats_ms, stats, this));
+  try {
+    thread_ = std::thread ([this] { run (); });
+  } catch (const std::system_error &error) {
+    return {
+        StatusCode::kInternal, std::string ("cannot start the server's thread: ") + error.what ()};
+  }
+  return {};
+}
+
+void
+Server::run ()
+{
+  g_main_context_push_thread_default (context_);
+  g_main_loop_run (loop_);
+  g_main_context_pop_thread_default (context_);
+}
+
+void
+Server::close_all ()
+{
+  soup_server_disconnect (soup_); /* no new ones; open WebSockets stay */
+  for (const auto &client : clients_)
+    client->close (kCloseGoingAway, "the server stops");
+  const gint64 end = g_get_monotonic_time () + kFarewell_us;
+  GSource *timer = add_timer (
+      context_, kFarewell_us / 1000, [] (gpointer) -> gboolean { return G_SOURCE_REMOVE; },
+      nullptr);
+  while (!clients_.empty () && g_get_monotonic_time () < end)
+    g_main_context_iteration (context_, TRUE);
+  g_source_destroy (timer);
+  g_source_unref (timer);
+  g_main_loop_quit (loop_);
+}
+
+/* ---- HTTP ---- */
+
+void
+Server::add_handlers ()
+{
+  const SoupServerCallback early = [] (SoupServer *, SoupServerMessage *message, const char *,
+                                       GHashTable *, gpointer self) {
+    auto server = static_cast<Server *> (self);
+    if (server->is_own_origin (message))
+      return;
+    GST_WARNING_OBJECT (server->element_, "refusing %s: it comes from a page of '%s'",
+        soup_server_message_get_remote_host (message),
+        soup_message_headers_get_one (soup_server_message_get_request_headers (message), "Origin"));
+    soup_server_message_set_status (message, SOUP_STATUS_FORBIDDEN, nullptr);
+  };
+  const SoupServerWebsocketCallback opened =
+      [] (SoupServer *, SoupServerMessage *message, const char *, SoupWebsocketConnection *socket,
+          gpointer self) { static_cast<Server *> (self)->accept (message, socket); };
+  const SoupServerCallback file = [] (SoupServer *, SoupServerMessage *message, const char *path,
+                                      GHashTable *, gpointer self) {
+    static_cast<Server *> (self)->answer (message, path);
+  };
+  const char *protocols[] = {kSubprotocol, nullptr};
+  soup_server_add_early_handler (soup_, "/stream", early, this, nullptr);
+  soup_server_add_websocket_handler (
+      soup_, "/stream", nullptr, const_cast<char **> (protocols), opened, this, nullptr);
+  soup_server_add_handler (soup_, "/", file, this, nullptr);
+}
+
+bool
+Server::is_own_origin (SoupServerMessage *message) const
+{
+  SoupMessageHeaders *headers = soup_server_message_get_request_headers (message);
+  const char *origin = soup_message_headers_get_one (headers, "Origin");
+  const char *host = soup_message_headers_get_one (headers, "Host");
+  if (!origin)
+    return true;
+  const std::string_view text = origin;
+  const auto slashes = text.find ("://");
+  if (host && slashes != text.npos && text.substr (slashes + 3) == host)
+    return true;
+  g_auto (GStrv) allowed = g_strsplit (settings_.origins.c_str (), " ", -1);
+  return g_strv_contains (allowed, origin);
+}
+
+void
+Server::answer (SoupServerMessage *message, const char *path)
+{
+  SoupMessageHeaders *headers = soup_server_message_get_response_headers (message);
+  soup_message_headers_append (headers, "Cache-Control", "no-cache");
+  soup_message_headers_append (headers, "X-Content-Type-Options", "nosniff");
+  soup_message_headers_append (headers, "Referrer-Policy", "no-referrer");
+  const char *method = soup_server_message_get_method (message);
+  if (method != SOUP_METHOD_GET && method != SOUP_METHOD_HEAD)
+    return soup_server_message_set_status (message, SOUP_STATUS_METHOD_NOT_ALLOWED, nullptr);
+  if (std::strcmp (path, "/server.json") == 0) {
+    std::string json = "{\"version\":" + std::to_string (kProtocolVersion) +
+                       ",\"token\":" + (settings_.has_token () ? "true" : "false") + ",\"title\":";
+    append_json_string (json, settings_.title);
+    json += "}";
+    soup_server_message_set_response (
+        message, "application/json", SOUP_MEMORY_COPY, json.data (), json.size ());
+    return soup_server_message_set_status (message, SOUP_STATUS_OK, nullptr);
+  }
+  const std::string name = std::strcmp (path, "/") == 0      ? "index.html"
+                           : std::strcmp (path, "/rig") == 0 ? "rig.html"
+                                                             : path + 1;
+  const char *type = type_of (name);
+  gchar *contents = nullptr;
+  gsize size = 0;
+  if (!type ||
+      !g_file_get_contents ((settings_.root + "/" + name).c_str (), &contents, &size, nullptr))
+    return soup_server_message_set_status (message, SOUP_STATUS_NOT_FOUND, nullptr);
+  soup_server_message_set_response (message, type, SOUP_MEMORY_TAKE, contents, size);
+  soup_server_message_set_status (message, SOUP_STATUS_OK, nullptr);
+}
+
+/* ---- clients ---- */
+
+void
+Server::accept (SoupServerMessage *message, SoupWebsocketConnection *socket)
+{
+  const char *host = soup_server_message_get_remote_host (message);
+  const bool full = clients_.size () >= settings_.max_clients;
+  {
+    std::lock_guard guard (lock_);
+    counters_.connections++;
+    counters_.refused += full;
+  }
+  if (full) {
+    GST_WARNING_OBJECT (element_, "refusing %s: max-clients=%u", host, settings_.max_clients);
+    return soup_websocket_connection_close (socket, kCloseLimit,
+        ("at most " + std::to_string (settings_.max_clients) + " viewers").c_str ());
+  }
+  GST_DEBUG_OBJECT (element_, "%s connected", host);
+  Client::Host &self = *this;
+  clients_.push_back (std::make_unique<Client> (
+      element_, self, settings_, socket, host ? host : "unknown address"));
+  std::lock_guard guard (lock_);
+  counters_.clients = guint (clients_.size ());
+}
+
+void
+Server::closed (Client &client)
+{
+  gone_bytes_ += client.bytes ();
+  std::erase_if (clients_, [&] (const auto &one) { return one.get () == &client; });
+  std::lock_guard guard (lock_);
+  counters_.clients = guint (clients_.size ());
+}
+
+bool
+Server::admit (const std::string &token, std::string &name)
+{
+  bool admitted = !settings_.has_token ();
+  if (!settings_.token.empty ())
+    admitted = equal_tokens (token, settings_.token);
+  if (!admitted && !settings_.token_file.empty ()) {
+    std::string error;
+    const auto found = find_token (settings_.token_file, token, error);
+    if (!error.empty ())
+      GST_WARNING_OBJECT (element_, "token-file: %s", error.c_str ());
+    admitted = found.has_value ();
+    name = found.value_or ("");
+  }
+  if (!admitted) {
+    std::lock_guard guard (lock_);
+    counters_.refused++;
+  }
+  return admitted;
+}
+
+std::string
+Server::welcome ()
+{
+  std::string json = "{\"type\":\"welcome\",\"version\":" + std::to_string (kProtocolVersion) +
+                     ",\"window\":" + std::to_string (settings_.window) + ",\"rtc\":false";
+  std::string caps;
+  {
+    std::lock_guard guard (lock_);
+    caps = caps_;
+  }
+  if (!caps.empty ()) {
+    json += ",\"caps\":";
+    append_json_string (json, caps);
+  }
+  return json + "}";
+}
+
+void
+Server::entered (Client &client)
+{
+  if (client.wants_stats ())
+    client.send_text (board_.message (client.stats_sent));
+}
+
+void
+Server::request_key (Client &client)
+{
+  const gint64 now = g_get_monotonic_time ();
+  if (now - key_requested_us_ < gint64 (settings_.key_unit_interval_ms) * 1000)
+    return;
+  key_requested_us_ = now;
+  GST_DEBUG_OBJECT (element_, "requesting a key frame set for %s", client.label ().c_str ());
+  {
+    std::lock_guard guard (lock_);
+    counters_.key_requests++;
+  }
+  request_key_ (element_);
+}
+
+/* Frees what was published a second ago. */
+void
+Server::tick ()
+{
+  /* A client that is closed at once leaves the list. */
+  for (auto at = clients_.begin (); at != clients_.end ();)
+    (*at++)->check_silence ();
+  std::vector<GstStructure *> made;
+  guint64 bytes = gone_bytes_;
+  for (const auto &client : clients_) {
+    made.push_back (client->stats ());
+    bytes += client->bytes ();
+  }
+  {
+    std::lock_guard guard (lock_);
+    made.swap (client_stats_);
+    counters_.bytes = bytes;
+  }
+  for (GstStructure *structure : made)
+    gst_structure_free (structure);
+}
+
+/* ---- the stream ---- */
+
+void
+Server::set_stream (std::string caps, std::string rig_units)
+{
+  std::lock_guard guard (lock_);
+  caps_ = std::move (caps);
+  rig_units_ = std::make_shared<const std::string> (std::move (rig_units));
+}
+
+void
+Server::push (BytesPtr units, bool key, gint64 captured_us)
+{
+  std::lock_guard guard (lock_);
+  counters_.frame_sets++;
+  const guint32 number = next_number_++;
+  if (queue_.size () >= kMaxQueue) {
+    GST_DEBUG_OBJECT (element_, "the server is busy; dropping frame set %u", number);
+    return;
+  }
+  queue_.push_back ({{std::move (units), rig_units_, key, number, captured_us}});
+  wake ();
+}
+
+void
+Server::end ()
+{
+  std::lock_guard guard (lock_);
+  queue_.push_back ({{}, true});
+  wake ();
+}
+
+/* With the lock held. Not g_main_context_invoke(), which may call at once. */
+void
+Server::wake ()
+{
+  if (std::exchange (woken_, true))
+    return;
+  GSource *source = g_idle_source_new ();
+  const auto call = [] (gpointer self) -> gboolean {
+    static_cast<Server *> (self)->deliver ();
+    return G_SOURCE_REMOVE;
+  };
+  g_source_set_priority (source, G_PRIORITY_DEFAULT);
+  g_source_set_callback (source, call, this, nullptr);
+  g_source_attach (source, context_);
+  g_source_unref (source);
+}
+
+void
+Server::deliver ()
+{
+  std::deque<Item> items;
+  {
+    std::lock_guard guard (lock_);
+    items.swap (queue_);
+    woken_ = false;
+  }
+  for (const Item &item : items)
+    for (auto at = clients_.begin (); at != clients_.end ();) {
+      Client &client = **at++; /* it may leave */
+      if (item.is_end)
+        client.send_text ("{\"type\":\"end\"}");
+      else
+        client.send (item.frame_set);
+    }
+}
+
+/* ---- statistics ---- */
+
+void
+Server::read_stats ()
+{
+  std::array<gchar, StatsBoard::kMaxDatagram + 1> datagram;
+  for (int i = 0; i < 100; i++) { /* others want to be served, too */
+    const gssize size =
+        g_socket_receive (stats_socket_, datagram.data (), datagram.size (), nullptr, nullptr);
+    if (size < 0)
+      return;
+    if (!board_.add ({datagram.data (), gsize (size)}))
+      GST_LOG_OBJECT (element_, "ignoring a datagram of %d bytes: no statistics", int (size));
+  }
+}
+
+void
+Server::send_stats ()
+{
+  for (auto at = clients_.begin (); at != clients_.end ();) {
+    Client &client = **at++;
+    if (!client.wants_stats ())
+      continue;
+    const std::string message = board_.message (client.stats_sent);
+    if (!message.empty ())
+      client.send_text (message);
+  }
+}
+
+Server::Counters
+Server::counters ()
+{
+  std::lock_guard guard (lock_);
+  return counters_;
+}
+
+void
+Server::take_client_stats (GValue *array)
+{
+  std::lock_guard guard (lock_);
+  for (const GstStructure *structure : client_stats_) {
+    GValue value = G_VALUE_INIT;
+    g_value_init (&value, GST_TYPE_STRUCTURE);
+    gst_value_set_structure (&value, structure);
+    gst_value_array_append_and_take_value (array, &value);
+  }
+}
+
+} // namespace web
