@@ -16,14 +16,23 @@ constexpr gint64 kMaxSilence_us = 60 * G_USEC_PER_SEC;
 } // namespace
 
 Client::Client (GstObject *log, Host &host, const Settings &settings,
-    SoupWebsocketConnection *socket, std::string address)
+    SoupWebsocketConnection *socket, WebLimitedInput *input, std::string address)
     : log_ (log), host_ (host), settings_ (settings),
-      socket_ (SOUP_WEBSOCKET_CONNECTION (g_object_ref (socket))), address_ (std::move (address)),
+      socket_ (SOUP_WEBSOCKET_CONNECTION (g_object_ref (socket))),
+      input_ (WEB_LIMITED_INPUT (g_object_ref (input))), address_ (std::move (address)),
       label_ (address_), opened_us_ (g_get_monotonic_time ()), heard_us_ (opened_us_)
 {
-  soup_websocket_connection_set_max_incoming_payload_size (socket_, kMaxMessage);
   soup_websocket_connection_set_keepalive_interval (socket_, 20);
   g_signal_connect (socket_, "message", G_CALLBACK (on_message), this);
+  const auto pong = [] (SoupWebsocketConnection *, GBytes *, gpointer self) {
+    web_limited_input_restart (static_cast<Client *> (self)->input_);
+  };
+  const auto failed = [] (SoupWebsocketConnection *, GError *error, gpointer self) {
+    auto client = static_cast<Client *> (self);
+    GST_WARNING_OBJECT (client->log_, "%s: %s", client->label_.c_str (), error->message);
+  };
+  g_signal_connect (socket_, "error", GCallback (+failed), this);
+  g_signal_connect (socket_, "pong", GCallback (+pong), this);
   g_signal_connect (socket_, "closed", G_CALLBACK (on_closed), this);
 }
 
@@ -31,6 +40,7 @@ Client::~Client ()
 {
   g_signal_handlers_disconnect_by_data (socket_, this);
   g_object_unref (socket_);
+  g_object_unref (input_);
 }
 
 /* ---- the connection ---- */
@@ -39,12 +49,16 @@ void
 Client::on_message (SoupWebsocketConnection *, gint type, GBytes *message, gpointer self)
 {
   auto client = static_cast<Client *> (self);
+  web_limited_input_restart (client->input_);
   if (client->closing_)
     return;
   gsize size = 0;
   const auto text = static_cast<const char *> (g_bytes_get_data (message, &size));
   if (type != SOUP_WEBSOCKET_DATA_TEXT)
     client->refuse (kCloseUnsupported, "expected text messages");
+  else if (size > kMaxMessage)
+    client->refuse (
+        kCloseTooBig, "a message of more than " + std::to_string (kMaxMessage) + " bytes");
   else if (client->is_too_fast ())
     client->refuse (
         kCloseLimit, "at most " + std::to_string (kMaxMessageRate) + " messages a second");

@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "limitedinput.h"
 #include "protocol.hpp"
 #include "settings.hpp"
 
@@ -44,7 +45,7 @@ public:
   };
 
   Client (GstObject *log, Host &host, const Settings &settings, SoupWebsocketConnection *socket,
-      std::string address);
+      WebLimitedInput *input, std::string address);
   ~Client ();
   Client (const Client &) = delete;
   Client &operator= (const Client &) = delete;
@@ -83,6 +84,7 @@ private:
   Host &host_;
   const Settings &settings_;
   SoupWebsocketConnection *socket_;
+  WebLimitedInput *input_; /* of the socket */
   std::string address_, label_, user_;
   Hello hello_;
   bool entered_ = false, closing_ = false;

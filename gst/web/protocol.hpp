@@ -15,7 +15,9 @@ namespace web {
 inline constexpr int kProtocolVersion = 1;
 inline constexpr const char *kSubprotocol = "rangecast.v1";
 /** Maximum size of a client's message, bytes. */
-inline constexpr guint64 kMaxMessage = 16384;
+inline constexpr gsize kMaxMessage = 16384;
+/** Maximum number of bytes from a client without a whole message. */
+inline constexpr gsize kMaxUnfinished = 65536;
 /** Maximum number of a client's messages in a second. */
 inline constexpr guint kMaxMessageRate = 200;
 
@@ -24,6 +26,7 @@ enum CloseCode : gushort {
   kCloseNormal = 1000,
   kCloseGoingAway = 1001,
   kCloseUnsupported = 1003,
+  kCloseTooBig = 1009,
   kCloseBadMessage = 4400,
   kCloseUnauthorized = 4401,
   kCloseVersion = 4406,

@@ -259,17 +259,16 @@ Server::add_handlers ()
         soup_message_headers_get_one (soup_server_message_get_request_headers (message), "Origin"));
     soup_server_message_set_status (message, SOUP_STATUS_FORBIDDEN, nullptr);
   };
-  const SoupServerWebsocketCallback opened =
-      [] (SoupServer *, SoupServerMessage *message, const char *, SoupWebsocketConnection *socket,
-          gpointer self) { static_cast<Server *> (self)->accept (message, socket); };
+  const SoupServerCallback upgrade = [] (SoupServer *, SoupServerMessage *message, const char *path,
+                                         GHashTable *, gpointer self) {
+    static_cast<Server *> (self)->upgrade (message, path);
+  };
   const SoupServerCallback file = [] (SoupServer *, SoupServerMessage *message, const char *path,
                                       GHashTable *, gpointer self) {
     static_cast<Server *> (self)->answer (message, path);
   };
-  const char *protocols[] = {kSubprotocol, nullptr};
   soup_server_add_early_handler (soup_, "/stream", early, this, nullptr);
-  soup_server_add_websocket_handler (
-      soup_, "/stream", nullptr, const_cast<char **> (protocols), opened, this, nullptr);
+  soup_server_add_handler (soup_, "/stream", upgrade, this, nullptr);
   soup_server_add_handler (soup_, "/", file, this, nullptr);
 }
 
@@ -323,10 +322,44 @@ Server::answer (SoupServerMessage *message, const char *path)
 
 /* ---- clients ---- */
 
+/* What soup_server_add_websocket_handler() does, but with an input whose size is limited. */
 void
-Server::accept (SoupServerMessage *message, SoupWebsocketConnection *socket)
+Server::upgrade (SoupServerMessage *message, const char *path)
 {
-  const char *host = soup_server_message_get_remote_host (message);
+  const char *protocols[] = {kSubprotocol, nullptr};
+  const auto names = const_cast<char **> (protocols);
+  if (std::strcmp (path, "/stream") != 0)
+    return answer (message, path);
+  if (!soup_websocket_server_process_handshake (message, nullptr, names, nullptr, nullptr)) {
+    GST_INFO_OBJECT (element_, "%s: no WebSocket of this protocol",
+        soup_server_message_get_remote_host (message));
+    return; /* it has set the status */
+  }
+  const auto complete = [] (SoupServerMessage *upgraded, gpointer self) {
+    static_cast<Server *> (self)->accept (upgraded);
+  };
+  g_signal_connect (message, "wrote-informational", GCallback (+complete), this);
+}
+
+void
+Server::accept (SoupServerMessage *message)
+{
+  g_autofree gchar *host = g_strdup (soup_server_message_get_remote_host (message));
+  g_autoptr (GUri) uri = g_uri_ref (soup_server_message_get_uri (message));
+  g_autoptr (GIOStream) connection = soup_server_message_steal_connection (message);
+  g_autoptr (WebLimitedInput) input =
+      web_limited_input_new (g_io_stream_get_input_stream (connection), kMaxUnfinished);
+  g_autoptr (GIOStream) stream =
+      g_simple_io_stream_new (G_INPUT_STREAM (input), g_io_stream_get_output_stream (connection));
+  /* Closing this stream does not close the connection. */
+  const auto close = [] (gpointer connection) {
+    g_io_stream_close_async (
+        G_IO_STREAM (connection), G_PRIORITY_DEFAULT, nullptr, nullptr, nullptr);
+    g_object_unref (connection);
+  };
+  g_object_set_data_full (G_OBJECT (stream), "connection", g_object_ref (connection), close);
+  g_autoptr (SoupWebsocketConnection) socket = soup_websocket_connection_new (
+      stream, uri, SOUP_WEBSOCKET_CONNECTION_SERVER, nullptr, kSubprotocol, nullptr);
   const bool full = clients_.size () >= settings_.max_clients;
   {
     std::lock_guard guard (lock_);
@@ -341,7 +374,7 @@ Server::accept (SoupServerMessage *message, SoupWebsocketConnection *socket)
   GST_DEBUG_OBJECT (element_, "%s connected", host);
   Client::Host &self = *this;
   clients_.push_back (std::make_unique<Client> (
-      element_, self, settings_, socket, host ? host : "unknown address"));
+      element_, self, settings_, socket, input, host ? host : "unknown address"));
   std::lock_guard guard (lock_);
   counters_.clients = guint (clients_.size ());
 }

@@ -78,7 +78,8 @@ private:
   void close_all ();
   void wake ();
   void deliver ();
-  void accept (SoupServerMessage *message, SoupWebsocketConnection *socket);
+  void upgrade (SoupServerMessage *message, const char *path);
+  void accept (SoupServerMessage *message);
   void answer (SoupServerMessage *message, const char *path);
   [[nodiscard]] bool is_own_origin (SoupServerMessage *message) const;
   void tick ();
