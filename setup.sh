@@ -2,22 +2,24 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Installs what the project needs (Debian 12 packages), configures and builds build/.
 # Quick when nothing changed. What the compiler prints goes to build/setup.log.
-# usage: setup.sh [--demo | --tests]
+# usage: setup.sh [--demo | --web | --tests]
 #   --demo   what demo.sh, the viewer and README's launch lines need: no calibration, cameras, RTSP server, other programs,
 #            language bindings, tests and benchmarks, even where their libraries are installed
+#   --web    what demo.sh --web needs: that, rangewebsink and its page
 #   --tests  everything, as without an option
 set -euo pipefail
 cd "$(dirname "$0")"
 
 targets=(all)
 case "${1:-}" in
-  --demo)
+  --demo | --web)
     targets=(demo)
+    [ "$1" = --demo ] || targets+=(web)
     # What was built before is kept up to date, because env.sh makes all plugins known.
     ! compgen -G "build/gst/camera/*.so" >/dev/null || targets+=(plugins programs) ;;
   --tests | "") ;;
   *)
-    echo "setup.sh: unknown option '$1'; expected --demo or --tests" >&2
+    echo "setup.sh: unknown option '$1'; expected --demo, --web or --tests" >&2
     exit 2
     ;;
 esac
@@ -30,17 +32,20 @@ packages=(
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-base-apps gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
   gstreamer1.0-libav glib-networking gstreamer1.0-gl libgl1-mesa-dri libegl1 libegl-mesa0 libgles2 libgl1
 )
+[ "${1:-}" = --demo ] || packages+=(
+  # rangewebsink, and its page: rangecast.wasm
+  libsoup-3.0-dev libjson-glib-dev gstreamer1.0-nice
+  clang-19 lld-19 wasi-libc libc++-19-dev-wasm32 libc++abi-19-dev-wasm32 libclang-rt-19-dev-wasm32
+)
 [ "${targets[0]}" = demo ] || packages+=(
   # calibration, cameras, RTSP server
   libopencv-contrib-dev libceres-dev libaravis-dev libusb-1.0-0-dev libgstrtspserver-1.0-dev
-  # rangewebsink
-  libsoup-3.0-dev libjson-glib-dev gstreamer1.0-nice
   # language bindings of libgstrange
   libgirepository1.0-dev python3-gst-1.0 python3-numpy
   # benchmarks
   libturbojpeg0-dev libzstd-dev libpng-dev libdraco-dev libavcodec-dev
-  # rangecast.wasm, the decoder for browsers; its tests
-  clang-19 lld-19 wasi-libc libc++-19-dev-wasm32 libc++abi-19-dev-wasm32 libclang-rt-19-dev-wasm32 nodejs chromium
+  # tests of the page
+  nodejs chromium
   # tests
   libgtest-dev iproute2 openssl opencv-doc valgrind xvfb xauth xdotool aravis-tools aravis-tools-cli umockdev libumockdev-dev
 )

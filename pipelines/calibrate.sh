@@ -117,7 +117,7 @@ list_pictures () {
 
 # An existing file is a video, whatever its name looks like.
 is_source () { # a launch string: has a link, or begins with an element's name
-  [ ! -e "$1" ] && { [[ "$1" == *!* ]] || gst-inspect-1.0 --exists "${1%% *}" 2>/dev/null; }
+  [ ! -e "$1" ] && { [[ "$1" == *!* ]] || gst-inspect-1.0 --exists --atleast-version=0.0.0 "${1%% *}" 2>/dev/null; }
 }
 is_pattern () { [ ! -e "$1" ] && ! is_source "$1" && [[ "$1" == *[%*?[]* ]]; }
 

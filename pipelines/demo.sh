@@ -23,8 +23,10 @@ usage: demo.sh [options]
   --frames N    number of frame sets to render (default 150)
   --fps N       frame sets per second (default 15)
   --out DIR     where avatar.png, avatar.webm and report.json go (default out)
-  --port N      first of views + 1 UDP ports (default 18400)
+  --port N      first of views + 2 UDP ports (default 18400)
   --window      also show it in a window
+  --web [PORT]  show it in a browser instead, until interrupted: prints a link to a page that this machine
+                serves (port 8080), and one to a dashboard of the rig
   --no-film     do not write avatar.webm, whose encoding takes CPU time
   --trace       write the time at which each buffer passed each pad to DIR/log/HOST.trace, for
                 tests/bench/latency-budget.py
@@ -38,7 +40,7 @@ With RANGECAST_STATS=udp://HOST:PORT (or a file) the hosts send their statistics
 END
 }
 
-input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 window= film=yes trace= jitter= latency= loop= threads= mtu= depth=
+input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 web= window= film=yes trace= jitter= latency= loop= threads= mtu= depth=
 while [ $# -gt 0 ]; do
   option=$1
   case "$1" in
@@ -54,6 +56,9 @@ while [ $# -gt 0 ]; do
     --out) out=${2:-}; shift ;;
     --port) port=${2:-}; shift ;;
     --window) window=--window ;;
+    --web)
+      web=8080
+      [[ ! "${2:-}" =~ ^[0-9]+$ ]] || { web=$2; shift; } ;;
     --no-film) film= ;;
     --trace) trace=yes ;;
     --jitter) jitter=${2:-}; shift ;;
@@ -68,6 +73,8 @@ need_picture "$size" --size 4096
 need_number "$frames" --frames 1 1000000
 need_number "$fps" --fps 1 120
 need_number "$port" --port 1024 65000
+[ -z "$web" ] || need_number "$web" --web 0 65535
+[ -z "$web" ] || [ -z "$window$trace" ] || die "--web: expected without --window and --trace"
 [ -z "$jitter" ] || need_number "$jitter" --jitter 0 10000
 [ -z "$latency" ] || need_number "$latency" --latency 0 10000
 [ -z "$mtu" ] || need_number "$mtu" --mtu 256 65000
@@ -95,7 +102,7 @@ mkdir -p "$out/log" 2>/dev/null || die "--out: cannot create '$out'"
 
 case "$input" in
   cameras) ./setup.sh ;; # Aravis and the simulated cameras
-  *) ./setup.sh --demo ;;
+  *) if [ -n "$web" ]; then ./setup.sh --web; else ./setup.sh --demo; fi ;;
 esac
 source pipelines/env.sh
 
@@ -153,6 +160,9 @@ case "$input" in
   *) run_options="--base-time $(python3 -c 'import time; print(time.monotonic_ns() + 2 * 10**9)')" ;;
 esac
 
+# For the dashboard.
+stats_port=$((port + views + 1))
+[ -z "$web" ] || export RANGECAST_STATS=${RANGECAST_STATS:-udp://127.0.0.1:$stats_port}
 [ -n "$threads" ] || { threads=$(($(nproc) / views)) && [ "$threads" -ge 1 ] || threads=1; }
 parent_port=$port viewer_port=$((port + views))
 echo "$views stereo cameras at $size, $fps frame sets/s: $views camera hosts, parent and viewer"
@@ -165,14 +175,25 @@ run_options=
 start parent pipelines/parent-host.sh --views "$views" --listen "$parent_port" --to "127.0.0.1:$viewer_port" \
   ${jitter:+--jitter "$jitter"} ${latency:+--latency "$latency"} ${mtu:+--mtu "$mtu"}
 
-[ -n "$film" ] || rm -f "$out/avatar.webm" # of another run
-RANGECAST_HOST=viewer RANGECAST_LAUNCH="rangecast-run $(trace_option viewer) --progress --frames $frames --views $views --turn --timeout $((60 + 4 * frames / fps)) \
-  --snapshot $(printf %q "$out/avatar.png") --report $(printf %q "$out/log/viewer.json")" \
-  pipelines/viewer-host.sh --listen "$viewer_port" ${film:+--out "$out"} ${jitter:+--jitter "$jitter"} $window &
+if [ -n "$web" ]; then
+  RANGECAST_HOST=web-server pipelines/web-server.sh --listen "$viewer_port" --port "$web" --stats "$stats_port" ${jitter:+--jitter "$jitter"} \
+    --title "gst-rangecast: $views stereo cameras" > >(
+    trap '' INT TERM # ends at the end of its input
+    while IFS= read -r line; do
+      printf '%s\n' "$line"
+      [[ "$line" != http* ]] || echo "${line}rig"
+    done
+  ) &
+else
+  [ -n "$film" ] || rm -f "$out/avatar.webm" # of another run
+  RANGECAST_HOST=viewer RANGECAST_LAUNCH="rangecast-run $(trace_option viewer) --progress --frames $frames --views $views --turn --timeout $((60 + 4 * frames / fps)) \
+    --snapshot $(printf %q "$out/avatar.png") --report $(printf %q "$out/log/viewer.json")" \
+    pipelines/viewer-host.sh --listen "$viewer_port" ${film:+--out "$out"} ${jitter:+--jitter "$jitter"} $window &
+fi
 viewer=$!
 pids+=($viewer)
 
-# The viewer ends the run; a host that ends earlier has failed (or its recording is over).
+# The viewer, or a server for browsers, ends the run; a host that ends earlier has failed (or its recording is over).
 while true; do
   status=0
   wait -n -p ended "${pids[@]}" || status=$?
@@ -190,6 +211,7 @@ while true; do
   done
   pids=("${left[@]}")
 done
+[ -z "$web" ] || { [ "$status" = 0 ] || echo "demo.sh: the server for browsers failed" >&2; exit "$status"; }
 [ "$status" -le 128 ] || { echo "demo.sh: the viewer was killed by signal $((status - 128))" >&2; exit 1; }
 [ "$status" = 0 ] || { echo "demo.sh: the viewer failed" >&2; exit 1; }
 

@@ -13,12 +13,13 @@ build_is_complete () {
   done
 }
 
+# gst-inspect-1.0 --exists asks for version 1.0 or later unless told otherwise.
 if [ -d "$root/build/gst" ]; then
   export GST_PLUGIN_PATH="$root/build/gst${GST_PLUGIN_PATH:+:$GST_PLUGIN_PATH}"
   export GST_REGISTRY="${GST_REGISTRY:-$root/build/registry.bin}"
   PATH="$root/build/pipelines:$PATH"
   build_is_complete || echo "env.sh: $root/build is incomplete: run $root/setup.sh" >&2
-elif ! gst-inspect-1.0 --exists neighbourcodeenc 2>/dev/null; then
+elif ! gst-inspect-1.0 --exists --atleast-version=0.0.0 neighbourcodeenc 2>/dev/null; then
   echo "env.sh: gst-rangecast is neither built nor installed: run $root/setup.sh" >&2
 fi
 # usage: has_display -> whether a window can be shown

@@ -61,6 +61,8 @@ public:
     }
     if (pool) /* without the lock, which jobs take */
       g_thread_pool_free (pool, TRUE, TRUE);
+    std::lock_guard guard (lock_);
+    pending_ = 0; /* those that had not begun are gone */
   }
   /** While flushing, waits end at once; jobs go on. */
   void set_flushing (bool flushing)

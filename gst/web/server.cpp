@@ -429,8 +429,7 @@ Server::welcome ()
 void
 Server::entered (Client &client)
 {
-  if (client.wants_stats ())
-    client.send_text (board_.message (client.stats_sent));
+  send_stats_to (client);
 }
 
 void
@@ -555,16 +554,18 @@ Server::read_stats ()
 }
 
 void
+Server::send_stats_to (Client &client)
+{
+  const std::string message = client.wants_stats () ? board_.message (client.stats_sent) : "";
+  if (!message.empty ())
+    client.send_text (message);
+}
+
+void
 Server::send_stats ()
 {
-  for (auto at = clients_.begin (); at != clients_.end ();) {
-    Client &client = **at++;
-    if (!client.wants_stats ())
-      continue;
-    const std::string message = board_.message (client.stats_sent);
-    if (!message.empty ())
-      client.send_text (message);
-  }
+  for (auto at = clients_.begin (); at != clients_.end ();)
+    send_stats_to (**at++);
 }
 
 Server::Counters

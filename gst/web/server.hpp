@@ -84,6 +84,7 @@ private:
   [[nodiscard]] bool is_own_origin (SoupServerMessage *message) const;
   void tick ();
   void send_stats ();
+  void send_stats_to (Client &client);
   void read_stats ();
 
   GstObject *element_;

@@ -61,6 +61,14 @@ report_recovery (GstMessage *message)
   }
 }
 
+/* Where browsers find the stream. */
+void
+report_address (GstMessage *message)
+{
+  if (gst_message_has_name (message, "rangewebsink-address"))
+    g_print ("serving %s\n", gst_structure_get_string (gst_message_get_structure (message), "url"));
+}
+
 gboolean
 on_message (GstBus *, GstMessage *message, gpointer user_data)
 {
@@ -96,6 +104,7 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
       break;
     case GST_MESSAGE_ELEMENT:
       report_recovery (message);
+      report_address (message);
       if (runner->stats)
         runner->stats->take (message);
       break;

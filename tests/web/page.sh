@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The page in headless Chromium: beside striprender, and before servers. Exit status 77 (skipped) where Chromium, or puppeteer-core and
+# The page in headless Chromium: beside striprender, before servers that a test plays, and with rangewebsink. Exit status 77 (skipped) where Chromium, or puppeteer-core and
 # the network that it comes from, are missing. Pictures stay in build/web-test.
 # usage: tests/web/page.sh [options of node --test]
 set -euo pipefail
@@ -34,4 +34,6 @@ for mode in blend strips; do
   done
 done
 export CHROMIUM=$browser
-exec node --test "$@" "$here/page.test.js" "$here/server.test.js"
+live=("$here/live.test.js")
+compgen -G "$RANGECAST_BUILD/gst/web/*.so" >/dev/null || { echo "left out: live.test.js, because rangewebsink is missing"; live=(); }
+exec node --test "$@" "$here/page.test.js" "$here/server.test.js" "${live[@]}"

@@ -1,0 +1,126 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Shows a stream in browsers: serves a page, a dashboard of the rig (/rig) and the stream on one port.
+set -euo pipefail
+source "$(dirname "$0")/env.sh"
+source "$(dirname "$0")/rtp.sh"
+
+usage () {
+  cat <<'END'
+usage: web-server.sh [options]                        a built-in scene
+       web-server.sh [options] --listen PORT          the parent's stream, by RTP as viewer-host.sh receives it
+       web-server.sh [options] --file RECORDING       a recording, once
+       web-server.sh [options] -- LAUNCH STRING       whatever ends with coded frame sets, as "... ! neighbourcodeenc"
+  --address IP    address to listen at (default 127.0.0.1: browsers of this machine only); 0.0.0.0: all
+  --port N        TCP port (default 8080; 0: any that is free)
+  --token TEXT    what a browser must know to get in; the link has it (default: a random one, unless the address is 127.0.0.1)
+  --token-file FILE  lines "name token", one for each user
+  --anonymous     no token: whoever can connect sees the stream
+  --certificate PEM, --private-key PEM  https; web-certificate.sh makes them
+  --title TEXT    title of the page
+  --stats PORT    UDP port for statistics of all hosts, for the dashboard: run them with RANGECAST_STATS=udp://THIS-MACHINE:PORT
+  --origins LIST  origins of other servers' pages that may connect, e.g. "https://example.org"
+  --jitter MS     with --listen: jitter buffer (default 30)
+  --multicast GROUP, --interface IF  with --listen: as in viewer-host.sh
+END
+  rtp_usage_receiver
+}
+
+listen= file= jitter=30 group= port=8080 address=127.0.0.1 token= token_file= anonymous= certificate= private_key= title= stats= origins= string=()
+while [ $# -gt 0 ]; do
+  option=$1
+  rtp_option receiver "$1" "${2:-}"
+  if [ $taken -gt 0 ]; then
+    shift $taken || die "option $1 needs a value"
+    continue
+  fi
+  case "$1" in
+    --listen) listen=${2:-}; shift ;;
+    --file) file=${2:-}; shift ;;
+    --address) address=${2:-}; shift ;;
+    --port) port=${2:-}; shift ;;
+    --token) token=${2:-}; shift ;;
+    --token-file) token_file=${2:-}; shift ;;
+    --anonymous) anonymous=yes ;;
+    --certificate) certificate=${2:-}; shift ;;
+    --private-key) private_key=${2:-}; shift ;;
+    --title) title=${2:-}; shift ;;
+    --stats) stats=${2:-}; shift ;;
+    --origins) origins=${2:-}; shift ;;
+    --jitter) jitter=${2:-}; shift ;;
+    --multicast) group=${2:-}; shift ;;
+    --interface) rtp_interface=${2:-}; shift ;;
+    --) shift; string=("$@"); [ $# -gt 0 ] || die "--: expected a launch string"; break ;;
+    -h | --help) usage; exit 0 ;;
+    *) usage >&2; die "unknown option '$1'" ;;
+  esac
+  shift || die "option $option needs a value"
+done
+need_number "$port" --port 0 65535
+need_number "$jitter" --jitter 0 10000
+[ -z "$stats" ] || need_number "$stats" --stats 1 65535
+[ -z "$group" ] || need_group "$group"
+[ -z "$group$rtp_interface$rtp_fec$rtp_rtx$rtp_key$rtp_feedback" ] || [ -n "$listen" ] || die "options of RTP: expected with --listen"
+[ -z "$token" ] || [[ "$token" =~ ^[A-Za-z0-9._~-]+$ ]] || die "--token: expected letters, digits and . _ ~ -, which a link may have"
+[ -z "$token$token_file" ] || [ -z "$anonymous" ] || die "--anonymous: expected without --token and --token-file"
+for needed in "$certificate" "$private_key" "$token_file" "$file"; do
+  [ -z "$needed" ] || [ -f "$needed" ] || die "no file '$needed'"
+done
+[ -z "$private_key" ] || [ -n "$certificate" ] || die "--private-key: expected with --certificate"
+gst-inspect-1.0 --exists --atleast-version=0.0.0 rangewebsink || die "rangewebsink is missing: it needs libsoup-3.0 and json-glib; run $root/setup.sh"
+
+if [ -z "$token$token_file$anonymous" ] && ! [[ "$address" =~ ^(127\.|::1$|localhost$) ]]; then
+  token=$(head -c 16 /dev/urandom | base64 | tr '+/' '-_' | tr -d '=\n')
+fi
+settings=("port=$port" "address=$address")
+[ -z "$token" ] || settings+=("token=$token")
+[ -z "$token_file" ] || settings+=("token-file=$token_file")
+[ -z "$anonymous" ] || settings+=(anonymous=true)
+[ -z "$certificate" ] || settings+=("certificate=$certificate" "private-key=${private_key:-$certificate}")
+[ -z "$title" ] || settings+=("title=$title")
+[ -z "$origins" ] || settings+=("origins=$origins")
+if [ -n "$stats" ]; then
+  settings+=("stats-address=udp://0.0.0.0:$stats")
+  export RANGECAST_STATS=${RANGECAST_STATS:-udp://127.0.0.1:$stats} RANGECAST_HOST=${RANGECAST_HOST:-web-server}
+fi
+
+# What comes from the network is sent at once; a recording and the scene in their own time.
+sync=true
+if [ -n "$listen" ]; then
+  need_number "$listen" --listen 1 65535
+  { [ -z "$file" ] && [ ${#string[@]} = 0 ]; } || die "expected one of --listen, --file and a launch string"
+  rtp_check receiver
+  receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
+  source=("${rtp[@]}") sync=false
+elif [ -n "$file" ]; then
+  [ ${#string[@]} = 0 ] || die "expected one of --listen, --file and a launch string"
+  source=(filesrc "location=$file" ! neighbourcodeparse)
+elif [ ${#string[@]} -gt 0 ]; then
+  source=("${string[@]}")
+else
+  source=(avatartestsrc is-live=true views=4 range-person-only=true ! "video/x-range,width=320,height=240,framerate=15/1" ! neighbourcodeenc)
+fi
+
+# usage: print_links URL: for 0.0.0.0 with the names and addresses of this machine
+print_links () {
+  local scheme=${1%%://*} host=${1#*://} link_port one hosts
+  link_port=${host##*:} link_port=${link_port%/} host=${host%:*}
+  hosts=$host
+  case "$host" in 0.0.0.0 | '[::]') hosts="$(hostname) $(hostname -I 2>/dev/null || true)" ;; esac
+  for one in $hosts; do
+    [[ "$one" != *:*:* || "$one" == \[* ]] || one="[$one]"
+    echo "$scheme://$one:$link_port/${token:+#token=$token}"
+  done
+  [ -z "$token_file" ] || echo "(each user's link ends with #token= and their token)"
+}
+
+# rangecast-run says where it listens.
+launch "${source[@]}" ! rangewebsink name=web "sync=$sync" "${settings[@]}" > >(
+  trap '' INT TERM # ends at the end of its input
+  while IFS= read -r line; do
+    case "$line" in
+      'serving '*) print_links "${line#serving }" ;;
+      *) printf '%s\n' "$line" ;;
+    esac
+  done
+)
