@@ -13,7 +13,8 @@ usage: web-server.sh [options]                        a built-in scene
        web-server.sh [options] -- LAUNCH STRING       whatever ends with coded frame sets, as "... ! neighbourcodeenc"
   --address IP    address to listen at (default 127.0.0.1: browsers of this machine only); 0.0.0.0: all
   --port N        TCP port (default 8080; 0: any that is free)
-  --token TEXT    what a browser must know to get in; the link has it (default: a random one, unless the address is 127.0.0.1)
+  --token TEXT    what a browser must know to get in; the link has it (default: a random one, unless the address is 127.0.0.1).
+                  Other users of this machine see it in the list of processes; they don't see a random one
   --token-file FILE  lines "name token", one for each user
   --anonymous     no token: whoever can connect sees the stream
   --certificate PEM, --private-key PEM  https; web-certificate.sh makes them
@@ -63,6 +64,7 @@ need_number "$jitter" --jitter 0 10000
 [ -z "$group$rtp_interface$rtp_fec$rtp_rtx$rtp_key$rtp_feedback" ] || [ -n "$listen" ] || die "options of RTP: expected with --listen"
 [ -z "$token" ] || [[ "$token" =~ ^[A-Za-z0-9._~-]+$ ]] || die "--token: expected letters, digits and . _ ~ -, which a link may have"
 [ -z "$token$token_file" ] || [ -z "$anonymous" ] || die "--anonymous: expected without --token and --token-file"
+[ -z "$token" ] || [ -z "$token_file" ] || die "expected one of --token and --token-file"
 for needed in "$certificate" "$private_key" "$token_file" "$file"; do
   [ -z "$needed" ] || [ -f "$needed" ] || die "no file '$needed'"
 done
@@ -73,8 +75,6 @@ if [ -z "$token$token_file$anonymous" ] && ! [[ "$address" =~ ^(127\.|::1$|local
   token=$(head -c 16 /dev/urandom | base64 | tr '+/' '-_' | tr -d '=\n')
 fi
 settings=("port=$port" "address=$address")
-[ -z "$token" ] || settings+=("token=$token")
-[ -z "$token_file" ] || settings+=("token-file=$token_file")
 [ -z "$anonymous" ] || settings+=(anonymous=true)
 [ -z "$certificate" ] || settings+=("certificate=$certificate" "private-key=${private_key:-$certificate}")
 [ -z "$title" ] || settings+=("title=$title")
@@ -101,6 +101,15 @@ else
   source=(avatartestsrc is-live=true views=4 range-person-only=true ! "video/x-range,width=320,height=240,framerate=15/1" ! neighbourcodeenc)
 fi
 
+# By a file that only this user can read: a launch string is in the list of processes.
+private=
+if [ -n "$token" ]; then
+  private=$(mktemp "${XDG_RUNTIME_DIR:-/tmp}/web-server-token.XXXXXX")
+  echo "link $token" >"$private"
+  token_file=$private
+fi
+[ -z "$token_file" ] || settings+=("token-file=$token_file")
+
 # usage: print_links URL: for 0.0.0.0 with the names and addresses of this machine
 print_links () {
   local scheme=${1%%://*} host=${1#*://} link_port one hosts
@@ -111,7 +120,7 @@ print_links () {
     [[ "$one" != *:*:* || "$one" == \[* ]] || one="[$one]"
     echo "$scheme://$one:$link_port/${token:+#token=$token}"
   done
-  [ -z "$token_file" ] || echo "(each user's link ends with #token= and their token)"
+  [ -z "$token_file" ] || [ -n "$private" ] || echo "(each user's link ends with #token= and their token)"
 }
 
 # rangecast-run says where it listens.
@@ -123,4 +132,5 @@ launch "${source[@]}" ! rangewebsink name=web "sync=$sync" "${settings[@]}" > >(
       *) printf '%s\n' "$line" ;;
     esac
   done
+  [ -z "$private" ] || rm -f "$private"
 )

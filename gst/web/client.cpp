@@ -210,7 +210,7 @@ Client::send (const FrameSet &frame_set)
   const gsize rig_size = new_rig ? frame_set.rig_units->size () : 0;
   const gsize whole = MessageHeader::kSize + rig_size + size;
   if (!has_room (whole)) {
-    GST_LOG_OBJECT (log_, "%s: leaving out frame set %u", label_.c_str (), frame_set.number);
+    GST_DEBUG_OBJECT (log_, "%s: leaving out frame set %u", label_.c_str (), frame_set.number);
     needs_key_ = true;
     return;
   }
