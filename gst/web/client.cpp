@@ -244,6 +244,14 @@ Client::send (const FrameSet &frame_set)
   bytes_ += whole;
 }
 
+void
+Client::end ()
+{
+  rig_units_.reset ();
+  needs_key_ = true;
+  send_text ("{\"type\":\"end\"}");
+}
+
 GstStructure *
 Client::stats () const
 {

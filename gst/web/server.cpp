@@ -531,7 +531,7 @@ Server::deliver ()
     for (auto at = clients_.begin (); at != clients_.end ();) {
       Client &client = **at++; /* it may leave */
       if (item.is_end)
-        client.send_text ("{\"type\":\"end\"}");
+        client.end ();
       else
         client.send (item.frame_set);
     }
