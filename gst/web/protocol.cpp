@@ -173,8 +173,10 @@ find_token (const std::string &path, std::string_view token, std::string &error)
   for (std::string line; std::getline (lines, line);) {
     std::istringstream words (line);
     std::string name, word;
-    if (words >> name >> word && name.front () != '#' && equal_tokens (word, token))
-      found = name;
+    if (words >> name >> word && name.front () != '#' && equal_tokens (word, token)) {
+      g_autofree gchar *valid = g_utf8_make_valid (name.data (), gssize (name.size ()));
+      found = valid;
+    }
   }
   return found;
 }
