@@ -53,7 +53,7 @@ GST_START_TEST (test_nothing_of_the_stream_comes_before_the_welcome)
   fail_unless_equals_int (late.frames.size (), 1);
   fail_unless_equals_int (stranger.frames.size () + stranger.texts.size (), 0);
   raw.send (masked_frame (0x81, R"({"type":"hello","version":1,"token":"wrong"})"));
-  const std::string rest = raw.receive ();
+  const std::string rest = raw.receive ("wrong or missing token");
   fail_unless_equals_int (guint8 (rest.at (0)), 0x88); /* what comes first is the end */
   fail_unless (rest.find ("witness") == rest.npos);
 }
