@@ -276,6 +276,13 @@ Server::add_handlers ()
                                       GHashTable *, gpointer self) {
     static_cast<Server *> (self)->answer (message, path);
   };
+  /* libsoup before 3.4 never closes its side of a connection that a client closed between two
+   * requests, so each has one. An upgrade replaces this header. */
+  const auto once = [] (SoupServer *, SoupServerMessage *message, gpointer) {
+    soup_message_headers_replace (
+        soup_server_message_get_response_headers (message), "Connection", "close");
+  };
+  g_signal_connect (soup_, "request-started", GCallback (+once), nullptr);
   soup_server_add_early_handler (soup_, "/stream", early, this, nullptr);
   soup_server_add_handler (soup_, "/stream", upgrade, this, nullptr);
   soup_server_add_handler (soup_, "/", file, this, nullptr);
