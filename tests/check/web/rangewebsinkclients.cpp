@@ -447,6 +447,49 @@ GST_START_TEST (test_clients_that_vanish_are_forgotten_and_others_go_on)
 }
 GST_END_TEST;
 
+/* Sockets and files that this process has open. */
+static int
+descriptors ()
+{
+  int n = 0;
+  g_autoptr (GDir) dir = g_dir_open ("/proc/self/fd", 0, nullptr);
+  while (dir && g_dir_read_name (dir))
+    n++;
+  return n;
+}
+
+GST_START_TEST (test_connections_that_ended_leave_no_descriptors)
+{
+  if (descriptors () == 0)
+    RANGECAST_SKIP ("no /proc/self/fd");
+  WebSink sink ("token=right max-clients=3");
+  Witness witness (sink, R"("token":"right")");
+  const std::string get = "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n";
+  const auto use = [&] {
+    for (int i = 0; i < 10; i++) {
+      RawClient idle (sink.port ()), page (sink.port ()), half (sink.port ()), raw (sink.port ());
+      page.send (get);
+      page.receive ("page</title>");
+      half.send (get.substr (0, 9));
+      raw.upgrade ();
+      fail_unless_equals_int (
+          code_after (sink, R"({"type":"hello","version":1,"token":"wrong"})"), 4401);
+      WebClient client (sink);
+      client.enter (R"("token":"right")");
+      WebClient refused (sink);
+      fail_unless_equals_int (refused.close_code (), 4429);
+    }
+    fail_unless_happens (sink.stat ("clients") == 1);
+    witness.go_on ();
+  };
+  use ();
+  const int before = descriptors ();
+  use ();
+  fail_unless_happens (descriptors () <= before + 3);
+  fail_unless_cmp (descriptors (), <=, before + 3);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_client_that_does_not_read_holds_up_nobody)
 {
   WebSink sink ("window=1000 max-queued-bytes=100000000");
@@ -576,6 +619,7 @@ rangewebsinkclients_suite ()
   tcase_add_test (tc, test_frames_against_the_websocket_rules_end_their_connection_only);
   tcase_add_test (tc, test_random_bytes_harm_nobody_else);
   tcase_add_test (tc, test_clients_that_vanish_are_forgotten_and_others_go_on);
+  tcase_add_test (tc, test_connections_that_ended_leave_no_descriptors);
   tcase_add_test (tc, test_client_that_does_not_read_holds_up_nobody);
   tcase_add_test (tc, test_server_that_stops_says_so);
   tcase_add_test (tc, test_server_that_stops_drops_clients_that_do_not_answer);
