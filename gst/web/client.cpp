@@ -231,7 +231,8 @@ Client::send (const FrameSet &frame_set)
   header.write (message);
   if (new_rig)
     std::memcpy (message + MessageHeader::kSize, frame_set.rig_units->data (), rig_size);
-  std::memcpy (message + MessageHeader::kSize + rig_size, units, size);
+  if (size > 0) /* else there are no bytes to point to */
+    std::memcpy (message + MessageHeader::kSize + rig_size, units, size);
   const BytesPtr bytes (g_bytes_new_take (message, whole));
   if (in_flight_.empty ())
     heard_us_ = now;
