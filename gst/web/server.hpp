@@ -67,6 +67,8 @@ private:
   bool admit (const std::string &token, std::string &name) override;
   void request_key (Client &client) override;
   std::string welcome () override;
+  bool offers_rtc () override { return rtc_; }
+  GMainContext *context () override { return context_; }
   void entered (Client &client) override;
   void closed (Client &client) override;
 
@@ -99,6 +101,7 @@ private:
   GSocket *stats_socket_ = nullptr;
   SoupServer *soup_ = nullptr;
   std::list<std::unique_ptr<Client>> clients_;
+  bool rtc_ = false; /* data channels are offered */
   gint64 key_requested_us_;
   guint64 gone_bytes_ = 0; /* of clients that left */
   StatsBoard board_;
