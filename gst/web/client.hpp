@@ -12,15 +12,11 @@
 
 #include "datachannel.hpp"
 #include "limitedinput.h"
+#include "pagefiles.hpp"
 #include "protocol.hpp"
 #include "settings.hpp"
 
 namespace web {
-
-struct BytesUnref {
-  void operator() (GBytes *bytes) const { g_bytes_unref (bytes); }
-};
-using BytesPtr = std::unique_ptr<GBytes, BytesUnref>;
 
 /** A coded frame set on its way to all clients. */
 struct FrameSet {

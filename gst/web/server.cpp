@@ -21,27 +21,6 @@ constexpr guint kTick_ms = 1000, kStats_ms = 250;
 /** Time for clients to take the message that closes their connection. */
 constexpr gint64 kFarewell_us = 300 * 1000;
 
-struct FileType {
-  const char *suffix, *type;
-};
-constexpr std::array<FileType, 4> kFileTypes = {
-    {{".html", "text/html; charset=utf-8"}, {".js", "text/javascript; charset=utf-8"},
-        {".css", "text/css; charset=utf-8"}, {".wasm", "application/wasm"}}};
-
-/* A name in the page's folder, without a path.
- * @return its type, or nullptr for any other name */
-const char *
-type_of (std::string_view name)
-{
-  const auto allowed = [] (char c) { return g_ascii_isalnum (c) || c == '-' || c == '.'; };
-  if (name.empty () || name.front () == '.' || !std::ranges::all_of (name, allowed))
-    return nullptr;
-  for (const FileType &file : kFileTypes)
-    if (name.ends_with (file.suffix))
-      return file.type;
-  return nullptr;
-}
-
 /* HOST and PORT of udp://HOST:PORT; [HOST] for IPv6. Returns: (transfer full) (nullable) */
 GSocketAddress *
 parse_udp (const std::string &address)
@@ -91,7 +70,7 @@ add_timer (GMainContext *context, guint interval_ms, GSourceFunc call, gpointer 
 Server::Server (GstObject *element, Settings settings, RequestKey request_key)
     : element_ (element), settings_ (std::move (settings)), request_key_ (request_key),
       context_ (g_main_context_new ()), loop_ (g_main_loop_new (context_, FALSE)),
-      key_requested_us_ (g_get_monotonic_time () - G_MAXINT32)
+      page_ (settings_.root), key_requested_us_ (g_get_monotonic_time () - G_MAXINT32)
 {
 }
 
@@ -331,16 +310,22 @@ Server::answer (SoupServerMessage *message, const char *path)
         message, "application/json", SOUP_MEMORY_COPY, json.data (), json.size ());
     return soup_server_message_set_status (message, SOUP_STATUS_OK, nullptr);
   }
-  const std::string name = std::strcmp (path, "/") == 0      ? "index.html"
-                           : std::strcmp (path, "/rig") == 0 ? "rig.html"
-                                                             : path + 1;
-  const char *type = type_of (name);
-  gchar *contents = nullptr;
-  gsize size = 0;
-  if (!type ||
-      !g_file_get_contents ((settings_.root + "/" + name).c_str (), &contents, &size, nullptr))
+  const PageFiles::File *file = page_.find (path);
+  if (!file)
     return soup_server_message_set_status (message, SOUP_STATUS_NOT_FOUND, nullptr);
-  soup_server_message_set_response (message, type, SOUP_MEMORY_TAKE, contents, size);
+  SoupMessageHeaders *request = soup_server_message_get_request_headers (message);
+  soup_message_headers_append (headers, "ETag", file->etag.c_str ());
+  soup_message_headers_append (headers, "Vary", "Accept-Encoding");
+  if (g_strcmp0 (soup_message_headers_get_list (request, "If-None-Match"), file->etag.c_str ()) ==
+      0)
+    return soup_server_message_set_status (message, SOUP_STATUS_NOT_MODIFIED, nullptr);
+  const char *encodings = soup_message_headers_get_list (request, "Accept-Encoding");
+  const bool gzip = encodings && soup_header_contains (encodings, "gzip");
+  if (gzip)
+    soup_message_headers_append (headers, "Content-Encoding", "gzip");
+  soup_message_headers_set_content_type (headers, file->type, nullptr);
+  soup_message_body_append_bytes (
+      soup_server_message_get_response_body (message), (gzip ? file->gzip : file->plain).get ());
   soup_server_message_set_status (message, SOUP_STATUS_OK, nullptr);
 }
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "client.hpp"
+#include "pagefiles.hpp"
 #include "settings.hpp"
 #include "statsboard.hpp"
 
@@ -102,6 +103,7 @@ private:
   SoupServer *soup_ = nullptr;
   std::list<std::unique_ptr<Client>> clients_;
   bool rtc_ = false; /* data channels are offered */
+  PageFiles page_;   /* server's thread */
   gint64 key_requested_us_;
   guint64 gone_bytes_ = 0; /* of clients that left */
   StatsBoard board_;
