@@ -22,6 +22,7 @@
 #include "common/bufferpools.hpp"
 #include "common/elementproperties.hpp"
 #include "framepairing.hpp"
+#include "padlinkwatch.hpp"
 #include "viewsettings.hpp"
 
 #include <gst/video/video.h>
@@ -75,6 +76,8 @@ struct GstRangeCombinePrivate {
   CombineSettings settings;
   guint64 frames = 0;
 
+  PadLinkWatch pad_links; /* any thread */
+
   /* streaming thread */
   GstAggregatorPad *colour_pad, *depth_pad; /* owned by the element */
   std::optional<PairMatcher> matcher;
@@ -118,6 +121,7 @@ gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, 
       gst_event_unref (event);
       return FALSE;
     }
+    priv->pad_links.begin (GST_ELEMENT (aggregator));
     (pad == priv->colour_pad ? priv->colour : priv->depth) = *info;
     priv->negotiate = true;
   }
@@ -453,7 +457,9 @@ gst_range_combine_flush (GstAggregator *aggregator)
 static gboolean
 gst_range_combine_stop (GstAggregator *aggregator)
 {
-  drop_pool_and_converter (GST_RANGE_COMBINE (aggregator)->priv);
+  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
+  priv->pad_links.reset ();
+  drop_pool_and_converter (priv);
   return TRUE;
 }
 

@@ -29,6 +29,7 @@
 #include "common/elementproperties.hpp"
 #include "common/videoframereader.hpp"
 #include "framepairing.hpp"
+#include "padlinkwatch.hpp"
 #include "roischedule.hpp"
 #include "stereosettings.hpp"
 
@@ -115,6 +116,7 @@ struct GstStereoDepthPrivate {
 
   /* thread-safe */
   StatsReporter reporter;
+  PadLinkWatch pad_links;
   RoiSchedule rois;
   std::atomic<bool> third_released = false; /* cleared by the streaming thread */
 
@@ -178,6 +180,7 @@ gst_stereo_depth_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, G
       gst_event_unref (event);
       return FALSE;
     }
+    priv->pad_links.begin (GST_ELEMENT (aggregator));
     apply_release_of_third (priv);
     if (side != kThird && priv->pair.buffers.first) {
       priv->inputs[side].next_info = info;
@@ -698,6 +701,7 @@ gst_stereo_depth_stop (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
   priv->reporter.stop ();
+  priv->pad_links.reset ();
   drop_pool (priv->pool);
   release_pair (priv);
   for (Input &input : priv->inputs)

@@ -6,18 +6,17 @@
 
 #include <deque>
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "datachannel.hpp"
 #include "limitedinput.h"
+#include "pagefiles.hpp"
 #include "protocol.hpp"
 #include "settings.hpp"
 
 namespace web {
-
-struct BytesUnref {
-  void operator() (GBytes *bytes) const { g_bytes_unref (bytes); }
-};
-using BytesPtr = std::unique_ptr<GBytes, BytesUnref>;
 
 /** A coded frame set on its way to all clients. */
 struct FrameSet {
@@ -28,8 +27,8 @@ struct FrameSet {
   gint64 captured_us; ///< on g_get_monotonic_time(); -1: unknown
 };
 
-/** One WebSocket of a browser. The server's thread only. */
-class Client {
+/** A browser: its WebSocket, and its data channel if it has one. The server's thread only. */
+class Client : private DataChannel::Owner {
 public:
   /** What a client needs from the server. */
   class Host {
@@ -40,13 +39,15 @@ public:
     virtual bool admit (const std::string &token, std::string &name) = 0;
     virtual void request_key (Client &client) = 0;
     virtual std::string welcome () = 0; ///< the message
+    virtual bool offers_rtc () = 0;
+    virtual GMainContext *context () = 0; ///< of the server's thread
     virtual void entered (Client &client) = 0;
     virtual void closed (Client &client) = 0;
   };
 
   Client (GstObject *log, Host &host, const Settings &settings, SoupWebsocketConnection *socket,
       WebLimitedInput *input, std::string address);
-  ~Client ();
+  ~Client () override;
   Client (const Client &) = delete;
   Client &operator= (const Client &) = delete;
 
@@ -71,6 +72,7 @@ private:
   struct InFlight {
     guint32 number;
     gsize bytes;
+    gint64 expires_us; /* no acknowledgement is expected after that */
   };
 
   static void on_message (SoupWebsocketConnection *, gint type, GBytes *message, gpointer self);
@@ -79,7 +81,14 @@ private:
   void enter (const JsonMessage &message);
   void acknowledge (const JsonMessage &message);
   [[nodiscard]] bool is_too_fast ();
-  [[nodiscard]] bool has_room (gsize bytes) const;
+  void signal (const std::string &json) override;
+  void channel_changed (const std::string &error) override;
+  void handle_rtc (const std::string &type, const JsonMessage &message);
+  void close_channel (const std::string &reason);
+  void begin_transport ();
+  [[nodiscard]] bool has_room (gsize bytes);
+  gsize send_message (const FrameSet &frame_set, MessageHeader header, bool with_rig);
+  gsize send_slices (const FrameSet &frame_set, MessageHeader header, bool with_rig);
   void refuse (gushort code, const std::string &reason);
 
   GstObject *log_;
@@ -91,19 +100,25 @@ private:
   Hello hello_;
   bool entered_ = false, closing_ = false;
   guint64 entered_us_ = 0;
-  gint64 opened_us_, heard_us_, rate_since_us_ = 0;
+  gint64 opened_us_, rate_since_us_ = 0;
   guint messages_in_second_ = 0;
+  std::unique_ptr<DataChannel> channel_;
+  guint channels_ = 0, candidates_ = 0; /* asked for, received */
 
   /* frame sets */
-  bool any_ = false;      /* the counts below have begun */
-  bool needs_key_ = true; /* an earlier frame set was not sent */
-  guint32 first_ = 0;     /* number of the first frame set since welcome */
-  guint32 last_ = 0;      /* of the last one that came by */
-  guint32 sent_ = 0;      /* frame sets = messages */
+  bool any_ = false;                            /* the counts below have begun */
+  bool needs_key_ = true;                       /* an earlier frame set was not sent */
+  guint32 first_ = 0;                           /* number of the first frame set since welcome */
+  guint32 last_ = 0;                            /* of the last one that came by */
+  guint32 sent_ = 0;                            /* frame sets */
+  guint32 messages_ = 0, channel_messages_ = 0; /* on the WebSocket, on the data channel */
+  gint64 unacknowledged_since_us_ = 0;          /* 0: all is acknowledged */
+  gint64 rig_sent_us_ = 0;
   guint64 bytes_ = 0;
   gsize in_flight_bytes_ = 0;
   std::deque<InFlight> in_flight_;
-  std::shared_ptr<const std::string> rig_units_; /* that the client has */
+  std::shared_ptr<const std::string> rig_units_;      /* that the client has */
+  std::vector<std::span<const std::uint8_t>> slices_; /* of the frame set that is sent */
 };
 
 } // namespace web

@@ -4,8 +4,9 @@
  * @title: rangewebsink
  *
  * Serves coded frame sets to browsers: a page that shows the person in 3D, a dashboard of the rig
- * (/rig), and the stream over WebSockets, as docs/formats/web-protocol.md specifies. Clients that
- * cannot keep up are sent fewer frame sets; they never delay the pipeline or other clients.
+ * (/rig), and the stream over WebSockets and WebRTC data channels, as docs/formats/web-protocol.md
+ * specifies. Clients that cannot keep up are sent fewer frame sets; they never delay the pipeline
+ * or other clients.
  *
  * By default only this machine can connect. An @address that others can reach needs a @token, a
  * @token-file, or @anonymous=true; use @certificate there, too.
@@ -304,6 +305,16 @@ web_properties ()
           "Minimum time in milliseconds between two requests for a key frame set, of all clients "
           "together",
           0, 600000, kMutableReady),
+      P::boolean<&Settings::webrtc> ("webrtc", "WebRTC",
+          "Offer data channels without retransmission, where webrtcbin and its plugins are "
+          "installed",
+          kMutableReady),
+      P::text<&Settings::stun_server> ("stun-server", "STUN server",
+          "stun://HOST:PORT, for this element and its clients; null: none", kMutableReady),
+      P::text<&Settings::turn_server> ("turn-server", "TURN server",
+          "turn://USER:PASSWORD@HOST:PORT, for this element and its clients, who learn the "
+          "password; null: none",
+          kMutableReady),
       P::text<&Settings::stats_address> ("stats-address", "Stats address",
           "udp://ADDRESS:PORT where hosts send their statistics for the dashboard; null: none",
           kMutableReady),

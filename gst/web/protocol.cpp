@@ -72,6 +72,16 @@ JsonMessage::number (const char *name) const
   return number;
 }
 
+std::string
+json_string (const std::string &text)
+{
+  JsonNode *node = json_node_alloc ();
+  json_node_init_string (node, text.c_str ());
+  g_autofree gchar *quoted = json_to_string (node, FALSE);
+  json_node_unref (node);
+  return quoted;
+}
+
 /* ---- hello ---- */
 
 static bool

@@ -54,6 +54,9 @@ private:
   std::unique_ptr<JsonNode, JsonUnref> root_;
 };
 
+/** The text as a JSON string, with its quotes. */
+std::string json_string (const std::string &text);
+
 /** A client's first message. */
 struct Hello {
   int version = 0;

@@ -21,37 +21,6 @@ constexpr guint kTick_ms = 1000, kStats_ms = 250;
 /** Time for clients to take the message that closes their connection. */
 constexpr gint64 kFarewell_us = 300 * 1000;
 
-struct FileType {
-  const char *suffix, *type;
-};
-constexpr std::array<FileType, 4> kFileTypes = {
-    {{".html", "text/html; charset=utf-8"}, {".js", "text/javascript; charset=utf-8"},
-        {".css", "text/css; charset=utf-8"}, {".wasm", "application/wasm"}}};
-
-/* A name in the page's folder, without a path.
- * @return its type, or nullptr for any other name */
-const char *
-type_of (std::string_view name)
-{
-  const auto allowed = [] (char c) { return g_ascii_isalnum (c) || c == '-' || c == '.'; };
-  if (name.empty () || name.front () == '.' || !std::ranges::all_of (name, allowed))
-    return nullptr;
-  for (const FileType &file : kFileTypes)
-    if (name.ends_with (file.suffix))
-      return file.type;
-  return nullptr;
-}
-
-void
-append_json_string (std::string &json, const std::string &text)
-{
-  JsonNode *node = json_node_alloc ();
-  json_node_init_string (node, text.c_str ());
-  g_autofree gchar *quoted = json_to_string (node, FALSE);
-  json_node_unref (node);
-  json += quoted;
-}
-
 /* HOST and PORT of udp://HOST:PORT; [HOST] for IPv6. Returns: (transfer full) (nullable) */
 GSocketAddress *
 parse_udp (const std::string &address)
@@ -62,6 +31,29 @@ parse_udp (const std::string &address)
       !address.starts_with ("udp://") || port < 0 || port > 65535)
     return nullptr;
   return g_inet_socket_address_new_from_string (host && *host ? host : "0.0.0.0", guint (port));
+}
+
+/* What the client's RTCPeerConnection takes for stun://HOST:PORT and
+ * turn://USER:PASSWORD@HOST:PORT. */
+std::string
+ice_servers (const Settings &settings)
+{
+  std::string json;
+  for (const std::string &address : {settings.stun_server, settings.turn_server}) {
+    g_autofree gchar *scheme = nullptr, *user = nullptr, *password = nullptr, *host = nullptr;
+    gint port = -1;
+    if (address.empty () ||
+        !g_uri_split_with_user (address.c_str (), G_URI_FLAGS_HAS_PASSWORD, &scheme, &user,
+            &password, nullptr, &host, &port, nullptr, nullptr, nullptr, nullptr))
+      continue;
+    json += json.empty () ? "{" : ",{";
+    json += "\"urls\":" + json_string (std::string (scheme) + ":" + host +
+                                       (port < 0 ? "" : ":" + std::to_string (port)));
+    if (user && password)
+      json += ",\"username\":" + json_string (user) + ",\"credential\":" + json_string (password);
+    json += "}";
+  }
+  return "[" + json + "]";
 }
 
 GSource *
@@ -78,7 +70,7 @@ add_timer (GMainContext *context, guint interval_ms, GSourceFunc call, gpointer 
 Server::Server (GstObject *element, Settings settings, RequestKey request_key)
     : element_ (element), settings_ (std::move (settings)), request_key_ (request_key),
       context_ (g_main_context_new ()), loop_ (g_main_loop_new (context_, FALSE)),
-      key_requested_us_ (g_get_monotonic_time () - G_MAXINT32)
+      page_ (settings_.root), key_requested_us_ (g_get_monotonic_time () - G_MAXINT32)
 {
 }
 
@@ -189,6 +181,16 @@ Server::start ()
   if (!g_file_test (index.c_str (), G_FILE_TEST_IS_REGULAR))
     return {StatusCode::kNotFound,
         "root: expected the folder of the page, but there is no '" + index + "'"};
+  for (const auto &[name, address, scheme] :
+      {std::tuple ("stun-server", settings_.stun_server, "stun://"),
+          std::tuple ("turn-server", settings_.turn_server, "turn")})
+    if (!address.empty () &&
+        (!address.starts_with (scheme) ||
+            !g_uri_is_valid (address.c_str (), G_URI_FLAGS_HAS_PASSWORD, nullptr)))
+      return {StatusCode::kBadValue,
+          std::string (name) + ": expected " +
+              (*name == 's' ? "stun://HOST:PORT" : "turn://USER:PASSWORD@HOST:PORT") + ", got '" +
+              address + "'"};
   g_main_context_push_thread_default (context_);
   soup_ = soup_server_new ("server-header", "rangewebsink", nullptr);
   Status status = load_certificate ();
@@ -199,6 +201,8 @@ Server::start ()
   g_main_context_pop_thread_default (context_);
   if (!status.ok ())
     return status;
+  if (std::string missing; settings_.webrtc && !(rtc_ = DataChannel::is_supported (missing)))
+    GST_INFO_OBJECT (element_, "offering no WebRTC: there is no element %s", missing.c_str ());
   add_handlers ();
   const auto tick = [] (gpointer self) -> gboolean {
     static_cast<Server *> (self)->tick ();
@@ -316,23 +320,28 @@ Server::answer (SoupServerMessage *message, const char *path)
     return soup_server_message_set_status (message, SOUP_STATUS_METHOD_NOT_ALLOWED, nullptr);
   if (std::strcmp (path, "/server.json") == 0) {
     std::string json = "{\"version\":" + std::to_string (kProtocolVersion) +
-                       ",\"token\":" + (settings_.has_token () ? "true" : "false") + ",\"title\":";
-    append_json_string (json, settings_.title);
-    json += "}";
+                       ",\"token\":" + (settings_.has_token () ? "true" : "false") +
+                       ",\"title\":" + json_string (settings_.title) + "}";
     soup_server_message_set_response (
         message, "application/json", SOUP_MEMORY_COPY, json.data (), json.size ());
     return soup_server_message_set_status (message, SOUP_STATUS_OK, nullptr);
   }
-  const std::string name = std::strcmp (path, "/") == 0      ? "index.html"
-                           : std::strcmp (path, "/rig") == 0 ? "rig.html"
-                                                             : path + 1;
-  const char *type = type_of (name);
-  gchar *contents = nullptr;
-  gsize size = 0;
-  if (!type ||
-      !g_file_get_contents ((settings_.root + "/" + name).c_str (), &contents, &size, nullptr))
+  const PageFiles::File *file = page_.find (path);
+  if (!file)
     return soup_server_message_set_status (message, SOUP_STATUS_NOT_FOUND, nullptr);
-  soup_server_message_set_response (message, type, SOUP_MEMORY_TAKE, contents, size);
+  SoupMessageHeaders *request = soup_server_message_get_request_headers (message);
+  soup_message_headers_append (headers, "ETag", file->etag.c_str ());
+  soup_message_headers_append (headers, "Vary", "Accept-Encoding");
+  if (g_strcmp0 (soup_message_headers_get_list (request, "If-None-Match"), file->etag.c_str ()) ==
+      0)
+    return soup_server_message_set_status (message, SOUP_STATUS_NOT_MODIFIED, nullptr);
+  const char *encodings = soup_message_headers_get_list (request, "Accept-Encoding");
+  const bool gzip = encodings && soup_header_contains (encodings, "gzip");
+  if (gzip)
+    soup_message_headers_append (headers, "Content-Encoding", "gzip");
+  soup_message_headers_set_content_type (headers, file->type, nullptr);
+  soup_message_body_append_bytes (
+      soup_server_message_get_response_body (message), (gzip ? file->gzip : file->plain).get ());
   soup_server_message_set_status (message, SOUP_STATUS_OK, nullptr);
 }
 
@@ -443,16 +452,17 @@ std::string
 Server::welcome ()
 {
   std::string json = "{\"type\":\"welcome\",\"version\":" + std::to_string (kProtocolVersion) +
-                     ",\"window\":" + std::to_string (settings_.window) + ",\"rtc\":false";
+                     ",\"window\":" + std::to_string (settings_.window) +
+                     ",\"rtc\":" + (rtc_ ? "true" : "false");
+  if (rtc_)
+    json += ",\"iceServers\":" + ice_servers (settings_);
   std::string caps;
   {
     std::lock_guard guard (lock_);
     caps = caps_;
   }
-  if (!caps.empty ()) {
-    json += ",\"caps\":";
-    append_json_string (json, caps);
-  }
+  if (!caps.empty ())
+    json += ",\"caps\":" + json_string (caps);
   return json + "}";
 }
 

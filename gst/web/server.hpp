@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "client.hpp"
+#include "pagefiles.hpp"
 #include "settings.hpp"
 #include "statsboard.hpp"
 
@@ -71,6 +72,8 @@ private:
   bool admit (const std::string &token, std::string &name) override;
   void request_key (Client &client) override;
   std::string welcome () override;
+  bool offers_rtc () override { return rtc_; }
+  GMainContext *context () override { return context_; }
   void entered (Client &client) override;
   void closed (Client &client) override;
 
@@ -105,6 +108,8 @@ private:
   SoupServer *soup_ = nullptr;
   std::list<std::unique_ptr<Client>> clients_;
   ConnectionCount connections_ = std::make_shared<std::atomic<int>> (0);
+  bool rtc_ = false; /* data channels are offered */
+  PageFiles page_;   /* server's thread */
   gint64 key_requested_us_;
   guint64 gone_bytes_ = 0; /* of clients that left */
   StatsBoard board_;

@@ -22,8 +22,10 @@ struct Settings {
   guint64 max_queued_bytes = 4 << 20;
   guint hello_timeout_ms = 5000;
   guint key_unit_interval_ms = 1000;
-  std::string stats_address; ///< udp://HOST:PORT; empty: none
-  std::string url;           ///< read-only: of the page, while the server runs
+  bool webrtc = true;
+  std::string stun_server, turn_server; ///< as webrtcbin's properties
+  std::string stats_address;            ///< udp://HOST:PORT; empty: none
+  std::string url;                      ///< read-only: of the page, while the server runs
 
   /** Whether clients need a token. */
   [[nodiscard]] bool has_token () const { return !token.empty () || !token_file.empty (); }

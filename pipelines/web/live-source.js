@@ -52,8 +52,8 @@ export class LiveSource {
       return;
     if (core.frame ().unknownPixels > 0)
       this.connection.requestKey ();
-    const { transport, dropped, lost } = frameSet;
-    this.stage.network = { transport, dropped, lost };
+    const { transport, dropped, lost, count, units } = frameSet;
+    this.stage.network = { transport, dropped, lost, absent: count - units.length }; // messages
     this.stage.decoded (frameSet.captured);
   }
 

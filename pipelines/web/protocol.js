@@ -21,7 +21,7 @@ const difference = (a, b) => (a - b) | 0;
 
 // Puts frame sets together from the messages of one transport, and counts what the network lost.
 export class FrameAssembler {
-  // deliver ({ frameSet, key, discontinuity, dropped, sent, delay, units: [Uint8Array] }); those with missing messages, too
+  // deliver ({ frameSet, key, discontinuity, dropped, sent, delay, count, units: [Uint8Array] }); those with missing messages, too
   constructor (deliver) {
     this.deliver = deliver;
     this.reset ();
