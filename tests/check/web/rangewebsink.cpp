@@ -284,6 +284,56 @@ GST_START_TEST (test_page_files_are_served_with_their_types)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_page_file_that_changes_is_served_anew)
+{
+  WebSink sink;
+  const auto get_with = [&] (const std::string &header) {
+    return answer_to (
+        sink.port (), "GET /a.js HTTP/1.1\r\nHost: a\r\nConnection: close\r\n" + header + "\r\n");
+  };
+  sink.root.write ("a.js", "the first");
+  const std::string answer = get_with ("");
+  const auto at = answer.find ("ETag: ");
+  fail_unless (at != answer.npos, "%s", answer.c_str ());
+  const std::string tag = answer.substr (at + 6, answer.find ("\r\n", at) - at - 6);
+  const std::string known = "If-None-Match: " + tag + "\r\n";
+  const std::string same = get_with (known);
+  fail_unless_contains (same, "HTTP/1.1 304");
+  fail_if (same.find ("the first") != same.npos, "%s", same.c_str ());
+  sink.root.write ("a.js", "the second one");
+  fail_unless_contains (get_with (known), "\r\n\r\nthe second one");
+  g_remove ((sink.root.path + "/a.js").c_str ());
+  fail_unless_contains (get_with (known), "HTTP/1.1 404");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_page_is_compressed_for_those_who_take_that)
+{
+  WebSink sink;
+  const std::string contents (100000, 'x');
+  sink.root.write ("a.css", contents);
+  const std::string answer = answer_to (sink.port (),
+      "GET /a.css HTTP/1.1\r\nHost: a\r\nConnection: close\r\nAccept-Encoding: br, gzip\r\n\r\n");
+  fail_unless_contains (answer, "Content-Encoding: gzip");
+  const auto begin = answer.find ("\r\n\r\n") + 4;
+  g_autoptr (GInputStream) compressed =
+      g_memory_input_stream_new_from_data (answer.data () + begin, answer.size () - begin, nullptr);
+  g_autoptr (GConverter) decompressor =
+      G_CONVERTER (g_zlib_decompressor_new (G_ZLIB_COMPRESSOR_FORMAT_GZIP));
+  g_autoptr (GInputStream) stream = g_converter_input_stream_new (compressed, decompressor);
+  std::string text (contents.size () + 1, 0);
+  gsize size = 0;
+  fail_unless (
+      g_input_stream_read_all (stream, text.data (), text.size (), &size, nullptr, nullptr));
+  fail_unless_cmp (text.substr (0, size), ==, contents);
+  for (const char *accept : {"", "Accept-Encoding: br\r\n", "Accept-Encoding: xgzip\r\n"})
+    fail_unless_contains (answer_to (sink.port (), std::string ("GET /a.css HTTP/1.1\r\nHost: a\r\n"
+                                                                "Connection: close\r\n") +
+                                                       accept + "\r\n"),
+        "\r\n\r\n" + contents);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_nothing_but_files_of_the_page_is_served)
 {
   WebSink sink;
@@ -361,7 +411,10 @@ GST_START_TEST (test_rubbish_instead_of_requests_harms_nobody)
   const std::string requests[] = {"\r\n\r\n", "GET\r\n\r\n", "GET / HTTP/9.9\r\n\r\n",
       "GET / HTTP/1.1\r\n\r\n", std::string ("\0\0\0\0\r\n\r\n", 8),
       "GET /" + std::string (200000, 'a') + " HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n",
-      "\x16\x03\x01\x02\x01\x01\r\n\r\n", "GET http://[ HTTP/1.1\r\nHost: a\r\n\r\n"};
+      "\x16\x03\x01\x02\x01\x01\r\n\r\n", "GET http://[ HTTP/1.1\r\nHost: a\r\n\r\n",
+      "GET a: HTTP/1.1\r\nHost: a\r\n\r\n", "GET a:b HTTP/1.1\r\nHost: a\r\n\r\n",
+      "GET http://a HTTP/1.1\r\nHost: a\r\n\r\n", "GET ? HTTP/1.1\r\nHost: a\r\n\r\n",
+      "GET http://a?b HTTP/1.1\r\nHost: a\r\n\r\n", "OPTIONS * HTTP/1.1\r\nHost: a\r\n\r\n"};
   for (const std::string &request : requests) {
     RawClient raw (sink.port ());
     raw.send (request);
@@ -412,6 +465,8 @@ rangewebsink_suite ()
   tcase_add_test (tc, test_stats_address_must_be_a_free_udp_port);
   tcase_add_test (tc, test_element_starts_after_its_error_was_mended);
   tcase_add_test (tc, test_page_files_are_served_with_their_types);
+  tcase_add_test (tc, test_page_file_that_changes_is_served_anew);
+  tcase_add_test (tc, test_page_is_compressed_for_those_who_take_that);
   tcase_add_test (tc, test_nothing_but_files_of_the_page_is_served);
   tcase_add_test (tc, test_methods_that_change_things_are_refused);
   tcase_add_test (tc, test_server_json_says_whether_a_token_is_needed);
