@@ -341,7 +341,8 @@ Client::send_message (const FrameSet &frame_set, MessageHeader header, bool with
   header.message = messages_++;
   header.write (message);
   std::memcpy (message + MessageHeader::kSize, frame_set.rig_units->data (), rig_size);
-  std::memcpy (message + MessageHeader::kSize + rig_size, units, size);
+  if (size > 0) /* else there are no bytes to point to */
+    std::memcpy (message + MessageHeader::kSize + rig_size, units, size);
   const BytesPtr bytes (g_bytes_new_take (message, whole));
   soup_websocket_connection_send_message (socket_, SOUP_WEBSOCKET_DATA_BINARY, bytes.get ());
   return whole;
@@ -387,6 +388,14 @@ Client::send_slices (const FrameSet &frame_set, MessageHeader header, bool with_
     whole += message_size;
   }
   return whole;
+}
+
+void
+Client::end ()
+{
+  rig_units_.reset ();
+  needs_key_ = true;
+  send_text ("{\"type\":\"end\"}");
 }
 
 GstStructure *

@@ -53,6 +53,8 @@ public:
 
   /** Sends it, if the client is ready for it. */
   void send (const FrameSet &frame_set);
+  /** The stream has ended; what is sent next begins another one. */
+  void end ();
   /** Sends a text message, if the client was let in. */
   void send_text (const std::string &json);
   void close (gushort code, const std::string &reason);

@@ -241,7 +241,8 @@ bool
 DataChannel::answer (const std::string &sdp)
 {
   GstSDPMessage *message = nullptr;
-  if (answered_ || gst_sdp_message_new_from_text (sdp.c_str (), &message) != GST_SDP_OK)
+  if (answered_ || sdp.empty () ||
+      gst_sdp_message_new_from_text (sdp.c_str (), &message) != GST_SDP_OK)
     return false;
   if (!is_answer (message)) {
     gst_sdp_message_free (message);

@@ -50,7 +50,7 @@ struct GstRangeWebSinkPrivate {
   std::mutex lock; /* guards settings, and which server there is; not held while the server starts,
                       stops or is given frame sets */
   Settings settings;
-  std::shared_ptr<web::Server> server; /* from start() to stop() */
+  std::shared_ptr<web::Server> server; /* from PAUSED on */
   StatsReporter reporter;
 
   /* streaming thread only */
@@ -176,46 +176,41 @@ default_root (GstElement *element)
   return root;
 }
 
-static gboolean
-gst_range_web_sink_start (GstBaseSink *base)
+static bool
+gst_range_web_sink_start (GstElement *element)
 {
-  GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (base)->priv;
+  GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (element)->priv;
   Settings settings;
   {
     std::lock_guard guard (priv->lock);
     settings = priv->settings;
   }
   if (settings.root.empty ())
-    settings.root = default_root (GST_ELEMENT (base));
+    settings.root = default_root (element);
   priv->caps_errors.reset ();
-  auto server = std::make_shared<web::Server> (GST_OBJECT (base), settings, request_key);
+  auto server = std::make_shared<web::Server> (GST_OBJECT (element), settings, request_key);
   if (const Status status = server->start ();
-      gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
-    return FALSE;
+      gst_range_flow_return (element, status) != GST_FLOW_OK)
+    return false;
   {
     std::lock_guard guard (priv->lock);
     priv->settings.url = server->url ();
     priv->server = server;
   }
-  GST_INFO_OBJECT (base, "listening at %s", server->url ().c_str ());
-  gst_element_post_message (
-      GST_ELEMENT (base), gst_message_new_element (GST_OBJECT (base),
-                              gst_structure_new ("rangewebsink-address", "url", G_TYPE_STRING,
-                                  server->url ().c_str (), nullptr)));
-  return TRUE;
+  GST_INFO_OBJECT (element, "listening at %s", server->url ().c_str ());
+  gst_element_post_message (element, gst_message_new_element (GST_OBJECT (element),
+                                         gst_structure_new ("rangewebsink-address", "url",
+                                             G_TYPE_STRING, server->url ().c_str (), nullptr)));
+  return true;
 }
 
-static gboolean
-gst_range_web_sink_stop (GstBaseSink *base)
+static void
+gst_range_web_sink_stop (GstRangeWebSinkPrivate *priv)
 {
-  GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (base)->priv;
-  std::shared_ptr<web::Server> server;
-  {
-    std::lock_guard guard (priv->lock);
-    server.swap (priv->server);
-    priv->settings.url.clear ();
-  }
-  return TRUE; /* the server stops here, without the lock */
+  std::shared_ptr<web::Server> server; /* stops at the end, without the lock */
+  std::lock_guard guard (priv->lock);
+  server.swap (priv->server);
+  priv->settings.url.clear ();
 }
 
 static std::vector<StatsRow>
@@ -230,13 +225,20 @@ static GstStateChangeReturn
 gst_range_web_sink_change_state (GstElement *element, GstStateChange transition)
 {
   GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (element)->priv;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED)
+  /* Not the base class's start(), which it calls from NULL to READY and whose failure is another
+   * error message. */
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
+    if (!gst_range_web_sink_start (element))
+      return GST_STATE_CHANGE_FAILURE;
     priv->reporter.start (element, collect_stats);
+  }
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS (gst_range_web_sink_parent_class)->change_state (element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY ||
-      (transition == GST_STATE_CHANGE_READY_TO_PAUSED && result == GST_STATE_CHANGE_FAILURE))
+      (transition == GST_STATE_CHANGE_READY_TO_PAUSED && result == GST_STATE_CHANGE_FAILURE)) {
     priv->reporter.stop ();
+    gst_range_web_sink_stop (priv);
+  }
   return result;
 }
 
@@ -351,8 +353,6 @@ gst_range_web_sink_class_init (GstRangeWebSinkClass *klass)
       "Serves coded frame sets, and a page that shows them, to browsers", "gst-rangecast");
   element_class->change_state = GST_DEBUG_FUNCPTR (gst_range_web_sink_change_state);
 
-  base_class->start = GST_DEBUG_FUNCPTR (gst_range_web_sink_start);
-  base_class->stop = GST_DEBUG_FUNCPTR (gst_range_web_sink_stop);
   base_class->set_caps = GST_DEBUG_FUNCPTR (gst_range_web_sink_set_caps);
   base_class->event = GST_DEBUG_FUNCPTR (gst_range_web_sink_event);
   base_class->render = GST_DEBUG_FUNCPTR (gst_range_web_sink_render);

@@ -4,6 +4,7 @@
 #include <gst/gst.h>
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 namespace web {
@@ -35,7 +36,7 @@ std::optional<JsonMessage>
 JsonMessage::parse (std::string_view text)
 {
   JsonMessage message;
-  if (is_nested_deeply (text))
+  if (is_nested_deeply (text) || text.find ('\0') != text.npos)
     return {};
   message.root_.reset (json_from_string (std::string (text).c_str (), nullptr));
   if (!message.root_ || !JSON_NODE_HOLDS_OBJECT (message.root_.get ()))
@@ -65,9 +66,10 @@ JsonMessage::number (const char *name) const
   if (!node || !JSON_NODE_HOLDS_VALUE (node))
     return {};
   const GType type = json_node_get_value_type (node);
-  if (type != G_TYPE_INT64 && type != G_TYPE_DOUBLE)
+  const double number = json_node_get_double (node);
+  if ((type != G_TYPE_INT64 && type != G_TYPE_DOUBLE) || !std::isfinite (number))
     return {};
-  return json_node_get_double (node);
+  return number;
 }
 
 std::string
@@ -181,8 +183,10 @@ find_token (const std::string &path, std::string_view token, std::string &error)
   for (std::string line; std::getline (lines, line);) {
     std::istringstream words (line);
     std::string name, word;
-    if (words >> name >> word && name.front () != '#' && equal_tokens (word, token))
-      found = name;
+    if (words >> name >> word && name.front () != '#' && equal_tokens (word, token)) {
+      g_autofree gchar *valid = g_utf8_make_valid (name.data (), gssize (name.size ()));
+      found = valid;
+    }
   }
   return found;
 }

@@ -45,6 +45,7 @@ public:
 
   /** @return nothing if there is no such member, or it is not a string */
   [[nodiscard]] std::optional<std::string> text (const char *name) const;
+  /** Finite: 1e999 is no number. */
   [[nodiscard]] std::optional<double> number (const char *name) const;
   [[nodiscard]] bool has (const char *name) const;
   [[nodiscard]] JsonObject *object () const { return json_node_get_object (root_.get ()); }

@@ -231,20 +231,29 @@ Server::run ()
   g_main_context_pop_thread_default (context_);
 }
 
+/* Until something has happened, but no longer. */
+void
+Server::run_for (gint64 time_us, const std::function<bool ()> &happened)
+{
+  const gint64 end = g_get_monotonic_time () + time_us;
+  GSource *timer = add_timer (
+      context_, guint (time_us / 1000), [] (gpointer) -> gboolean { return G_SOURCE_REMOVE; },
+      nullptr);
+  while (!happened () && g_get_monotonic_time () < end)
+    g_main_context_iteration (context_, TRUE);
+  g_source_destroy (timer);
+  g_source_unref (timer);
+}
+
 void
 Server::close_all ()
 {
   soup_server_disconnect (soup_); /* no new ones; open WebSockets stay */
   for (const auto &client : clients_)
     client->close (kCloseGoingAway, "the server stops");
-  const gint64 end = g_get_monotonic_time () + kFarewell_us;
-  GSource *timer = add_timer (
-      context_, kFarewell_us / 1000, [] (gpointer) -> gboolean { return G_SOURCE_REMOVE; },
-      nullptr);
-  while (!clients_.empty () && g_get_monotonic_time () < end)
-    g_main_context_iteration (context_, TRUE);
-  g_source_destroy (timer);
-  g_source_unref (timer);
+  run_for (kFarewell_us, [this] { return clients_.empty (); });
+  clients_.clear (); /* those that did not answer; their connections close asynchronously, too */
+  run_for (kFarewell_us, [this] { return *connections_ == 0; });
   g_main_loop_quit (loop_);
 }
 
@@ -271,6 +280,13 @@ Server::add_handlers ()
                                       GHashTable *, gpointer self) {
     static_cast<Server *> (self)->answer (message, path);
   };
+  /* libsoup before 3.4 never closes its side of a connection that a client closed between two
+   * requests, so each has one. An upgrade replaces this header. */
+  const auto once = [] (SoupServer *, SoupServerMessage *message, gpointer) {
+    soup_message_headers_replace (
+        soup_server_message_get_response_headers (message), "Connection", "close");
+  };
+  g_signal_connect (soup_, "request-started", GCallback (+once), nullptr);
   soup_server_add_early_handler (soup_, "/stream", early, this, nullptr);
   soup_server_add_handler (soup_, "/stream", upgrade, this, nullptr);
   soup_server_add_handler (soup_, "/", file, this, nullptr);
@@ -339,6 +355,14 @@ Server::upgrade (SoupServerMessage *message, const char *path)
   const auto names = const_cast<char **> (protocols);
   if (std::strcmp (path, "/stream") != 0)
     return answer (message, path);
+  /* libsoup upgrades also without any */
+  const char *offered = soup_message_headers_get_list (
+      soup_server_message_get_request_headers (message), "Sec-WebSocket-Protocol");
+  if (!offered || !soup_header_contains (offered, kSubprotocol)) {
+    GST_INFO_OBJECT (element_, "%s does not offer %s",
+        soup_server_message_get_remote_host (message), kSubprotocol);
+    return soup_server_message_set_status (message, SOUP_STATUS_BAD_REQUEST, nullptr);
+  }
   if (!soup_websocket_server_process_handshake (message, nullptr, names, nullptr, nullptr)) {
     GST_INFO_OBJECT (element_, "%s: no WebSocket of this protocol",
         soup_server_message_get_remote_host (message));
@@ -356,6 +380,12 @@ Server::accept (SoupServerMessage *message)
   g_autofree gchar *host = g_strdup (soup_server_message_get_remote_host (message));
   g_autoptr (GUri) uri = g_uri_ref (soup_server_message_get_uri (message));
   g_autoptr (GIOStream) connection = soup_server_message_steal_connection (message);
+  const auto gone = [] (gpointer count, GObject *) {
+    const std::unique_ptr<ConnectionCount> connections (static_cast<ConnectionCount *> (count));
+    --**connections;
+  };
+  ++*connections_;
+  g_object_weak_ref (G_OBJECT (connection), gone, new ConnectionCount (connections_));
   g_autoptr (WebLimitedInput) input =
       web_limited_input_new (g_io_stream_get_input_stream (connection), kMaxUnfinished);
   g_autoptr (GIOStream) stream =
@@ -541,7 +571,7 @@ Server::deliver ()
     for (auto at = clients_.begin (); at != clients_.end ();) {
       Client &client = **at++; /* it may leave */
       if (item.is_end)
-        client.send_text ("{\"type\":\"end\"}");
+        client.end ();
       else
         client.send (item.frame_set);
     }

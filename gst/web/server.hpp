@@ -4,7 +4,9 @@
 #include <gst/gst.h>
 #include <libsoup/soup.h>
 
+#include <atomic>
 #include <deque>
+#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -60,6 +62,8 @@ public:
   void take_client_stats (GValue *array);
 
 private:
+  /** Connections of WebSockets that are not closed yet; may outlive the server. */
+  using ConnectionCount = std::shared_ptr<std::atomic<int>>;
   struct Item { /* a frame set, or the end of the stream */
     FrameSet frame_set;
     bool is_end = false;
@@ -78,6 +82,7 @@ private:
   rangecast::Status open_stats ();
   void add_handlers ();
   void run ();
+  void run_for (gint64 time_us, const std::function<bool ()> &happened);
   void close_all ();
   void wake ();
   void deliver ();
@@ -102,6 +107,7 @@ private:
   GSocket *stats_socket_ = nullptr;
   SoupServer *soup_ = nullptr;
   std::list<std::unique_ptr<Client>> clients_;
+  ConnectionCount connections_ = std::make_shared<std::atomic<int>> (0);
   bool rtc_ = false; /* data channels are offered */
   PageFiles page_;   /* server's thread */
   gint64 key_requested_us_;

@@ -33,7 +33,7 @@ copy_field (JsonObject *, const gchar *name, JsonNode *node, gpointer to)
     if (json_node_get_value_type (node) == G_TYPE_STRING)
       json_object_set_string_member (
           object, name, shortened (json_node_get_string (node)).c_str ());
-    else
+    else if (std::isfinite (json_node_get_double (node))) /* JSON has no other numbers */
       json_object_set_member (object, name, json_node_copy (node));
   } else if (JSON_NODE_HOLDS_ARRAY (node)) {
     JsonArray *from = json_node_get_array (node), *array = json_array_new ();
@@ -50,7 +50,7 @@ copy_report (const JsonMessage &message)
 {
   JsonObject *object = json_object_new ();
   json_object_foreach_member (message.object (), copy_field, object);
-  if (const auto time = message.number ("time"); time && std::isfinite (*time))
+  if (const auto time = message.number ("time"))
     json_object_set_double_member (object, "clock", double (g_get_real_time ()) * 1e-6 - *time);
   JsonNode *node = json_node_alloc ();
   json_node_init_object (node, object);

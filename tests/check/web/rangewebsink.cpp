@@ -1,0 +1,479 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* The life of rangewebsink, its errors, and the page it serves. */
+#include "web-check.hpp"
+
+using namespace rangecast::testing;
+
+/* ---- life ---- */
+
+/* The answer to a request, with its headers; empty if nobody listens. */
+static std::string
+answer_to (guint16 port, const std::string &request)
+{
+  RawClient raw (port);
+  if (!raw.is_connected ())
+    return "";
+  raw.send (request);
+  return raw.receive ();
+}
+
+static std::string
+get (guint16 port, const std::string &path, const char *method = "GET")
+{
+  return answer_to (port, std::string (method) + " " + path +
+                              " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n");
+}
+
+static std::string
+url_of (GstElement *element)
+{
+  g_autofree gchar *url = nullptr;
+  g_object_get (element, "url", &url, nullptr);
+  return url ? url : "";
+}
+
+GST_START_TEST (test_all_state_changes_work_twice)
+{
+  const GstState states[] = {GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_PLAYING, GST_STATE_PAUSED,
+      GST_STATE_READY, GST_STATE_NULL, GST_STATE_PLAYING, GST_STATE_NULL};
+  WebSink sink;
+  sink.stop ();
+  for (int round = 0; round < 2; round++)
+    for (const GstState state : states) {
+      ck_assert_int_ne (gst_element_set_state (sink.h->element, state), GST_STATE_CHANGE_FAILURE);
+      const std::string url = url_of (sink.h->element);
+      fail_unless_equals_int (url.empty (), state < GST_STATE_PAUSED);
+      if (!url.empty ())
+        fail_unless_contains (get (port_of (url), "/"), "HTTP/1.1 200");
+    }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_stream_is_served_after_each_start)
+{
+  WebSink sink ("", false);
+  for (int round = 0; round < 3; round++) {
+    const guint16 port = sink.port ();
+    sink.set_caps ();
+    {
+      WebClient client (sink);
+      client.enter ();
+      sink.push ("one");
+      client.wait_for ("one");
+      fail_unless_cmp (client.frames[0].units (), ==, sink.rig_units () + "one");
+      fail_unless_equals_int (client.frames[0].number (), 0);
+    }
+    sink.stop ();
+    fail_if (RawClient (port).is_connected ());
+    fail_unless_equals_int (sink.stat ("frame-sets"), 0);
+    gst_harness_play (sink.h);
+    sink.url = url_of (sink.h->element);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_message_and_property_have_the_address)
+{
+  WebSink sink;
+  GstMessage *message = gst_bus_pop_filtered (sink.bus, GST_MESSAGE_ELEMENT);
+  fail_unless (message != nullptr);
+  fail_unless (gst_message_has_name (message, "rangewebsink-address"));
+  fail_unless (GST_MESSAGE_SRC (message) == GST_OBJECT (sink.h->element));
+  fail_unless_equals_string (
+      gst_structure_get_string (gst_message_get_structure (message), "url"), sink.url.c_str ());
+  gst_message_unref (message);
+  fail_unless (gst_bus_pop_filtered (sink.bus, GST_MESSAGE_ELEMENT) == nullptr);
+  fail_unless_cmp (sink.url, ==, "http://127.0.0.1:" + std::to_string (sink.port ()) + "/");
+  fail_unless_cmp (sink.port (), !=, 0);
+  int port = -1; /* what was asked for */
+  g_object_get (sink.h->element, "port", &port, nullptr);
+  fail_unless_equals_int (port, 0);
+  sink.stop ();
+  fail_unless_cmp (url_of (sink.h->element), ==, "");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_two_sinks_have_ports_of_their_own)
+{
+  WebSink one, two;
+  fail_unless_cmp (one.port (), !=, two.port ());
+  WebClient client (two);
+  client.enter ();
+  one.push ("of one");
+  two.push ("of two");
+  client.wait_for ("of two");
+  fail_unless_equals_int (client.frames.size (), 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_stats_have_all_fields_in_any_state)
+{
+  WebSink sink;
+  for (int round = 0; round < 2; round++) {
+    GstStructure *stats = sink.stats ();
+    fail_unless (gst_structure_has_name (stats, "stats"));
+    fail_unless (gst_structure_has_field_typed (stats, "clients", G_TYPE_UINT));
+    for (const char *name : {"connections", "refused", "frame-sets", "key-requests", "bytes"})
+      fail_unless (gst_structure_has_field_typed (stats, name, G_TYPE_UINT64), "%s", name);
+    fail_unless (gst_structure_has_field_typed (stats, "client", GST_TYPE_ARRAY));
+    fail_unless_equals_int (
+        gst_value_array_get_size (gst_structure_get_value (stats, "client")), 0);
+    gst_structure_free (stats);
+    sink.stop ();
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_client_stats_have_all_fields)
+{
+  WebSink sink;
+  WebClient client (sink);
+  client.enter ();
+  fail_unless_happens (!sink.client_stat ("address").empty ());
+  GstStructure *stats = sink.stats ();
+  const GValue *list = gst_structure_get_value (stats, "client");
+  fail_unless_equals_int (gst_value_array_get_size (list), 1);
+  const GstStructure *one = gst_value_get_structure (gst_value_array_get_value (list, 0));
+  fail_unless (gst_structure_has_name (one, "client"));
+  for (const char *name : {"address", "user", "transport"})
+    fail_unless (gst_structure_has_field_typed (one, name, G_TYPE_STRING), "%s", name);
+  for (const char *name : {"frame-sets", "dropped", "bytes"})
+    fail_unless (gst_structure_has_field_typed (one, name, G_TYPE_UINT64), "%s", name);
+  fail_unless (gst_structure_has_field_typed (one, "unacknowledged", G_TYPE_UINT));
+  gst_structure_free (stats);
+}
+GST_END_TEST;
+
+/* ---- errors ---- */
+
+/* Starts a rangewebsink with these properties, which must fail with one error that has the text,
+ * and again after it was set to NULL. */
+static void
+expect_error (const std::string &properties, const std::string &text)
+{
+  Folder root;
+  root.write ("index.html", "page");
+  GstElement *element = gst_parse_launch (
+      ("rangewebsink port=0 root=" + root.path + " " + properties).c_str (), nullptr);
+  fail_unless (element != nullptr);
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (element, bus);
+  for (int round = 0; round < 2; round++) {
+    ck_assert_int_eq (gst_element_set_state (element, GST_STATE_PLAYING), GST_STATE_CHANGE_FAILURE);
+    const std::string error = next_message_text (bus, GST_MESSAGE_ERROR);
+    fail_unless_contains (error, text);
+    fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr, "a second error");
+    fail_unless_cmp (url_of (element), ==, "");
+    gst_element_set_state (element, GST_STATE_NULL);
+  }
+  gst_element_set_bus (element, nullptr);
+  gst_object_unref (bus);
+  gst_object_unref (element);
+}
+
+GST_START_TEST (test_address_that_others_can_reach_needs_a_token)
+{
+  expect_error ("address=0.0.0.0", "address=0.0.0.0 can be reached from other machines");
+  expect_error ("address=::", "address=:: can be reached");
+  Folder folder;
+  const std::string file = folder.write ("users.txt", "anna one\n");
+  for (const std::string &properties :
+      {std::string ("token=right"), "token-file=" + file, std::string ("anonymous=true")}) {
+    WebSink sink ("address=0.0.0.0 " + properties);
+    fail_unless_contains (get (sink.port (), "/"), "HTTP/1.1 200");
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_address_must_be_one_of_this_machine)
+{
+  for (const char *address : {"nonsense", "127.0.0.1:80", "256.0.0.1", "127.0.0.1/8"})
+    expect_error (std::string ("address=") + address, "address: expected an IP address");
+  expect_error ("anonymous=true address=192.0.2.1", "address=192.0.2.1 port=0");
+  WebSink local ("address=localhost");
+  fail_unless_contains (get (local.port (), "/"), "HTTP/1.1 200");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_port_in_use_is_an_error)
+{
+  WebSink sink;
+  const std::string port = "port=" + std::to_string (sink.port ());
+  expect_error (port, port);
+  fail_unless_contains (get (sink.port (), "/"), "HTTP/1.1 200");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_certificate_must_be_a_readable_pem_file)
+{
+  Folder folder;
+  const std::string rubbish = folder.write ("rubbish.pem", "rubbish");
+  const std::string empty =
+      folder.write ("empty.pem", "-----BEGIN CERTIFICATE-----\n-----END CERTIFICATE-----\n");
+  for (const std::string &file : {std::string ("/nonexistent.pem"), rubbish, empty}) {
+    expect_error ("certificate=" + file, "certificate and private-key");
+    expect_error ("certificate=" + file, file);
+  }
+  expect_error ("certificate=" + rubbish + " private-key=/nonexistent.pem", "private-key");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_root_must_have_a_page)
+{
+  Folder folder;
+  for (const std::string &root : {std::string ("/nonexistent"), folder.path}) {
+    expect_error ("root=" + root, "root: expected");
+    expect_error ("root=" + root, root);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_stats_address_must_be_a_free_udp_port)
+{
+  for (const char *address : {"nonsense", "127.0.0.1:5990", "tcp://127.0.0.1:5990",
+           "udp://127.0.0.1", "udp://127.0.0.1:65536", "udp://somewhere:5990", "udp://", "udp://:"})
+    expect_error (std::string ("stats-address=") + address, "stats-address");
+  g_autoptr (GSocket) socket =
+      g_socket_new (G_SOCKET_FAMILY_IPV4, G_SOCKET_TYPE_DATAGRAM, G_SOCKET_PROTOCOL_UDP, nullptr);
+  g_autoptr (GSocketAddress) any = g_inet_socket_address_new_from_string ("127.0.0.1", 0);
+  fail_unless (g_socket_bind (socket, any, FALSE, nullptr));
+  g_autoptr (GSocketAddress) taken = g_socket_get_local_address (socket, nullptr);
+  const auto port = g_inet_socket_address_get_port (G_INET_SOCKET_ADDRESS (taken));
+  const std::string address = "stats-address=udp://127.0.0.1:" + std::to_string (port);
+  expect_error (address, address);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_element_starts_after_its_error_was_mended)
+{
+  WebSink sink;
+  sink.stop ();
+  g_object_set (sink.h->element, "address", "nonsense", nullptr);
+  ck_assert_int_eq (
+      gst_element_set_state (sink.h->element, GST_STATE_PLAYING), GST_STATE_CHANGE_FAILURE);
+  fail_unless_equals_int (sink.errors (), 1);
+  g_object_set (sink.h->element, "address", "127.0.0.1", nullptr);
+  gst_harness_play (sink.h);
+  fail_unless_contains (get (port_of (url_of (sink.h->element)), "/"), "HTTP/1.1 200");
+}
+GST_END_TEST;
+
+/* ---- the page ---- */
+
+GST_START_TEST (test_page_files_are_served_with_their_types)
+{
+  WebSink sink;
+  const struct {
+    const char *path, *file, *type;
+  } files[] = {{"/", "index.html", "text/html"}, {"/index.html", "index.html", "text/html"},
+      {"/rig", "rig.html", "text/html"}, {"/a-b.js", "a-b.js", "text/javascript"},
+      {"/style.css", "style.css", "text/css"}, {"/a.wasm", "a.wasm", "application/wasm"},
+      {"/a.js?query=1", "a.js", "text/javascript"}};
+  for (const auto &one : files) {
+    const std::string contents = std::string ("the file ") + one.file;
+    sink.root.write (one.file, contents);
+    const std::string answer = get (sink.port (), one.path);
+    fail_unless_contains (answer, "HTTP/1.1 200");
+    fail_unless_contains (answer, std::string ("Content-Type: ") + one.type);
+    fail_unless_contains (answer, "X-Content-Type-Options: nosniff");
+    fail_unless_contains (answer, "\r\n\r\n" + contents);
+    const std::string head = get (sink.port (), one.path, "HEAD");
+    fail_unless_contains (head, "HTTP/1.1 200");
+    fail_if (head.find (contents) != head.npos, "%s", head.c_str ());
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_page_file_that_changes_is_served_anew)
+{
+  WebSink sink;
+  const auto get_with = [&] (const std::string &header) {
+    return answer_to (
+        sink.port (), "GET /a.js HTTP/1.1\r\nHost: a\r\nConnection: close\r\n" + header + "\r\n");
+  };
+  sink.root.write ("a.js", "the first");
+  const std::string answer = get_with ("");
+  const auto at = answer.find ("ETag: ");
+  fail_unless (at != answer.npos, "%s", answer.c_str ());
+  const std::string tag = answer.substr (at + 6, answer.find ("\r\n", at) - at - 6);
+  const std::string known = "If-None-Match: " + tag + "\r\n";
+  const std::string same = get_with (known);
+  fail_unless_contains (same, "HTTP/1.1 304");
+  fail_if (same.find ("the first") != same.npos, "%s", same.c_str ());
+  sink.root.write ("a.js", "the second one");
+  fail_unless_contains (get_with (known), "\r\n\r\nthe second one");
+  g_remove ((sink.root.path + "/a.js").c_str ());
+  fail_unless_contains (get_with (known), "HTTP/1.1 404");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_page_is_compressed_for_those_who_take_that)
+{
+  WebSink sink;
+  const std::string contents (100000, 'x');
+  sink.root.write ("a.css", contents);
+  const std::string answer = answer_to (sink.port (),
+      "GET /a.css HTTP/1.1\r\nHost: a\r\nConnection: close\r\nAccept-Encoding: br, gzip\r\n\r\n");
+  fail_unless_contains (answer, "Content-Encoding: gzip");
+  const auto begin = answer.find ("\r\n\r\n") + 4;
+  g_autoptr (GInputStream) compressed =
+      g_memory_input_stream_new_from_data (answer.data () + begin, answer.size () - begin, nullptr);
+  g_autoptr (GConverter) decompressor =
+      G_CONVERTER (g_zlib_decompressor_new (G_ZLIB_COMPRESSOR_FORMAT_GZIP));
+  g_autoptr (GInputStream) stream = g_converter_input_stream_new (compressed, decompressor);
+  std::string text (contents.size () + 1, 0);
+  gsize size = 0;
+  fail_unless (
+      g_input_stream_read_all (stream, text.data (), text.size (), &size, nullptr, nullptr));
+  fail_unless_cmp (text.substr (0, size), ==, contents);
+  for (const char *accept : {"", "Accept-Encoding: br\r\n", "Accept-Encoding: xgzip\r\n"})
+    fail_unless_contains (answer_to (sink.port (), std::string ("GET /a.css HTTP/1.1\r\nHost: a\r\n"
+                                                                "Connection: close\r\n") +
+                                                       accept + "\r\n"),
+        "\r\n\r\n" + contents);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_nothing_but_files_of_the_page_is_served)
+{
+  WebSink sink;
+  const std::string name = sink.root.path.substr (sink.root.path.rfind ('/') + 1);
+  sink.root.write ("sub/inner.html", "secret");
+  sink.root.write ("dir.html/index.html", "secret");
+  for (const char *file : {".hidden.html", ".html", "notes.txt", "users", "key.pem", "a b.html",
+           "a~.html", "x.html~", "x.HTML"})
+    sink.root.write (file, "secret");
+  Folder outside;
+  const std::string other = outside.write ("outside.html", "secret");
+  const std::string sibling = other.substr (other.rfind ('/', other.rfind ('/') - 1));
+  const std::string paths[] = {"/sub/inner.html", "/sub%2finner.html", "/sub%2Finner.html",
+      "/sub\\inner.html", "/sub", "/sub/", "/dir.html", "/dir.html/", "/dir.html/index.html",
+      "/.hidden.html", "/%2ehidden.html", "/.html", "/notes.txt", "/users", "/key.pem",
+      "/a%20b.html", "/a~.html", "/x.html~", "/x.HTML", "/%00", "/index.html%00.js",
+      "/notes.txt%00.html", "/.." + sibling, "/../.." + other, "/%2e%2e" + sibling,
+      "/%2e%2e%2f" + sibling.substr (1), "/..%2f" + sibling.substr (1),
+      "/%252e%252e%252f" + sibling.substr (1), "/..%5c" + sibling.substr (1),
+      "/sub/../.." + sibling, "/sub/../sub/inner.html", "/./sub/inner.html", "/" + other, other,
+      "//" + other, "/%2f" + other.substr (1), "file://" + other, "/rig/", "/rig/../sub/inner.html",
+      "/" + name + "/sub/inner.html", "/stream/../sub/inner.html", "/server.json/", "*"};
+  for (const std::string &path : paths) {
+    const std::string answer = get (sink.port (), path);
+    fail_unless_contains (answer, "HTTP/1.1 4");
+    fail_if (answer.find ("secret") != answer.npos, "%s: %s", path.c_str (), answer.c_str ());
+  }
+  fail_unless_contains (get (sink.port (), "/index.html"), "HTTP/1.1 200");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_methods_that_change_things_are_refused)
+{
+  WebSink sink;
+  for (const char *method : {"POST", "PUT", "DELETE", "OPTIONS", "PATCH", "get"}) {
+    fail_unless_contains (get (sink.port (), "/", method), "HTTP/1.1 405");
+    fail_unless_contains (get (sink.port (), "/server.json", method), "HTTP/1.1 405");
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_server_json_says_whether_a_token_is_needed)
+{
+  const struct {
+    const char *properties, *json;
+  } servers[] = {{"", R"({"version":1,"token":false,"title":""})"},
+      {"anonymous=true", R"({"version":1,"token":false,"title":""})"},
+      {"token=right", R"({"version":1,"token":true,"title":""})"},
+      {"token-file=/nonexistent", R"({"version":1,"token":true,"title":""})"}};
+  for (const auto &server : servers) {
+    WebSink sink (server.properties);
+    const std::string answer = get (sink.port (), "/server.json");
+    fail_unless_contains (answer, "application/json");
+    fail_unless_contains (answer, std::string ("\r\n\r\n") + server.json);
+    fail_if (answer.find ("right") != answer.npos, "%s", answer.c_str ());
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_title_is_quoted_as_json_needs)
+{
+  WebSink sink;
+  sink.stop ();
+  g_object_set (sink.h->element, "title", "a\"b\\c\n</script>\xc3\xa9", nullptr);
+  gst_harness_play (sink.h);
+  const std::string answer = get (port_of (url_of (sink.h->element)), "/server.json");
+  fail_unless_contains (answer, R"("title":"a\"b\\c\n)");
+  fail_unless_contains (answer, "\xc3\xa9");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_rubbish_instead_of_requests_harms_nobody)
+{
+  WebSink sink;
+  const std::string requests[] = {"\r\n\r\n", "GET\r\n\r\n", "GET / HTTP/9.9\r\n\r\n",
+      "GET / HTTP/1.1\r\n\r\n", std::string ("\0\0\0\0\r\n\r\n", 8),
+      "GET /" + std::string (200000, 'a') + " HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n",
+      "\x16\x03\x01\x02\x01\x01\r\n\r\n", "GET http://[ HTTP/1.1\r\nHost: a\r\n\r\n",
+      "GET a: HTTP/1.1\r\nHost: a\r\n\r\n", "GET a:b HTTP/1.1\r\nHost: a\r\n\r\n",
+      "GET http://a HTTP/1.1\r\nHost: a\r\n\r\n", "GET ? HTTP/1.1\r\nHost: a\r\n\r\n",
+      "GET http://a?b HTTP/1.1\r\nHost: a\r\n\r\n", "OPTIONS * HTTP/1.1\r\nHost: a\r\n\r\n"};
+  for (const std::string &request : requests) {
+    RawClient raw (sink.port ());
+    raw.send (request);
+    fail_unless_contains (get (sink.port (), "/"), "HTTP/1.1 200"); /* meanwhile */
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_state_changes_while_clients_connect)
+{
+  WebSink sink ("", false);
+  for (int round = 0; round < 8; round++) {
+    std::vector<std::unique_ptr<RawClient>> clients;
+    for (int i = 0; i < 4; i++) {
+      clients.push_back (std::make_unique<RawClient> (sink.port ()));
+      clients.back ()->send (
+          "GET /stream HTTP/1.1\r\nHost: a\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+          "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: rangecast.v1\r\n"
+          "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n");
+    }
+    g_usleep (gulong (round * 100));
+    sink.stop ();
+    for (const auto &client : clients)
+      client->receive (); /* ends */
+    gst_harness_play (sink.h);
+    sink.url = url_of (sink.h->element);
+  }
+}
+GST_END_TEST;
+
+static Suite *
+rangewebsink_suite ()
+{
+  Suite *suite = suite_create ("rangewebsink");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_all_state_changes_work_twice);
+  tcase_add_test (tc, test_stream_is_served_after_each_start);
+  tcase_add_test (tc, test_message_and_property_have_the_address);
+  tcase_add_test (tc, test_two_sinks_have_ports_of_their_own);
+  tcase_add_test (tc, test_stats_have_all_fields_in_any_state);
+  tcase_add_test (tc, test_client_stats_have_all_fields);
+  tcase_add_test (tc, test_address_that_others_can_reach_needs_a_token);
+  tcase_add_test (tc, test_address_must_be_one_of_this_machine);
+  tcase_add_test (tc, test_port_in_use_is_an_error);
+  tcase_add_test (tc, test_certificate_must_be_a_readable_pem_file);
+  tcase_add_test (tc, test_root_must_have_a_page);
+  tcase_add_test (tc, test_stats_address_must_be_a_free_udp_port);
+  tcase_add_test (tc, test_element_starts_after_its_error_was_mended);
+  tcase_add_test (tc, test_page_files_are_served_with_their_types);
+  tcase_add_test (tc, test_page_file_that_changes_is_served_anew);
+  tcase_add_test (tc, test_page_is_compressed_for_those_who_take_that);
+  tcase_add_test (tc, test_nothing_but_files_of_the_page_is_served);
+  tcase_add_test (tc, test_methods_that_change_things_are_refused);
+  tcase_add_test (tc, test_server_json_says_whether_a_token_is_needed);
+  tcase_add_test (tc, test_title_is_quoted_as_json_needs);
+  tcase_add_test (tc, test_rubbish_instead_of_requests_harms_nobody);
+  tcase_add_test (tc, test_state_changes_while_clients_connect);
+  return suite;
+}
+
+GST_CHECK_MAIN (rangewebsink);

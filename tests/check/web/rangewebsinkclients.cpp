@@ -1,0 +1,633 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* Whom rangewebsink lets in, and how it ends the connections of others. */
+#include "web-check.hpp"
+
+using namespace rangecast::testing;
+
+/* A client that is in, to see that the server goes on. */
+struct Witness {
+  WebSink &sink;
+  WebClient client;
+  int count = 0;
+
+  explicit Witness (WebSink &server, const std::string &fields = "")
+      : sink (server), client (server)
+  {
+    client.enter (fields);
+  }
+  /* Pushes a frame set and waits until the server has sent it to all. */
+  void go_on ()
+  {
+    const std::string units = "witness " + std::to_string (count++);
+    sink.push (units);
+    client.wait_for (units);
+  }
+};
+
+/* What a client's connection ends with after it sent this message. */
+static int
+code_after (WebSink &sink, const std::string &message)
+{
+  WebClient client (sink);
+  client.send (message);
+  return client.close_code ();
+}
+
+/* ---- tokens ---- */
+
+GST_START_TEST (test_nothing_of_the_stream_comes_before_the_welcome)
+{
+  WebSink sink ("token=right");
+  Witness witness (sink, R"("token":"right")");
+  WebClient late (sink), stranger (sink);
+  RawClient raw (sink.port ());
+  raw.upgrade ();
+  for (int i = 0; i < 5; i++)
+    witness.go_on ();
+  stranger.send (R"({"type":"key"})");
+  fail_unless_equals_int (stranger.close_code (), 4400);
+  late.enter (R"("token":"right")");
+  witness.go_on ();
+  late.wait_for ("witness 5");
+  fail_unless_equals_int (late.frames_before_texts, 0);
+  fail_unless_equals_int (late.frames.size (), 1);
+  fail_unless_equals_int (stranger.frames.size () + stranger.texts.size (), 0);
+  raw.send (masked_frame (0x81, R"({"type":"hello","version":1,"token":"wrong"})"));
+  const std::string rest = raw.receive ("wrong or missing token");
+  fail_unless_equals_int (guint8 (rest.at (0)), 0x88); /* what comes first is the end */
+  fail_unless (rest.find ("witness") == rest.npos);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_wrong_and_missing_tokens_are_refused)
+{
+  WebSink sink ("token=right");
+  for (const char *fields : {"", R"(,"token":"")", R"(,"token":"wrong")", R"(,"token":"right ")",
+           R"(,"token":"righ")", R"(,"token":"Right")"})
+    fail_unless_equals_int (
+        code_after (sink, std::string (R"({"type":"hello","version":1)") + fields + "}"), 4401);
+  fail_unless_equals_int (sink.stat ("refused"), 6);
+  fail_unless_equals_int (sink.stat ("connections"), 6);
+  WebClient client (sink);
+  client.enter (R"("token":"right")");
+  fail_unless_equals_int (sink.stat ("refused"), 6);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_token_cannot_be_read_back)
+{
+  WebSink sink ("token=right");
+  fail_if (g_object_class_find_property (G_OBJECT_GET_CLASS (sink.h->element), "token")->flags &
+           G_PARAM_READABLE);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_users_of_the_token_file_come_and_go_while_the_server_runs)
+{
+  Folder folder;
+  const std::string file = folder.write ("users.txt", "anna one\nbert two\n");
+  WebSink sink ("token-file=" + file);
+  const auto hello = [] (const char *token) {
+    return std::string (R"({"type":"hello","version":1,"token":")") + token + "\"}";
+  };
+  WebClient anna (sink), bert (sink);
+  anna.enter (R"("token":"one")");
+  bert.enter (R"("token":"two")");
+  fail_unless_equals_int (code_after (sink, hello ("three")), 4401);
+  fail_unless_happens (sink.client_stat ("address", "anna") == "127.0.0.1");
+  fail_unless_happens (sink.client_stat ("address", "bert") == "127.0.0.1");
+  fail_unless_cmp (sink.client_stat ("address", "carl"), ==, "");
+
+  folder.write ("users.txt", "carl three\n");
+  fail_unless_equals_int (code_after (sink, hello ("one")), 4401);
+  WebClient carl (sink);
+  carl.enter (R"("token":"three")");
+  fail_unless_happens (sink.client_stat ("address", "carl") == "127.0.0.1");
+  anna.round_trip (); /* is still there */
+
+  g_remove (file.c_str ());
+  fail_unless_equals_int (code_after (sink, hello ("three")), 4401);
+  fail_unless_equals_int (code_after (sink, hello ("")), 4401);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_token_and_token_file_both_let_in)
+{
+  Folder folder;
+  WebSink sink ("token=right token-file=" + folder.write ("users.txt", "anna one\n"));
+  WebClient anna (sink), other (sink);
+  anna.enter (R"("token":"one")");
+  other.enter (R"("token":"right")");
+  fail_unless_happens (sink.client_stat ("address", "anna") == "127.0.0.1");
+  fail_unless_happens (sink.client_stat ("address", "") == "127.0.0.1");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_user_name_that_is_no_text_is_shown_as_far_as_it_is)
+{
+  Folder folder;
+  WebSink sink ("token-file=" + folder.write ("users.txt", "jos\xe9 one\n"));
+  WebClient client (sink);
+  client.enter (R"("token":"one")");
+  fail_unless_happens (sink.client_stat ("address", "jos\xef\xbf\xbd") == "127.0.0.1");
+}
+GST_END_TEST;
+
+/* ---- what is no hello ---- */
+
+GST_START_TEST (test_first_message_that_is_no_hello_ends_the_connection)
+{
+  WebSink sink;
+  Witness witness (sink);
+  for (const char *message : {"", "hello", "[]", "{}", "{\"type\":1}",
+           R"({"type":"ack","frameSet":0})", R"({"type":"hello"})",
+           R"({"type":"hello","version":"1"})", R"({"type":"hello","version":1,"token":7})",
+           R"({"type":"hello","version":1,"want":"x"})"})
+    fail_unless_equals_int (code_after (sink, message), 4400);
+  fail_unless_equals_int (code_after (sink, R"({"type":"hello","version":2})"), 4406);
+  fail_unless_equals_int (code_after (sink, R"({"type":"hello","version":0})"), 4406);
+  witness.go_on ();
+  fail_unless_equals_int (sink.stat ("clients"), 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_reason_names_the_field_that_is_wrong)
+{
+  WebSink sink;
+  WebClient client (sink), other (sink);
+  client.send (R"({"type":"hello","version":1,"want":"stream"})");
+  client.close_code ();
+  fail_unless_contains (client.reason, "want");
+  other.enter ();
+  other.send (R"({"type":"ack","frameSet":"1"})");
+  other.close_code ();
+  fail_unless_contains (other.reason, "frameSet");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_damaged_messages_after_the_welcome_end_the_connection)
+{
+  WebSink sink;
+  Witness witness (sink);
+  for (const char *message :
+      {"", "no JSON", "{\"type\":null}", R"({"type":"ack"})", R"({"type":"ack","frameSet":-1})",
+          R"({"type":"ack","frameSet":4294967296})", R"({"type":"ack","frameSet":1e999})",
+          R"({"type":"ack","frameSet":null})", R"({"type":"ping"})",
+          R"({"type":"ping","time":"1"})", R"({"type":"ping","time":1e999})"}) {
+    WebClient client (sink);
+    client.enter ();
+    client.send (message);
+    fail_unless_equals_int (client.close_code (), 4400);
+  }
+  witness.go_on ();
+}
+GST_END_TEST;
+
+GST_START_TEST (test_messages_of_unknown_types_are_ignored)
+{
+  WebSink sink;
+  Witness witness (sink);
+  for (const char *message : {R"({"type":"hello","version":1,"token":"other"})",
+           R"({"type":"news","of":[1,{"a":null}]})", R"({"type":""})", R"({"type":"welcome"})"})
+    witness.client.send (message);
+  witness.go_on ();
+  fail_unless_equals_int (witness.client.texts.size (), 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pong_has_the_number_of_the_ping)
+{
+  WebSink sink;
+  WebClient client (sink);
+  client.enter ();
+  client.round_trip ();
+  fail_unless_contains (client.pong, R"("time":1,"server":)");
+  client.send (R"({"type":"ping","time":-1234567.875})");
+  fail_unless_happens (client.pong.find (R"("time":-1234567.875,"server":)") != std::string::npos);
+}
+GST_END_TEST;
+
+/* ---- limits ---- */
+
+GST_START_TEST (test_binary_message_ends_the_connection)
+{
+  WebSink sink;
+  WebClient before (sink), after (sink);
+  before.send_binary ("x");
+  fail_unless_equals_int (before.close_code (), 1003);
+  after.enter ();
+  after.send_binary (R"({"type":"key"})");
+  fail_unless_equals_int (after.close_code (), 1003);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_message_of_more_than_16384_bytes_ends_the_connection)
+{
+  WebSink sink;
+  const std::string hello = R"({"type":"hello","version":1,"x":")";
+  const auto padded = [&] (gsize size) {
+    return hello + std::string (size - hello.size () - 2, 'x') + "\"}";
+  };
+  WebClient largest (sink);
+  largest.send (padded (16384));
+  largest.round_trip ();
+  fail_unless_equals_int (code_after (sink, padded (16385)), 1009);
+  fail_unless_equals_int (code_after (sink, padded (60000)), 1009);
+  largest.round_trip ();
+}
+GST_END_TEST;
+
+GST_START_TEST (test_more_than_200_messages_in_a_second_end_the_connection)
+{
+  WebSink sink;
+  Witness witness (sink);
+  RawClient fast (sink.port ());
+  fast.upgrade ();
+  std::string messages = masked_frame (0x81, R"({"type":"hello","version":1})");
+  for (int i = 0; i < 1000; i++)
+    messages += masked_frame (0x81, R"({"type":"anything"})");
+  fast.send (messages);
+  const std::string answer = fast.receive ("messages a second");
+  fail_unless_contains (answer, "\x11\x4d" /* 4429 */ "at most 200 messages a second");
+  witness.go_on ();
+}
+GST_END_TEST;
+
+GST_START_TEST (test_200_messages_at_once_are_not_too_many)
+{
+  WebSink sink;
+  WebClient client (sink);
+  client.enter ();
+  for (int i = 0; i < 198; i++)
+    client.send (R"({"type":"anything"})");
+  client.round_trip ();
+  fail_unless (client.is_open ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_bytes_without_a_whole_message_are_limited)
+{
+  WebSink sink;
+  Witness witness (sink);
+  RawClient fragments (sink.port ()), announced (sink.port ());
+  fragments.upgrade ();
+  bool open = fragments.send (masked_frame (0x01, "x")); /* a text without end */
+  for (int i = 0; i < 3000 && open; i++)
+    open = fragments.send (masked_frame (0x00, std::string (100, 'x')));
+  fragments.receive (); /* ends */
+  announced.upgrade ();
+  announced.send (masked_frame (0x81, std::string (200000, 'x')));
+  announced.receive ();
+  fail_unless_happens (sink.stat ("clients") == 1);
+  witness.go_on ();
+}
+GST_END_TEST;
+
+GST_START_TEST (test_message_in_many_fragments_is_one_message)
+{
+  WebSink sink;
+  RawClient raw (sink.port ());
+  raw.upgrade ();
+  const std::string hello = R"({"type":"hello","version":1})";
+  for (gsize i = 0; i < hello.size (); i++) {
+    const guint8 end = i + 1 == hello.size () ? 0x80 : 0;
+    raw.send (masked_frame (guint8 ((i == 0 ? 1 : 0) | end), hello.substr (i, 1)));
+  }
+  fail_unless_contains (raw.receive ("}"), "welcome");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_client_without_hello_is_closed_after_its_time)
+{
+  WebSink sink ("hello-timeout=1000");
+  Witness witness (sink); /* who was quick enough stays */
+  WebClient silent (sink);
+  fail_unless_equals_int (silent.close_code (), 4408);
+  witness.go_on ();
+  fail_unless_happens (sink.stat ("clients") == 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_clients_beyond_the_maximum_are_refused_until_one_leaves)
+{
+  WebSink sink ("max-clients=2");
+  WebClient one (sink), two (sink);
+  one.enter ();
+  for (int i = 0; i < 3; i++) { /* who has not introduced himself counts, too */
+    WebClient third (sink);
+    fail_unless_equals_int (third.close_code (), 4429);
+  }
+  fail_unless_equals_int (sink.stat ("refused"), 3);
+  fail_unless_equals_int (sink.stat ("clients"), 2);
+  two.close ();
+  fail_unless_happens (sink.stat ("clients") == 1);
+  WebClient next (sink);
+  next.enter ();
+  one.round_trip ();
+}
+GST_END_TEST;
+
+/* ---- the handshake ---- */
+
+GST_START_TEST (test_pages_of_other_origins_are_refused)
+{
+  WebSink sink ("origins=\"https://example.org http://localhost:1\"");
+  const std::string own = "http://127.0.0.1:" + std::to_string (sink.port ());
+  const std::string others[] = {"http://127.0.0.1", "http://127.0.0.1:1", own + "/", own + "0",
+      "http://localhost:" + std::to_string (sink.port ()), "https://example.org:443",
+      "http://example.org", "https://example.or", "https://example.org.evil", "null", "://", "x"};
+  for (const std::string &origin : others) {
+    WebClient client (sink, origin.c_str ());
+    fail_unless_equals_int (client.status, 403);
+    fail_if (client.is_open ());
+  }
+  for (const std::string &origin :
+      {own, std::string ("https://example.org"), std::string ("http://localhost:1")}) {
+    WebClient client (sink, origin.c_str ());
+    client.enter ();
+  }
+  fail_unless_equals_int (sink.stat ("connections"), 3);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_subprotocol_must_be_offered)
+{
+  WebSink sink;
+  for (const char *protocol :
+      {"rangecast.v2", "rangecast", "other", static_cast<const char *> (nullptr)}) {
+    WebClient client (sink, nullptr, protocol);
+    fail_unless_equals_int (client.status, 400);
+    fail_if (client.is_open ());
+  }
+  fail_unless_equals_int (sink.stat ("connections"), 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_stream_without_an_upgrade_is_a_bad_request)
+{
+  WebSink sink;
+  for (const char *request : {"GET /stream HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n",
+           "POST /stream HTTP/1.1\r\nHost: a\r\nConnection: close\r\nContent-Length: 0\r\n\r\n",
+           "GET /stream HTTP/1.1\r\nHost: a\r\nConnection: Upgrade, close\r\n"
+           "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+           "Sec-WebSocket-Protocol: rangecast.v1\r\nSec-WebSocket-Key: short\r\n\r\n"}) {
+    RawClient raw (sink.port ());
+    raw.send (request);
+    fail_unless_contains (raw.receive (), "HTTP/1.1 400");
+  }
+  fail_unless_equals_int (sink.stat ("connections"), 0);
+}
+GST_END_TEST;
+
+/* ---- rubbish and ends ---- */
+
+GST_START_TEST (test_frames_against_the_websocket_rules_end_their_connection_only)
+{
+  WebSink sink;
+  Witness witness (sink);
+  const std::string frames[] = {std::string ("\x81\x02{}", 4), /* not masked */
+      masked_frame (0x83, "{}"), masked_frame (0x8f, ""), masked_frame (0xc1, "{}"),
+      masked_frame (0x80, "{}"), masked_frame (0x08, "x"), masked_frame (0x81, "\xff\xff"),
+      masked_frame (0x88, "x"), masked_frame (0x88, std::string ("\x03\xed", 2)),
+      std::string ("\x81\xff\x7f\xff\xff\xff\xff\xff\xff\xff", 10),
+      std::string ("\x81\xff\xff\xff\xff\xff\xff\xff\xff\xff\0\0\0\0", 14),
+      std::string ("\x81\xfe\x00\x01\0\0\0\0x", 9),
+      masked_frame (0x01, "{") + masked_frame (0x81, "}")};
+  for (const std::string &frame : frames) {
+    RawClient raw (sink.port ());
+    raw.upgrade ();
+    raw.send (frame);
+    raw.receive (); /* ends */
+    witness.go_on ();
+  }
+  fail_unless_happens (sink.stat ("clients") == 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_random_bytes_harm_nobody_else)
+{
+  WebSink sink ("hello-timeout=1000");
+  Witness witness (sink);
+  g_autoptr (GRand) rand = g_rand_new_with_seed (4);
+  for (int round = 0; round < 60; round++) {
+    RawClient raw (sink.port ());
+    if (round % 2)
+      raw.upgrade ();
+    std::string bytes;
+    for (int i = g_rand_int_range (rand, 1, 300); i > 0; i--)
+      bytes += char (g_rand_int (rand));
+    raw.send (round % 4 == 3 ? masked_frame (0x81, bytes) : bytes);
+    if (round % 3 == 0)
+      raw.reset ();
+  }
+  witness.go_on ();
+  fail_unless_happens (sink.stat ("clients") == 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_clients_that_vanish_are_forgotten_and_others_go_on)
+{
+  WebSink sink;
+  Witness witness (sink);
+  const std::string hello = masked_frame (0x81, R"({"type":"hello","version":1})");
+  for (int i = 0; i < 8; i++) {
+    RawClient raw (sink.port ());
+    raw.upgrade ();
+    if (i & 1)
+      raw.send (hello);
+    if (i & 2)
+      raw.send (masked_frame (0x81, "half a message").substr (0, 9));
+    witness.go_on ();
+    if (i & 4)
+      raw.reset ();
+    else
+      raw.close ();
+    witness.go_on ();
+    witness.go_on ();
+  }
+  fail_unless_happens (sink.stat ("clients") == 1);
+  fail_unless_equals_int (sink.stat ("connections"), 9);
+}
+GST_END_TEST;
+
+/* Sockets and files that this process has open. */
+static int
+descriptors ()
+{
+  int n = 0;
+  g_autoptr (GDir) dir = g_dir_open ("/proc/self/fd", 0, nullptr);
+  while (dir && g_dir_read_name (dir))
+    n++;
+  return n;
+}
+
+GST_START_TEST (test_connections_that_ended_leave_no_descriptors)
+{
+  if (descriptors () == 0)
+    RANGECAST_SKIP ("no /proc/self/fd");
+  WebSink sink ("token=right max-clients=3");
+  Witness witness (sink, R"("token":"right")");
+  const std::string get = "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n";
+  const auto use = [&] {
+    for (int i = 0; i < 10; i++) {
+      RawClient idle (sink.port ()), page (sink.port ()), half (sink.port ()), raw (sink.port ());
+      page.send (get);
+      page.receive ("page</title>");
+      half.send (get.substr (0, 9));
+      raw.upgrade ();
+      fail_unless_equals_int (
+          code_after (sink, R"({"type":"hello","version":1,"token":"wrong"})"), 4401);
+      WebClient client (sink);
+      client.enter (R"("token":"right")");
+      WebClient refused (sink);
+      fail_unless_equals_int (refused.close_code (), 4429);
+    }
+    fail_unless_happens (sink.stat ("clients") == 1);
+    witness.go_on ();
+  };
+  use ();
+  const int before = descriptors ();
+  use ();
+  fail_unless_happens (descriptors () <= before + 3);
+  fail_unless_cmp (descriptors (), <=, before + 3);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_client_that_does_not_read_holds_up_nobody)
+{
+  WebSink sink ("window=1000 max-queued-bytes=100000000");
+  Witness witness (sink);
+  RawClient deaf (sink.port ());
+  deaf.upgrade ();
+  deaf.send (masked_frame (0x81, R"({"type":"hello","version":1})"));
+  deaf.receive ("}"); /* the welcome; from here on nothing is read */
+  for (int i = 0; i < 30; i++) {
+    const std::string units = std::string (1000000, 'x') + std::to_string (i);
+    sink.push (units);
+    witness.client.wait_for (units);
+  }
+  fail_unless_equals_int (witness.client.frames.size (), 30);
+  fail_unless_equals_int (witness.client.frames.back ().dropped (), 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_server_that_stops_says_so)
+{
+  WebSink sink;
+  WebClient one (sink), two (sink), silent (sink);
+  one.enter ();
+  two.enter ();
+  sink.push ("one");
+  bool stopped = false;
+  GThread *thread = g_thread_new (
+      "stop",
+      [] (gpointer element) -> gpointer {
+        gst_element_set_state (GST_ELEMENT (element), GST_STATE_NULL);
+        return nullptr;
+      },
+      sink.h->element);
+  for (WebClient *client : {&one, &two, &silent})
+    fail_unless_equals_int (client->close_code (), 1001);
+  g_thread_join (thread);
+  stopped = true;
+  fail_unless (stopped);
+  fail_unless_equals_int (sink.stat ("clients"), 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_server_that_stops_drops_clients_that_do_not_answer)
+{
+  WebSink sink;
+  RawClient deaf (sink.port ()), half (sink.port ()), idle (sink.port ());
+  deaf.upgrade ();
+  half.upgrade ();
+  half.send (masked_frame (0x81, R"({"type":"hello","version":1})").substr (0, 9));
+  idle.send ("GET / HTTP/1.1\r\n");
+  fail_unless_happens (sink.stat ("clients") == 2);
+  sink.stop ();
+  for (RawClient *client : {&deaf, &half}) {
+    const std::string rest = client->receive (); /* ends */
+    fail_unless_equals_int (guint8 (rest.at (0)), 0x88);
+    fail_unless_equals_int (GST_READ_UINT16_BE (rest.data () + 2), 1001);
+  }
+  idle.receive ();
+}
+GST_END_TEST;
+
+/* ---- statistics ---- */
+
+GST_START_TEST (test_reports_of_hosts_reach_those_who_want_them)
+{
+  g_autoptr (GSocket) probe =
+      g_socket_new (G_SOCKET_FAMILY_IPV4, G_SOCKET_TYPE_DATAGRAM, G_SOCKET_PROTOCOL_UDP, nullptr);
+  g_autoptr (GSocketAddress) any = g_inet_socket_address_new_from_string ("127.0.0.1", 0);
+  fail_unless (g_socket_bind (probe, any, FALSE, nullptr));
+  g_autoptr (GSocketAddress) address = g_socket_get_local_address (probe, nullptr);
+  const guint16 port = g_inet_socket_address_get_port (G_INET_SOCKET_ADDRESS (address));
+  g_socket_close (probe, nullptr); /* free again, for the server */
+
+  WebSink sink ("stats-address=udp://127.0.0.1:" + std::to_string (port));
+  WebClient dashboard (sink), viewer (sink);
+  dashboard.enter (R"("want":["stats"])");
+  viewer.enter ();
+  g_autoptr (GSocket) host =
+      g_socket_new (G_SOCKET_FAMILY_IPV4, G_SOCKET_TYPE_DATAGRAM, G_SOCKET_PROTOCOL_UDP, nullptr);
+  for (const std::string &datagram : {std::string ("rubbish"), std::string (20000, '['),
+           std::string (R"({"host":"camera0","element":"stereodepth","name":"depth0","n":7})")})
+    fail_unless (
+        g_socket_send_to (host, address, datagram.data (), datagram.size (), nullptr, nullptr) > 0);
+  fail_unless_happens (dashboard.texts.size () == 2);
+  fail_unless_contains (dashboard.texts[1], R"({"type":"stats","rows":[{)");
+  fail_unless_contains (dashboard.texts[1], "depth0");
+  WebClient late (sink);
+  late.enter (R"("want":["stats","stream"])");
+  late.round_trip (); /* what there is comes at once */
+  fail_unless_equals_int (late.texts.size (), 2);
+  viewer.round_trip ();
+  fail_unless_equals_int (viewer.texts.size (), 1);
+  sink.push ("one");
+  late.wait_for ("one");
+  fail_unless_equals_int (dashboard.frames.size (), 0);
+}
+GST_END_TEST;
+
+static Suite *
+rangewebsinkclients_suite ()
+{
+  Suite *suite = suite_create ("rangewebsinkclients");
+  TCase *tc = tcase_create ("general");
+  suite_add_tcase (suite, tc);
+  tcase_add_test (tc, test_nothing_of_the_stream_comes_before_the_welcome);
+  tcase_add_test (tc, test_wrong_and_missing_tokens_are_refused);
+  tcase_add_test (tc, test_token_cannot_be_read_back);
+  tcase_add_test (tc, test_users_of_the_token_file_come_and_go_while_the_server_runs);
+  tcase_add_test (tc, test_token_and_token_file_both_let_in);
+  tcase_add_test (tc, test_user_name_that_is_no_text_is_shown_as_far_as_it_is);
+  tcase_add_test (tc, test_first_message_that_is_no_hello_ends_the_connection);
+  tcase_add_test (tc, test_reason_names_the_field_that_is_wrong);
+  tcase_add_test (tc, test_damaged_messages_after_the_welcome_end_the_connection);
+  tcase_add_test (tc, test_messages_of_unknown_types_are_ignored);
+  tcase_add_test (tc, test_pong_has_the_number_of_the_ping);
+  tcase_add_test (tc, test_binary_message_ends_the_connection);
+  tcase_add_test (tc, test_message_of_more_than_16384_bytes_ends_the_connection);
+  tcase_add_test (tc, test_more_than_200_messages_in_a_second_end_the_connection);
+  tcase_add_test (tc, test_200_messages_at_once_are_not_too_many);
+  tcase_add_test (tc, test_bytes_without_a_whole_message_are_limited);
+  tcase_add_test (tc, test_message_in_many_fragments_is_one_message);
+  tcase_add_test (tc, test_client_without_hello_is_closed_after_its_time);
+  tcase_add_test (tc, test_clients_beyond_the_maximum_are_refused_until_one_leaves);
+  tcase_add_test (tc, test_pages_of_other_origins_are_refused);
+  tcase_add_test (tc, test_subprotocol_must_be_offered);
+  tcase_add_test (tc, test_stream_without_an_upgrade_is_a_bad_request);
+  tcase_add_test (tc, test_frames_against_the_websocket_rules_end_their_connection_only);
+  tcase_add_test (tc, test_random_bytes_harm_nobody_else);
+  tcase_add_test (tc, test_clients_that_vanish_are_forgotten_and_others_go_on);
+  tcase_add_test (tc, test_connections_that_ended_leave_no_descriptors);
+  tcase_add_test (tc, test_client_that_does_not_read_holds_up_nobody);
+  tcase_add_test (tc, test_server_that_stops_says_so);
+  tcase_add_test (tc, test_server_that_stops_drops_clients_that_do_not_answer);
+  tcase_add_test (tc, test_reports_of_hosts_reach_those_who_want_them);
+  return suite;
+}
+
+GST_CHECK_MAIN (rangewebsinkclients);

@@ -1,0 +1,381 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# pipelines/web-server.sh, web-certificate.sh and demo.sh --web: what they say, serve and leave behind, without a browser.
+side_by_side=4 # they wait for each other's processes
+
+need_server () {
+  gst-inspect-1.0 --exists --atleast-version=0.0.0 rangewebsink || skip "built without libsoup-3.0 or json-glib"
+  [ -f "${RANGECAST_BUILD:-$source_dir/build}/pipelines/web/index.html" ] || skip "built without the page, which needs clang for wasm32-wasi"
+}
+
+until_true () { # seconds command...
+  local i most=$(($1 * 10))
+  shift
+  for ((i = 0; i < most; i++)); do
+    "$@" && return
+    sleep 0.1
+  done
+  fail "$* was never true; $(tail -n 5 ./*.log ./*.txt)"
+}
+
+# usage: serve arguments of web-server.sh -> sets $server, a process group of its own that ends with the test, and $links
+serve () {
+  : >links.txt # maybe of another one before
+  set -m
+  "$pipelines/web-server.sh" --port 0 "$@" >links.txt 2>server.log &
+  server=$!
+  set +m
+  trap 'kill -KILL -- -$server 2>/dev/null || true' EXIT
+  until_true 30 server_listens
+  readarray -t links < <(grep '^http' links.txt)
+}
+server_listens () {
+  ! grep -qs "TLS support is not available" server.log || skip "GLib has no TLS: glib-networking is missing"
+  kill -0 "$server" 2>/dev/null || fail "web-server.sh ended: $(cat server.log links.txt)"
+  grep -q '^http' links.txt
+}
+# Whether processes of the group are left, apart from zombies.
+is_left () { ps -eo pgid=,stat= | awk -v group="$1" '$1 == group && $2 !~ /^Z/ { found = 1 } END { exit !found }'; }
+is_gone () { ! is_left "$1"; }
+# usage: stop_server [SIGNAL]: it must end in time, with status 0, and leave no process
+stop_server () {
+  local status=0
+  kill -"${1:-INT}" "$server"
+  until_true 20 is_gone "$server"
+  wait "$server" || status=$?
+  [ "$status" = 0 ] || fail "web-server.sh ended with status $status: $(cat server.log)"
+  trap - EXIT
+}
+
+# usage: watch URL TOKEN FRAME-SETS [WANT [CA-FILE]]: a client that prints the server's texts and "frame sets N" and ends with
+# that many, or with the server's texts if that is 0; with CLOSED and its code if the server refuses it.
+watch () {
+  timeout 40 python3 - "$@" <<'END'
+import base64, json, os, socket, ssl, struct, sys, urllib.parse
+url, token, most = urllib.parse.urlparse(sys.argv[1]), sys.argv[2], int(sys.argv[3])
+stream = socket.create_connection((url.hostname, url.port), timeout=30)
+if url.scheme == "https":
+    stream = ssl.create_default_context(cafile=sys.argv[5]).wrap_socket(stream, server_hostname=url.hostname)
+key = base64.b64encode(os.urandom(16)).decode()
+stream.sendall(f"GET /stream HTTP/1.1\r\nHost: {url.netloc}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+               f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: rangecast.v1\r\n\r\n".encode())
+file = stream.makefile("rb")
+status = file.readline()
+assert b" 101 " in status, status
+while file.readline().strip():
+    pass
+def send(message):
+    text = json.dumps(message).encode()
+    stream.sendall(struct.pack("!BBH4x", 0x81, 0xfe, len(text)) + text if len(text) > 125 else struct.pack("!BB4x", 0x81, 0x80 | len(text)) + text)
+hello = {"type": "hello", "version": 1, "want": [sys.argv[4] if len(sys.argv) > 4 else "stream"]}
+send(hello | {"token": token} if token else hello)
+count = 0
+while True:
+    first, size = file.read(2)
+    if size >= 126:
+        size = int.from_bytes(file.read(2 if size == 126 else 8), "big")
+    data = file.read(size)
+    if first == 0x81:
+        print(data.decode(), flush=True)
+        if most == 0 and '"welcome"' not in data.decode() or '"end"' in data.decode():
+            break
+    elif first == 0x82:
+        count += 1
+        send({"type": "ack", "frameSet": struct.unpack_from("<I", data, 4)[0]})
+        if count == most:
+            break
+    elif first == 0x88:
+        print("CLOSED", int.from_bytes(data[:2], "big"), data[2:].decode())
+        break
+print("frame sets", count)
+END
+}
+# usage: gets FRAME-SETS watch...: it must print that many
+gets () {
+  local said
+  said=$("${@:2}") || fail "$said"
+  grep -qx "frame sets $1" <<<"$said" || fail "expected $1 frame sets: $said"
+}
+
+# usage: refused_by watch...: the server must not let it in
+refused_by () {
+  local said
+  said=$("$@")
+  grep -q '^CLOSED 4401 ' <<<"$said" || fail "$* was let in: $said"
+}
+
+test_help_names_every_option () {
+  local script option
+  for script in web-server.sh web-certificate.sh; do
+    "$pipelines/$script" --help >help.txt
+    grep -q "^usage: $script" help.txt || fail "$script: $(cat help.txt)"
+  done
+  "$pipelines/web-server.sh" -h >help.txt
+  for option in $(grep -oE '^    --[a-z-]+\)' "$pipelines/web-server.sh" | tr -d ' )'); do
+    [ "$option" = -- ] || grep -qE -- "(^|[ ,])$option( |,|$)" help.txt || fail "$option is not in --help"
+  done
+}
+
+test_errors_name_the_option () {
+  need_server
+  local script=$pipelines/web-server.sh
+  expect_error "unknown option '--no-such-option'" "$script" --no-such-option
+  expect_error "option --port needs a value" "$script" --port
+  expect_error "--port: expected a whole number from 0 to 65535" "$script" --port 65536
+  expect_error "--port: expected a whole number" "$script" --port http
+  expect_error "--jitter: expected a whole number" "$script" --listen $((ports + 40)) --jitter x
+  expect_error "--stats: expected a whole number from 1 to 65535" "$script" --stats 0
+  expect_error "--listen: expected a whole number" "$script" --listen 0
+  expect_error "--listen, --file and a launch string" "$script" --listen $((ports + 40)) -- videotestsrc
+  expect_error "options of RTP: expected with --listen" "$script" --interface lo
+  expect_error "--token: expected letters" "$script" --token 'a b'
+  expect_error "--token: expected letters" "$script" --token 'a&b'
+  expect_error "--anonymous: expected without" "$script" --anonymous --token a
+  touch users.txt recording.rcnc
+  expect_error "--anonymous: expected without" "$script" --anonymous --token-file users.txt
+  expect_error "expected one of --token and --token-file" "$script" --token a --token-file users.txt
+  expect_error "expected one of --listen, --file and a launch string" "$script" --file recording.rcnc -- videotestsrc
+  expect_error "no file 'missing.txt'" "$script" --token-file missing.txt
+  expect_error "no file 'missing.pem'" "$script" --certificate missing.pem
+  expect_error "no file 'missing.rcnc'" "$script" --file missing.rcnc
+  expect_error "--private-key: expected with --certificate" "$script" --private-key users.txt
+  expect_error "--: expected a launch string" "$script" --
+}
+
+test_errors_of_the_server_name_the_property () {
+  need_server
+  local script=$pipelines/web-server.sh
+  echo rubbish >rubbish.pem
+  expect_error "certificate and private-key: expected PEM files" "$script" --port 0 --certificate rubbish.pem
+  expect_error "address: expected an IP address" "$script" --port 0 --address localhost.localdomain --anonymous
+  expect_error "no element \"nosuchelement\"" "$script" --port 0 -- nosuchelement
+  serve
+  local port=${links[0]##*:}
+  expect_error "port=${port%/}: cannot listen there" "$script" --port "${port%/}"
+  stop_server
+}
+
+test_page_and_server_json_are_answered () {
+  need_server
+  serve --title "The \"red\" room, 2 & 3"
+  [ "${#links[@]}" = 1 ] || fail "$(cat links.txt)"
+  [[ "${links[0]}" =~ ^http://127\.0\.0\.1:[0-9]+/$ ]] || fail "${links[0]}"
+  curl -sSf "${links[0]}" >page.html
+  cmp page.html "${RANGECAST_BUILD:-$source_dir/build}/pipelines/web/index.html"
+  curl -sSf "${links[0]}rig" >page.html
+  cmp page.html "${RANGECAST_BUILD:-$source_dir/build}/pipelines/web/rig.html"
+  # All that the pages name is there.
+  local file
+  for file in rangecast.wasm $(grep -ohE '(src|href)="[a-z-]+\.[a-z]+"' "$pipelines"/web/*.html | cut -d '"' -f 2) \
+    $(grep -ohE "from '\./[a-z-]+\.js'" "$pipelines"/web/*.js | grep -oE '[a-z-]+\.js'); do
+    curl -sSf -o file "${links[0]}$file" || fail "$file is not served"
+  done
+  curl -sSf "${links[0]}server.json" >server.json
+  python3 -c '
+import json
+server = json.load(open("server.json"))
+assert server["version"] == 1 and server["token"] is False and server["title"] == "The \"red\" room, 2 & 3", server'
+  gets 5 watch "${links[0]}" "" 5
+  stop_server
+}
+
+test_other_machines_need_a_token () {
+  need_server
+  serve --address 0.0.0.0
+  local token=${links[0]##*#token=} url=${links[0]%%#*} port
+  [[ "$token" =~ ^[A-Za-z0-9_-]{22}$ ]] || fail "${links[0]}"
+  port=${url##*:} port=${port%/}
+  [ "$(grep -c "#token=$token\$" links.txt)" = "${#links[@]}" ] || fail "$(cat links.txt)"
+  curl -sSf -o server.json "http://127.0.0.1:$port/server.json"
+  grep -qF '"token":true' server.json || fail "$(cat server.json)"
+  gets 3 watch "http://127.0.0.1:$port/" "$token" 3
+  refused_by watch "http://127.0.0.1:$port/" "" 3
+  refused_by watch "http://127.0.0.1:$port/" "${token}x" 3
+  # Other users of this machine do not see it.
+  ps -eo args >args.txt
+  ! grep -qF -e "$token" args.txt || fail "ps shows the token"
+  local private
+  private=$(tr '\0' '\n' <"/proc/$server/cmdline" | sed -n 's/^token-file=//p')
+  [ "$(stat -c %a "$private")" = 600 ] || fail "$(ls -l "$private")"
+  stop_server
+  [ ! -e "$private" ] || fail "$private is left"
+}
+
+test_tokens_come_from_options_and_files () {
+  need_server
+  printf 'anna one\nbert two\n' >"the users.txt"
+  serve --token-file "the users.txt"
+  [[ "${links[0]}" != *token=* ]] || fail "${links[0]}"
+  gets 2 watch "${links[0]}" two 2
+  refused_by watch "${links[0]}" three 2
+  stop_server
+  [ -e "the users.txt" ] || fail "the users' file was removed"
+  serve --token my-token.1
+  [[ "${links[0]}" == *"/#token=my-token.1" ]] || fail "${links[0]}"
+  gets 2 watch "${links[0]%%#*}" my-token.1 2
+  stop_server
+  serve --address 0.0.0.0 --anonymous
+  [[ "${links[0]}" != *token* ]] || fail "${links[0]}"
+  stop_server
+}
+
+test_recording_is_shown_once () {
+  need_server
+  gst-launch-1.0 -q avatartestsrc num-buffers=40 views=2 ! video/x-range,width=64,height=48,framerate=10/1 ! neighbourcodeenc \
+    ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location="the recording.rcnc"
+  serve --file "the recording.rcnc"
+  watch "${links[0]}" "" 1000 >watched.txt || fail "$(cat watched.txt)"
+  grep -qF '{"type":"end"}' watched.txt || grep -q '^CLOSED 1001' watched.txt || fail "$(cat watched.txt)"
+  [ "$(sed -n 's/^frame sets //p' watched.txt)" -ge 5 ] || fail "$(cat watched.txt)"
+  until_true 10 is_gone "$server"
+  wait "$server" || fail "web-server.sh failed: $(cat server.log)"
+}
+
+test_launch_string_and_rtp_are_served () {
+  need_server
+  local scene=(avatartestsrc is-live=true views=2 ! "video/x-range,width=64,height=48,framerate=15/1" ! neighbourcodeenc) sender
+  serve -- "${scene[@]}"
+  gets 3 watch "${links[0]}" "" 3
+  stop_server
+  timeout 60 gst-launch-1.0 -q "${scene[@]}" ! rtpneighbourcodepay config-interval=1 ! udpsink host=127.0.0.1 port=$((ports + 1)) &
+  sender=$!
+  serve --listen $((ports + 1)) --jitter 10
+  gets 5 watch "${links[0]}" "" 5
+  stop_server
+  kill "$sender"
+  wait "$sender" || true
+}
+
+test_statistics_reach_the_dashboard () {
+  need_server
+  serve --stats $((ports + 2))
+  watch "${links[0]}" "" 0 stats >watched.txt || fail "$(cat watched.txt)"
+  grep -q '"type":"stats","rows":\[{' watched.txt || fail "$(cat watched.txt)"
+  grep -q '"host":"web-server"' watched.txt || fail "$(cat watched.txt)"
+  stop_server
+}
+
+test_server_ends_at_once_and_leaves_nothing () {
+  need_server
+  local signal
+  for signal in INT TERM; do
+    serve
+    watch "${links[0]}" "" 1000000 >watched.txt 2>&1 &
+    until_true 20 grep -q welcome watched.txt
+    stop_server $signal
+    wait $! || fail "the client failed: $(cat watched.txt)"
+    grep -q '^CLOSED 1001\|"end"' watched.txt || fail "$signal: $(cat watched.txt)"
+    ! curl -s -o page.html --max-time 5 "${links[0]}" || fail "somebody still listens"
+  done
+}
+
+test_certificate_is_for_its_names () {
+  command -v openssl >/dev/null || skip "openssl is missing"
+  "$pipelines/web-certificate.sh" certs rig.example 192.0.2.7 ::1 >said.txt
+  grep -qF certs/server.pem said.txt || fail "$(cat said.txt)"
+  [ "$(stat -c %a certs/server-key.pem certs/authority-key.pem | sort -u)" = 600 ] || fail "$(ls -l certs)"
+  [ "$(find certs -type f | wc -l)" = 4 ] || fail "$(ls certs)"
+  openssl verify -x509_strict -CAfile certs/authority.pem -verify_hostname rig.example certs/server.pem
+  openssl verify -CAfile certs/authority.pem -verify_ip 192.0.2.7 certs/server.pem
+  openssl verify -CAfile certs/authority.pem -verify_ip ::1 certs/server.pem
+  ! openssl verify -CAfile certs/authority.pem -verify_hostname other.example certs/server.pem || fail "it is good for other names"
+  openssl x509 -in certs/server.pem -noout -checkend $((396 * 86400))
+  ! openssl x509 -in certs/server.pem -noout -checkend $((398 * 86400)) || fail "browsers refuse more than 398 days"
+  # The authority that phones trust stays.
+  cp certs/authority.pem before.pem
+  "$pipelines/web-certificate.sh" certs >said.txt
+  cmp before.pem certs/authority.pem
+  openssl verify -CAfile certs/authority.pem -verify_hostname localhost certs/server.pem
+  openssl verify -CAfile certs/authority.pem -verify_hostname "$(hostname)" certs/server.pem
+}
+
+test_certificate_errors () {
+  command -v openssl >/dev/null || skip "openssl is missing"
+  expect_error "expected a folder" "$pipelines/web-certificate.sh"
+  expect_error "expected a folder" "$pipelines/web-certificate.sh" --no-such-option
+  expect_error "expected names and IP addresses, got 'a b'" "$pipelines/web-certificate.sh" certs 'a b'
+  expect_error "expected names and IP addresses, got 'x,DNS:y'" "$pipelines/web-certificate.sh" certs 'x,DNS:y'
+  [ ! -e certs/server.pem ] || fail "a certificate was made"
+  touch file
+  expect_error "cannot create 'file/certs'" "$pipelines/web-certificate.sh" file/certs
+  mkdir -p damaged
+  echo rubbish | tee damaged/authority.pem >damaged/authority-key.pem
+  expect_error "openssl failed" "$pipelines/web-certificate.sh" damaged
+}
+
+test_stream_is_served_with_tls () {
+  need_server
+  command -v openssl >/dev/null || skip "openssl is missing"
+  "$pipelines/web-certificate.sh" certs localhost 127.0.0.1
+  serve --certificate certs/server.pem --private-key certs/server-key.pem --token right
+  local url=${links[0]%%#*}
+  [[ "${links[0]}" =~ ^https://127\.0\.0\.1:[0-9]+/#token=right$ ]] || fail "${links[0]}"
+  curl -sSf --cacert certs/authority.pem -o server.json "${url}server.json"
+  grep -qF '"token":true' server.json || fail "$(cat server.json)"
+  curl -sSf --cacert certs/authority.pem "${url/127.0.0.1/localhost}" >page.html
+  ! curl -s "$url" >page.html || fail "curl trusts everybody"
+  ! curl -s "${url/https/http}" >page.html || fail "it serves without TLS, too"
+  gets 3 watch "$url" right 3 stream certs/authority.pem
+  refused_by watch "$url" wrong 3 stream certs/authority.pem
+  stop_server
+  # Certificate and key in one file.
+  cat certs/server.pem certs/server-key.pem >both.pem
+  serve --certificate both.pem
+  gets 3 watch "${links[0]}" "" 3 stream certs/authority.pem
+  stop_server
+}
+
+# A tree whose setup.sh has nothing to do.
+make_tree () {
+  mkdir tree
+  ln -s "$pipelines" tree/pipelines
+  ln -s "${RANGECAST_BUILD:-$source_dir/build}" tree/build
+  printf '#!/bin/sh\necho "$@" >"%s/setup.txt"\n' "$PWD" >tree/setup.sh
+  chmod +x tree/setup.sh
+}
+
+test_demo_is_shown_in_browsers () {
+  need_server
+  make_tree
+  local demo port
+  set -m
+  tree/pipelines/demo.sh --input range --views 2 --size 64x48 --fps 8 --port $((ports + 10)) --out demo --web 0 >demo.log 2>&1 &
+  demo=$!
+  set +m
+  trap 'kill -KILL -- -$demo 2>/dev/null || true' EXIT
+  until_true 40 grep -q '^http.*/rig$' demo.log
+  [ "$(cat setup.txt)" = --web ] || fail "setup.sh $(cat setup.txt)"
+  port=$(sed -nE 's|^http://127\.0\.0\.1:([0-9]+)/$|\1|p' demo.log)
+  [ -n "$port" ] || fail "$(cat demo.log)"
+  curl -sSf -o server.json "http://127.0.0.1:$port/server.json"
+  grep -qF '2 stereo cameras' server.json || fail "$(cat server.json)"
+  gets 5 watch "http://127.0.0.1:$port/" "" 5
+  watch "http://127.0.0.1:$port/" "" 0 stats >watched.txt || fail "$(cat watched.txt)"
+  grep -q '"type":"stats"' watched.txt || fail "$(cat watched.txt)"
+  kill -INT -- "-$demo" # as Ctrl+C does
+  until_true 20 is_gone "$demo"
+  wait "$demo" || true
+  grep -q Traceback demo.log && fail "$(cat demo.log)"
+  trap - EXIT
+}
+
+test_demo_ends_with_term_and_says_when_the_server_failed () {
+  need_server
+  make_tree
+  local demo
+  expect_error "--web: expected without --window and --trace" tree/pipelines/demo.sh --web --window
+  expect_error "--web: expected a whole number from 0 to 65535" tree/pipelines/demo.sh --web 65536
+  [ ! -e setup.txt ] || fail "setup.sh was run"
+  set -m
+  tree/pipelines/demo.sh --input range --views 1 --size 64x48 --fps 8 --port $((ports + 20)) --out demo --web 0 >demo.log 2>&1 &
+  demo=$!
+  set +m
+  trap 'kill -KILL -- -$demo 2>/dev/null || true' EXIT
+  until_true 40 grep -q '^http.*/rig$' demo.log
+  local taken
+  taken=$(sed -nE 's|^http://127\.0\.0\.1:([0-9]+)/$|\1|p' demo.log)
+  expect_error "the server for browsers failed" tree/pipelines/demo.sh --input range --views 1 --size 64x48 --fps 8 \
+    --port $((ports + 30)) --out other --web "$taken"
+  kill -TERM "$demo"
+  until_true 20 is_gone "$demo"
+  trap - EXIT
+}
