@@ -27,9 +27,10 @@ END
   rtp_usage_receiver
 }
 
-listen= file= jitter=30 group= port=8080 address=127.0.0.1 token= token_file= anonymous= certificate= private_key= title= stats= origins= string=()
+listen= file= jitter= group= port=8080 address=127.0.0.1 token= token_file= anonymous= certificate= private_key= title= stats= origins= string=()
 while [ $# -gt 0 ]; do
   option=$1
+  [ $# = 1 ] || [ -n "$2" ] || die "option $1: expected a value, got ''"
   rtp_option receiver "$1" "${2:-}"
   if [ $taken -gt 0 ]; then
     shift $taken || die "option $1 needs a value"
@@ -58,10 +59,10 @@ while [ $# -gt 0 ]; do
   shift || die "option $option needs a value"
 done
 need_number "$port" --port 0 65535
-need_number "$jitter" --jitter 0 10000
+[ -z "$jitter" ] || need_number "$jitter" --jitter 0 10000
 [ -z "$stats" ] || need_number "$stats" --stats 1 65535
 [ -z "$group" ] || need_group "$group"
-[ -z "$group$rtp_interface$rtp_fec$rtp_rtx$rtp_key$rtp_feedback" ] || [ -n "$listen" ] || die "options of RTP: expected with --listen"
+[ -z "$group$rtp_interface$rtp_fec$rtp_rtx$rtp_key$rtp_feedback$jitter" ] || [ -n "$listen" ] || die "options of RTP: expected with --listen"
 [ -z "$token" ] || [[ "$token" =~ ^[A-Za-z0-9._~-]+$ ]] || die "--token: expected letters, digits and . _ ~ -, which a link may have"
 [ -z "$token$token_file" ] || [ -z "$anonymous" ] || die "--anonymous: expected without --token and --token-file"
 [ -z "$token" ] || [ -z "$token_file" ] || die "expected one of --token and --token-file"
@@ -69,6 +70,7 @@ for needed in "$certificate" "$private_key" "$token_file" "$file"; do
   [ -z "$needed" ] || [ -f "$needed" ] || die "no file '$needed'"
 done
 [ -z "$private_key" ] || [ -n "$certificate" ] || die "--private-key: expected with --certificate"
+command -v rangecast-run >/dev/null || die "rangecast-run is missing, which prints the link; run $root/setup.sh"
 gst-inspect-1.0 --exists --atleast-version=0.0.0 rangewebsink || die "rangewebsink is missing: it needs libsoup-3.0 and json-glib; run $root/setup.sh"
 
 if [ -z "$token$token_file$anonymous" ] && ! [[ "$address" =~ ^(127\.|::1$|localhost$) ]]; then
@@ -77,10 +79,12 @@ fi
 settings=("port=$port" "address=$address")
 [ -z "$anonymous" ] || settings+=(anonymous=true)
 [ -z "$certificate" ] || settings+=("certificate=$certificate" "private-key=${private_key:-$certificate}")
-[ -z "$title" ] || settings+=("title=$title")
+[ -z "$title" ] || settings+=("title=$(sed 's/["\\]/\\&/g' <<<"$title")")
 [ -z "$origins" ] || settings+=("origins=$origins")
 if [ -n "$stats" ]; then
-  settings+=("stats-address=udp://0.0.0.0:$stats")
+  stats_address=0.0.0.0
+  [[ ! "$address" =~ ^(127\.|::1$|localhost$) ]] || stats_address=127.0.0.1
+  settings+=("stats-address=udp://$stats_address:$stats")
   export RANGECAST_STATS=${RANGECAST_STATS:-udp://127.0.0.1:$stats} RANGECAST_HOST=${RANGECAST_HOST:-web-server}
 fi
 
@@ -90,7 +94,7 @@ if [ -n "$listen" ]; then
   need_number "$listen" --listen 1 65535
   { [ -z "$file" ] && [ ${#string[@]} = 0 ]; } || die "expected one of --listen, --file and a launch string"
   rtp_check receiver
-  receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
+  receive_rtp 0 "$listen" "${jitter:-30}" 4194304 "$group"
   source=("${rtp[@]}") sync=false
 elif [ -n "$file" ]; then
   [ ${#string[@]} = 0 ] || die "expected one of --listen, --file and a launch string"
@@ -125,7 +129,7 @@ print_links () {
 
 # rangecast-run says where it listens.
 launch "${source[@]}" ! rangewebsink name=web "sync=$sync" "${settings[@]}" > >(
-  trap '' INT TERM # ends at the end of its input
+  trap '' INT TERM HUP # ends at the end of its input
   while IFS= read -r line; do
     case "$line" in
       'serving '*) print_links "${line#serving }" ;;

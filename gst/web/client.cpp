@@ -35,15 +35,11 @@ Client::Client (GstObject *log, Host &host, const Settings &settings,
 {
   soup_websocket_connection_set_keepalive_interval (socket_, 20);
   g_signal_connect (socket_, "message", G_CALLBACK (on_message), this);
-  const auto pong = [] (SoupWebsocketConnection *, GBytes *, gpointer self) {
-    web_limited_input_restart (static_cast<Client *> (self)->input_);
-  };
   const auto failed = [] (SoupWebsocketConnection *, GError *error, gpointer self) {
     auto client = static_cast<Client *> (self);
     GST_WARNING_OBJECT (client->log_, "%s: %s", client->label_.c_str (), error->message);
   };
   g_signal_connect (socket_, "error", GCallback (+failed), this);
-  g_signal_connect (socket_, "pong", GCallback (+pong), this);
   g_signal_connect (socket_, "closed", G_CALLBACK (on_closed), this);
 }
 
@@ -190,6 +186,8 @@ Client::acknowledge (const JsonMessage &message)
   if (!number || !(*number >= 0 && *number <= G_MAXUINT32))
     return refuse (kCloseBadMessage, "ack: frameSet: expected a number of a frame set");
   const auto acknowledged = static_cast<guint32> (*number);
+  if (sent_ == 0 || gint32 (acknowledged - last_) > 0)
+    return refuse (kCloseBadMessage, "ack: frameSet: expected one that was sent");
   unacknowledged_since_us_ = 0;
   while (!in_flight_.empty () && gint32 (acknowledged - in_flight_.front ().number) >= 0) {
     in_flight_bytes_ -= in_flight_.front ().bytes;
@@ -209,6 +207,8 @@ Client::handle_rtc (const std::string &type, const JsonMessage &message)
       return;
     if (++channels_ > kMaxChannels)
       return refuse (kCloseLimit, "at most " + std::to_string (kMaxChannels) + " data channels");
+    if (channel_)
+      close_channel ("the client asks for another");
     candidates_ = 0;
     DataChannel::Owner &self = *this;
     channel_ = std::make_unique<DataChannel> (host_.context (), self, settings_);

@@ -61,6 +61,7 @@ public:
   /** Once a second: closes clients that have been silent for too long. */
   void check_silence ();
 
+  [[nodiscard]] bool was_let_in () const { return entered_; }
   [[nodiscard]] bool wants_stats () const { return entered_ && hello_.stats; }
   [[nodiscard]] const std::string &label () const { return label_; }
   /** Structure "client". Returns: (transfer full) */

@@ -3,6 +3,9 @@
 
 #include <gst/sdp/sdp.h>
 
+#include <sys/resource.h>
+
+#include <atomic>
 #include <mutex>
 
 #include "category.hpp"
@@ -54,6 +57,25 @@ struct DataChannel::Link {
 
 namespace {
 
+/** File descriptors of a webrtcbin: 24 were counted, more with more network interfaces. */
+constexpr rlim_t kDescriptors = 32;
+/** Channels of this process, until their pipelines have stopped. */
+std::atomic<int> channels = 0;
+
+/* Asks no router for ports. */
+void
+switch_upnp_off (GstElement *webrtc)
+{
+  GObject *ice = nullptr, *agent = nullptr;
+  g_object_get (webrtc, "ice-agent", &ice, nullptr);
+  if (ice && g_object_class_find_property (G_OBJECT_GET_CLASS (ice), "agent"))
+    g_object_get (ice, "agent", &agent, nullptr);
+  if (agent)
+    g_object_set (agent, "upnp", FALSE, nullptr);
+  g_clear_object (&agent);
+  g_clear_object (&ice);
+}
+
 /* What the page of this protocol version answers: one data section with the keys of a transport.
  * webrtcbin is not asked about other descriptions. */
 bool
@@ -86,6 +108,16 @@ DataChannel::is_supported (std::string &missing)
     gst_object_unref (factory);
   }
   return true;
+}
+
+bool
+DataChannel::has_room ()
+{
+  rlimit limit = {};
+  getrlimit (RLIMIT_NOFILE, &limit);
+  const rlim_t others = limit.rlim_cur / 4; /* for WebSockets and the rest of the process */
+  return limit.rlim_cur == RLIM_INFINITY ||
+         rlim_t (channels + 1) * kDescriptors <= limit.rlim_cur - others;
 }
 
 /* ---- on webrtcbin's threads ---- */
@@ -195,6 +227,8 @@ DataChannel::DataChannel (GMainContext *context, Owner &owner, const Settings &s
 {
   gst_object_ref_sink (pipeline_);
   link_->channel = this;
+  channels++;
+  switch_upnp_off (webrtc_);
   g_object_set (webrtc_, "bundle-policy", GST_WEBRTC_BUNDLE_POLICY_MAX_BUNDLE, nullptr);
   if (!settings.stun_server.empty ())
     g_object_set (webrtc_, "stun-server", settings.stun_server.c_str (), nullptr);
@@ -222,6 +256,7 @@ DataChannel::~DataChannel ()
     std::lock_guard guard (link->lock);
     link->closed = true;
     gst_element_set_state (pipeline, GST_STATE_NULL);
+    channels--;
   };
   gst_element_call_async (pipeline_, stop, Link::hold (link_), Link::release);
   gst_object_unref (pipeline_);
@@ -241,11 +276,11 @@ bool
 DataChannel::answer (const std::string &sdp)
 {
   GstSDPMessage *message = nullptr;
-  if (answered_ || sdp.empty () ||
-      gst_sdp_message_new_from_text (sdp.c_str (), &message) != GST_SDP_OK)
+  if (answered_ || sdp.empty ())
     return false;
-  if (!is_answer (message)) {
-    gst_sdp_message_free (message);
+  if (gst_sdp_message_new_from_text (sdp.c_str (), &message) != GST_SDP_OK ||
+      !is_answer (message)) {
+    g_clear_pointer (&message, gst_sdp_message_free);
     return false;
   }
   answered_ = true;

@@ -33,6 +33,8 @@ public:
   /** @return whether the elements that a channel needs are installed; `missing` names the first
    * that is not */
   static bool is_supported (std::string &missing);
+  /** @return whether the process has file descriptors for another channel */
+  static bool has_room ();
 
   /** Begins to offer a channel to the client. @param context  of the server's thread */
   DataChannel (GMainContext *context, Owner &owner, const Settings &settings);

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "server.hpp"
 
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -18,6 +21,8 @@ namespace {
 /** Frame sets that wait for the server's thread; more would be late. */
 constexpr std::size_t kMaxQueue = 8;
 constexpr guint kTick_ms = 1000, kStats_ms = 250;
+/** A client that reads nothing for so long is disconnected. */
+constexpr gint kMaxUnread_ms = 30000;
 /** Time for clients to take the message that closes their connection. */
 constexpr gint64 kFarewell_us = 300 * 1000;
 
@@ -47,7 +52,9 @@ ice_servers (const Settings &settings)
             &password, nullptr, &host, &port, nullptr, nullptr, nullptr, nullptr))
       continue;
     json += json.empty () ? "{" : ",{";
-    json += "\"urls\":" + json_string (std::string (scheme) + ":" + host +
+    const bool is_ipv6 = std::strchr (host, ':');
+    const std::string name = is_ipv6 ? std::string ("[") + host + "]" : host;
+    json += "\"urls\":" + json_string (std::string (scheme) + ":" + name +
                                        (port < 0 ? "" : ":" + std::to_string (port)));
     if (user && password)
       json += ",\"username\":" + json_string (user) + ",\"credential\":" + json_string (password);
@@ -177,20 +184,24 @@ Server::open_stats ()
 Status
 Server::start ()
 {
+  if (!settings_.token_file.empty () &&
+      !g_file_test (settings_.token_file.c_str (), G_FILE_TEST_IS_REGULAR))
+    return {StatusCode::kNotFound,
+        "token-file: expected a file, but there is no '" + settings_.token_file + "'"};
+  if (!settings_.private_key.empty () && settings_.certificate.empty ())
+    return {StatusCode::kBadValue, "private-key: expected certificate, too"};
   const std::string index = settings_.root + "/index.html";
   if (!g_file_test (index.c_str (), G_FILE_TEST_IS_REGULAR))
     return {StatusCode::kNotFound,
         "root: expected the folder of the page, but there is no '" + index + "'"};
   for (const auto &[name, address, scheme] :
-      {std::tuple ("stun-server", settings_.stun_server, "stun://"),
-          std::tuple ("turn-server", settings_.turn_server, "turn")})
+      {std::tuple ("stun-server", settings_.stun_server, "stun://HOST:PORT"),
+          std::tuple ("turn-server", settings_.turn_server, "turn://USER:PASSWORD@HOST:PORT")})
     if (!address.empty () &&
-        (!address.starts_with (scheme) ||
+        (!address.starts_with (std::string_view (scheme).substr (0, 7)) ||
+            (*name == 't' && address.find ('@') == address.npos) ||
             !g_uri_is_valid (address.c_str (), G_URI_FLAGS_HAS_PASSWORD, nullptr)))
-      return {StatusCode::kBadValue,
-          std::string (name) + ": expected " +
-              (*name == 's' ? "stun://HOST:PORT" : "turn://USER:PASSWORD@HOST:PORT") + ", got '" +
-              address + "'"};
+      return {StatusCode::kBadValue, std::string (name) + ": expected " + scheme};
   g_main_context_push_thread_default (context_);
   soup_ = soup_server_new ("server-header", "rangewebsink", nullptr);
   Status status = load_certificate ();
@@ -286,10 +297,47 @@ Server::add_handlers ()
     soup_message_headers_replace (
         soup_server_message_get_response_headers (message), "Connection", "close");
   };
+  /* No request has a body of use; libsoup would keep it in memory. */
+  const auto without_body = [] (SoupServer *, SoupServerMessage *message, gpointer) {
+    soup_message_body_set_accumulate (soup_server_message_get_request_body (message), FALSE);
+  };
+  const SoupServerCallback check_host = [] (SoupServer *, SoupServerMessage *message, const char *,
+                                            GHashTable *, gpointer self) {
+    auto server = static_cast<Server *> (self);
+    if (server->is_own_host (message))
+      return;
+    GST_WARNING_OBJECT (server->element_, "refusing %s: it asks for another host, '%s'",
+        soup_server_message_get_remote_host (message),
+        soup_message_headers_get_one (soup_server_message_get_request_headers (message), "Host"));
+    soup_server_message_set_status (message, SOUP_STATUS_MISDIRECTED_REQUEST, nullptr);
+  };
   g_signal_connect (soup_, "request-started", GCallback (+once), nullptr);
+  g_signal_connect (soup_, "request-started", GCallback (+without_body), nullptr);
+  soup_server_add_early_handler (soup_, "/", check_host, this, nullptr);
   soup_server_add_early_handler (soup_, "/stream", early, this, nullptr);
   soup_server_add_handler (soup_, "/stream", upgrade, this, nullptr);
   soup_server_add_handler (soup_, "/", file, this, nullptr);
+}
+
+/* Without token and TLS, whoever makes a name of their own point here could let a browser of this
+ * network read the stream for their page (DNS rebinding). Addresses, names without a dot and
+ * .local are no such names; origins lists others. */
+bool
+Server::is_own_host (SoupServerMessage *message) const
+{
+  if (settings_.has_token () || !settings_.certificate.empty ())
+    return true;
+  const char *value =
+      soup_message_headers_get_one (soup_server_message_get_request_headers (message), "Host");
+  g_autofree gchar *host = nullptr;
+  if (!value || !g_uri_split_network ((std::string ("http://") + value).c_str (), G_URI_FLAGS_NONE,
+                    nullptr, &host, nullptr, nullptr))
+    return false;
+  if (g_hostname_is_ip_address (host) || !std::strchr (host, '.') ||
+      std::string_view (host).ends_with (".local"))
+    return true;
+  g_auto (GStrv) origins = g_strsplit (settings_.origins.c_str (), " ", -1);
+  return g_strv_contains (origins, (std::string ("http://") + value).c_str ());
 }
 
 bool
@@ -315,6 +363,10 @@ Server::answer (SoupServerMessage *message, const char *path)
   soup_message_headers_append (headers, "Cache-Control", "no-cache");
   soup_message_headers_append (headers, "X-Content-Type-Options", "nosniff");
   soup_message_headers_append (headers, "Referrer-Policy", "no-referrer");
+  soup_message_headers_append (headers, "Content-Security-Policy",
+      "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; "
+      "img-src 'self' data: blob:; connect-src *; object-src 'none'; base-uri 'none'; "
+      "frame-ancestors 'none'");
   const char *method = soup_server_message_get_method (message);
   if (method != SOUP_METHOD_GET && method != SOUP_METHOD_HEAD)
     return soup_server_message_set_status (message, SOUP_STATUS_METHOD_NOT_ALLOWED, nullptr);
@@ -374,11 +426,27 @@ Server::upgrade (SoupServerMessage *message, const char *path)
   g_signal_connect (message, "wrote-informational", GCallback (+complete), this);
 }
 
+/* Clients that were not let in do not keep others out. */
+void
+Server::drop_waiting_client ()
+{
+  const auto waiting =
+      std::ranges::find_if (clients_, [] (const auto &one) { return !one->was_let_in (); });
+  if (waiting == clients_.end ())
+    return;
+  GST_INFO_OBJECT (element_, "%s makes room for others", (*waiting)->label ().c_str ());
+  (*waiting)->close (kCloseLimit, "too many connections without hello");
+  closed (**waiting);
+}
+
 void
 Server::accept (SoupServerMessage *message)
 {
   g_autofree gchar *host = g_strdup (soup_server_message_get_remote_host (message));
   g_autoptr (GUri) uri = g_uri_ref (soup_server_message_get_uri (message));
+  /* Who acknowledges but reads nothing must not let libsoup's queue grow. */
+  g_socket_set_option (soup_server_message_get_socket (message), IPPROTO_TCP, TCP_USER_TIMEOUT,
+      kMaxUnread_ms, nullptr);
   g_autoptr (GIOStream) connection = soup_server_message_steal_connection (message);
   const auto gone = [] (gpointer count, GObject *) {
     const std::unique_ptr<ConnectionCount> connections (static_cast<ConnectionCount *> (count));
@@ -399,6 +467,8 @@ Server::accept (SoupServerMessage *message)
   g_object_set_data_full (G_OBJECT (stream), "connection", g_object_ref (connection), close);
   g_autoptr (SoupWebsocketConnection) socket = soup_websocket_connection_new (
       stream, uri, SOUP_WEBSOCKET_CONNECTION_SERVER, nullptr, kSubprotocol, nullptr);
+  if (clients_.size () >= settings_.max_clients)
+    drop_waiting_client ();
   const bool full = clients_.size () >= settings_.max_clients;
   {
     std::lock_guard guard (lock_);
@@ -464,6 +534,14 @@ Server::welcome ()
   if (!caps.empty ())
     json += ",\"caps\":" + json_string (caps);
   return json + "}";
+}
+
+bool
+Server::offers_rtc ()
+{
+  if (rtc_ && !DataChannel::has_room ())
+    GST_WARNING_OBJECT (element_, "no file descriptors for another data channel");
+  return rtc_ && DataChannel::has_room ();
 }
 
 void

@@ -72,7 +72,7 @@ private:
   bool admit (const std::string &token, std::string &name) override;
   void request_key (Client &client) override;
   std::string welcome () override;
-  bool offers_rtc () override { return rtc_; }
+  bool offers_rtc () override;
   GMainContext *context () override { return context_; }
   void entered (Client &client) override;
   void closed (Client &client) override;
@@ -88,7 +88,9 @@ private:
   void deliver ();
   void upgrade (SoupServerMessage *message, const char *path);
   void accept (SoupServerMessage *message);
+  void drop_waiting_client ();
   void answer (SoupServerMessage *message, const char *path);
+  [[nodiscard]] bool is_own_host (SoupServerMessage *message) const;
   [[nodiscard]] bool is_own_origin (SoupServerMessage *message) const;
   void tick ();
   void send_stats ();

@@ -81,7 +81,8 @@ StatsBoard::add (std::string_view datagram)
   const Key key (shortened (host->c_str ()), shortened (name->c_str ()),
       shortened (message->text ("pad").value_or ("").c_str ()));
   if (rows_.size () >= kMaxRows && !rows_.contains (key))
-    return false;
+    rows_.erase (std::ranges::min_element (
+        rows_, {}, [] (const auto &row) { return row.second.arrived_us; }));
   rows_[key] = {copy_report (*message), g_get_monotonic_time (), ++count_};
   return true;
 }

@@ -139,7 +139,7 @@ export class Connection {
     if (this.want.includes ('stream'))
       this.silence = this.later (() => {
         if (this.stateName !== 'ended')
-          this.say (this.stateName === 'receiving' ? 'No frame sets have come for some seconds; the server is there.'
+          this.say (this.stateName === 'receiving' ? 'No frame sets have come for some seconds.'
             : 'The server has no stream at the moment; this page waits for it.');
       }, SILENCE);
   }
@@ -151,7 +151,7 @@ export class Connection {
     this.socket = null;
     if (this.closed)
       return;
-    const detail = reason && reason !== meaning.text ? `: ${reason.replace (/\.$/, '')}` : '';
+    const detail = reason && !(code === 4401 && !this.token) && reason !== meaning.text ? `: ${reason.replace (/\.$/, '')}` : '';
     if (wait === undefined) {
       this.say (`${meaning.text}${detail}.`, 'error');
       return this.state (meaning.token ? 'token' : 'closed');
@@ -173,13 +173,15 @@ export class Connection {
     this.forgetTimers ();
     this.socket?.close ();
   }
-  // Anew at once: the decoder has forgotten the stream.
+  // Anew: the decoder has forgotten the stream.
   reopen () {
     const { socket } = this;
     this.socket = null;
     socket?.close ();
+    this.forgetTimers ();
+    this.state ('connecting');
     if (!this.closed)
-      this.open ();
+      this.later (() => this.open (), FIRST_WAIT);
   }
 
   // ---- frame sets ----

@@ -60,5 +60,8 @@ export class LiveSource {
   // ---- the page's data channel ----
 
   signal ({ message }) { this.connection.send (message); }
-  transmit ({ data }) { this.connection.receive (data, 'WebRTC'); }
+  transmit ({ data }) {
+    if (this.connection.welcomed) // else it is of the connection before
+      this.connection.receive (data, 'WebRTC');
+  }
 }

@@ -248,7 +248,7 @@ class Page {
       event.preventDefault ();
       say ('');
       element ('token').hidden = true;
-      keepToken (element ('token-text').value);
+      keepToken (this.server.url, element ('token-text').value);
       this.openLive (this.server.url, element ('token-text').value);
     };
     element ('file').onchange = ({ target }) => target.files[0] && this.open (target.files[0]);
@@ -280,13 +280,14 @@ try {
   window.rangecastPage = page; // for tests and for the curious
   if (parameters.has ('src'))
     page.open (new URL (parameters.get ('src'), location).href);
-  else if (parameters.has ('server'))
-    page.openLive (new URL (parameters.get ('server'), location).href.replace (/^http/, 'ws'), takeToken ());
-  else {
+  else if (parameters.has ('server')) {
+    const url = new URL (parameters.get ('server'), location).href.replace (/^http/, 'ws');
+    page.openLive (url, takeToken (url));
+  } else {
     const server = await findServer ();
     if (server) {
       document.title = server.title || document.title;
-      page.openLive (server.url, takeToken ());
+      page.openLive (server.url, takeToken (server.url));
     } else
       element ('welcome').hidden = false;
   }

@@ -13,7 +13,8 @@ export const readMessage = (buffer) => {
   const message = { key: Boolean (view.getUint8 (1) & 1), discontinuity: Boolean (view.getUint8 (1) & 2), count: view.getUint16 (2, true),
     frameSet: view.getUint32 (4, true), index: view.getUint16 (8, true), number: view.getUint32 (12, true), dropped: view.getUint32 (16, true),
     delay: delay === UNKNOWN ? 0 : delay / 1000, sent: Number (view.getBigUint64 (24, true)) / 1000, units: new Uint8Array (buffer, HEADER) };
-  return view.getUint8 (0) === 1 && message.index < message.count ? message : null;
+  message.kind = view.getUint8 (0);
+  return message.kind !== 1 || message.index < message.count ? message : null;
 };
 
 // a - b of numbers modulo 2^32
@@ -43,6 +44,8 @@ export class FrameAssembler {
     const message = readMessage (buffer);
     if (!message)
       return false;
+    if (message.kind !== 1)
+      return true; // of a later version of the protocol
     this.received++;
     this.next = Math.max (this.next, message.number + 1);
     if (this.last !== null && difference (message.frameSet, this.last) <= 0)

@@ -71,7 +71,7 @@ class Dashboard {
     this.warnings = [];
     element ('token').onsubmit = (event) => {
       event.preventDefault ();
-      keepToken (element ('token-text').value);
+      keepToken (this.url, element ('token-text').value);
       this.connect (element ('token-text').value);
     };
     this.connect (token);
@@ -202,7 +202,7 @@ try {
   if (!server)
     throw new Error ('This page was not served by rangewebsink, which knows the rig.');
   const module = await WebAssembly.compile (await (await fetch ('rangecast.wasm')).arrayBuffer ());
-  window.rangecastDashboard = new Dashboard (module, server.url, takeToken ());
+  window.rangecastDashboard = new Dashboard (module, server.url, takeToken (server.url));
 } catch (error) {
   say (error.message);
 }

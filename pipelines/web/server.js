@@ -12,15 +12,17 @@ export const findServer = async () => {
   }
 };
 
-export const keepToken = (token) => sessionStorage.setItem ('rangecast-token', token);
+// Each server has its own.
+const place = (url) => `rangecast-token ${url}`;
+export const keepToken = (url, token) => sessionStorage.setItem (place (url), token);
 
 // The token of the address's fragment. It is removed from there, so that it is not shown and not passed on with a copied link, and
-// kept for when this tab loads the page anew. @return undefined if there is none
-export const takeToken = () => {
+// kept for when this tab loads the page anew. url: of the server. @return undefined if there is none
+export const takeToken = (url) => {
   const token = new URLSearchParams (location.hash.slice (1)).get ('token');
   if (token !== null) {
     history.replaceState (null, '', location.pathname + location.search);
-    keepToken (token);
+    keepToken (url, token);
   }
-  return token ?? sessionStorage.getItem ('rangecast-token') ?? undefined;
+  return token ?? sessionStorage.getItem (place (url)) ?? undefined;
 };

@@ -313,7 +313,8 @@ GST_START_TEST (test_clients_beyond_the_maximum_are_refused_until_one_leaves)
   WebSink sink ("max-clients=2");
   WebClient one (sink), two (sink);
   one.enter ();
-  for (int i = 0; i < 3; i++) { /* who has not introduced himself counts, too */
+  two.enter ();
+  for (int i = 0; i < 3; i++) {
     WebClient third (sink);
     fail_unless_equals_int (third.close_code (), 4429);
   }
@@ -327,7 +328,67 @@ GST_START_TEST (test_clients_beyond_the_maximum_are_refused_until_one_leaves)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_clients_without_hello_do_not_keep_others_out)
+{
+  WebSink sink ("max-clients=2");
+  WebClient one (sink);
+  one.enter ();
+  for (int i = 0; i < 5; i++) {
+    WebClient silent (sink);
+    WebClient next (sink);
+    next.enter ();
+    fail_unless_equals_int (silent.close_code (), 4429);
+    next.close ();
+    fail_unless_happens (sink.stat ("clients") == 1);
+  }
+  one.round_trip ();
+}
+GST_END_TEST;
+
+GST_START_TEST (test_acknowledgement_of_what_was_not_sent_ends_the_connection)
+{
+  WebSink sink;
+  WebClient client (sink);
+  client.enter ();
+  client.send (R"({"type":"ack","frameSet":1000000})");
+  fail_unless_equals_int (client.close_code (), 4400);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pongs_do_not_make_room_for_more_fragments)
+{
+  WebSink sink;
+  Witness witness (sink);
+  RawClient endless (sink.port ());
+  endless.upgrade ();
+  const std::string part (1000, 'x');
+  endless.send (masked_frame (0x01, part));
+  for (int i = 0; i < 100; i++)
+    endless.send (masked_frame (0x8a, "") + masked_frame (0x00, part));
+  endless.receive (); /* ends */
+  witness.go_on ();
+}
+GST_END_TEST;
+
 /* ---- the handshake ---- */
+
+GST_START_TEST (test_names_that_others_may_own_are_refused_without_a_token)
+{
+  const auto status = [] (const WebSink &sink, const std::string &host) {
+    RawClient client (sink.port ());
+    client.send ("GET /server.json HTTP/1.1\r\nHost: " + host + "\r\n\r\n");
+    return client.receive ("\r\n").substr (9, 3);
+  };
+  WebSink open ("origins=http://studio.example.org:8080"), closed ("token=right");
+  for (const char *host : {"evil.example", "evil.example:8080", "localhost.evil.example",
+           "studio.example.org", "127.0.0.1.evil.example"})
+    fail_unless_cmp (status (open, host), !=, "200");
+  for (const char *host : {"127.0.0.1:1", "localhost", "localhost:8080", "[::1]:8080", "studio",
+           "studio.local:80", "studio.example.org:8080"})
+    fail_unless_cmp (status (open, host), ==, "200");
+  fail_unless_cmp (status (closed, "studio.example.org"), ==, "200");
+}
+GST_END_TEST;
 
 GST_START_TEST (test_pages_of_other_origins_are_refused)
 {
@@ -480,7 +541,7 @@ GST_START_TEST (test_connections_that_ended_leave_no_descriptors)
       WebClient client (sink);
       client.enter (R"("token":"right")");
       WebClient refused (sink);
-      fail_unless_equals_int (refused.close_code (), 4429);
+      refused.enter (R"("token":"right")");
     }
     fail_unless_happens (sink.stat ("clients") == 1);
     witness.go_on ();
@@ -616,6 +677,10 @@ rangewebsinkclients_suite ()
   tcase_add_test (tc, test_message_in_many_fragments_is_one_message);
   tcase_add_test (tc, test_client_without_hello_is_closed_after_its_time);
   tcase_add_test (tc, test_clients_beyond_the_maximum_are_refused_until_one_leaves);
+  tcase_add_test (tc, test_clients_without_hello_do_not_keep_others_out);
+  tcase_add_test (tc, test_acknowledgement_of_what_was_not_sent_ends_the_connection);
+  tcase_add_test (tc, test_pongs_do_not_make_room_for_more_fragments);
+  tcase_add_test (tc, test_names_that_others_may_own_are_refused_without_a_token);
   tcase_add_test (tc, test_pages_of_other_origins_are_refused);
   tcase_add_test (tc, test_subprotocol_must_be_offered);
   tcase_add_test (tc, test_stream_without_an_upgrade_is_a_bad_request);
