@@ -304,13 +304,16 @@ public:
   {
     send (R"({"type":"ack","frameSet":)" + std::to_string (number) + "}");
   }
-  /** Waits until the server has handled all that was sent, and all that it sent before is here. */
+  /** Waits until the server has handled all that was sent and pushed, and all that it sent before
+   * is here. Twice: what was pushed and the first ping may be handled in any order. */
   void round_trip ()
   {
-    const guint expected = ++pings_;
-    send (R"({"type":"ping","time":)" + std::to_string (expected) + "}");
-    fail_unless_happens (pongs_ == expected || closed);
-    fail_if (closed, "closed: %d %s", code, reason.c_str ());
+    for (int i = 0; i < 2; i++) {
+      const guint expected = ++pings_;
+      send (R"({"type":"ping","time":)" + std::to_string (expected) + "}");
+      fail_unless_happens (pongs_ == expected || closed);
+      fail_if (closed, "closed: %d %s", code, reason.c_str ());
+    }
   }
   /** Introduces itself and waits for the welcome. */
   void enter (const std::string &fields = "")
