@@ -34,6 +34,8 @@ public:
   [[nodiscard]] std::uint16_t code (std::uint16_t depth) const { return codes_[depth]; }
   /** The depth of a code below codes(), depth units. */
   [[nodiscard]] std::uint16_t depth (std::uint16_t code) const { return depths_[code]; }
+  /** Depths of all codes. */
+  [[nodiscard]] const std::uint16_t *depths () const { return depths_.data (); }
   /** Number of codes; decoders refuse others. */
   [[nodiscard]] int codes () const { return static_cast<int> (depths_.size ()); }
   /** Greatest change of a depth, depth units, by quantisation and a change of its code by up to

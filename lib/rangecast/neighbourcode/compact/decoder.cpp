@@ -44,6 +44,53 @@ shown_as (PixelCode code, const CompactQuantisers &quantisers, const PixelLimits
   return rgb | depth << 32;
 }
 
+/* A run of valid pixels as it goes into the image. Some more of the row, which has so many columns,
+ * may be written, too: invalid ones as 0. */
+inline void
+show (const PixelCode *codes, std::size_t begin, std::size_t end, std::size_t columns,
+    const CompactQuantisers &quantisers, const PixelLimits &limits, std::uint16_t *depth,
+    Rgbx *colour)
+{
+  const std::uint16_t *const depths = quantisers.depth.depths ();
+  for (std::size_t x = begin; x < end; x++)
+    depth[x] = depths[codes[x] & 0xffff];
+  std::size_t x = begin;
+  if (std::endian::native == std::endian::little && quantisers.colour.bits () == 8) {
+    /* Four pixels at once, see to_rgb(). */
+    typedef std::int16_t Four __attribute__ ((vector_size (32)));
+    typedef std::uint64_t Codes __attribute__ ((vector_size (32)));
+    typedef std::uint8_t Shown __attribute__ ((vector_size (16)));
+    constexpr std::size_t step = sizeof (Four) / sizeof (PixelCode);
+    const Four zero = {}, most = zero + 255;
+    for (; x < end && x + step <= columns; x += step) {
+      Four c;
+      std::memcpy (&c, codes + x, sizeof c);
+      const auto valid = reinterpret_cast<Four> (reinterpret_cast<Codes> (c) != kNoPixel);
+      const Four half = c >> 1;
+      /* From depth, Y, Co, Cg to R, G, B, 0. */
+      const Four y =
+          __builtin_shufflevector (c, zero, 1, 1, 1, 16, 5, 5, 5, 16, 9, 9, 9, 16, 13, 13, 13, 16);
+      const Four plus = __builtin_shufflevector (
+          c, zero, 2, 3, 16, 16, 6, 7, 16, 16, 10, 11, 16, 16, 14, 15, 16, 16);
+      const Four cg = __builtin_shufflevector (
+          half, zero, 3, 3, 3, 16, 7, 7, 7, 16, 11, 11, 11, 16, 15, 15, 15, 16);
+      const Four co = __builtin_shufflevector (
+          half, zero, 2, 16, 2, 16, 6, 16, 6, 16, 10, 16, 10, 16, 14, 16, 14, 16);
+      Four rgb = y - cg + (plus - co);
+      rgb = (rgb > 0 ? rgb : zero) & valid;
+      rgb = rgb < most ? rgb : most;
+      const Shown shown = __builtin_convertvector(rgb, Shown);
+      std::memcpy (static_cast<void *> (colour + x), &shown, sizeof shown);
+    }
+  }
+  for (; x < end; x++) {
+    auto rgbx = static_cast<std::uint32_t> (shown_as (codes[x], quantisers, limits));
+    if constexpr (std::endian::native == std::endian::big)
+      rgbx = __builtin_bswap32 (rgbx);
+    std::memcpy (static_cast<void *> (colour + x), &rgbx, sizeof rgbx);
+  }
+}
+
 void
 write_row (const std::uint64_t *row, std::size_t columns, std::uint16_t *depth, Rgbx *colour)
 {
@@ -136,6 +183,130 @@ CompactDecoder::decode_run (
     shown[x] = left_shown;
   }
   last_ = left.code;
+  slice_code = code;
+  return true;
+}
+
+/* ---- packed, key slices ---- */
+
+/* predict() where all neighbours are valid, which is likely.
+ * @param above  context of the two pixels above and to the right */
+[[gnu::always_inline]] inline Components
+predict_packed (
+    PixelCode left, const PixelCode *upper, unsigned above, PixelCode last, Components max)
+{
+  if (left == kNoPixel || upper[-1] == kNoPixel || (above & PackedStep::context (0xc)) == 0 ||
+      (above & PackedStep::context (0x30)) == 0) [[unlikely]]
+    return predict (left, upper, last, max);
+  const Components l = components_of (left), u = components_of (upper[0]);
+  const Components mean = (2 * l + u + components_of (upper[1]) + 2) >> 2;
+  const Components plane = clamped (l + u - components_of (upper[-1]), Components{}, max);
+  const Components depth_only = {-1, 0, 0, 0};
+  return (mean & ~depth_only) | (plane & depth_only);
+}
+
+/* Decodes a run of valid pixels, which follows an invalid one: as decode_run(), but of the
+ * neighbours there are only their kinds, and shown pixels come later. */
+inline bool
+CompactDecoder::decode_packed_run (PackedReader &slice_code, std::size_t begin, std::size_t end)
+{
+  PixelCode *const codes = row_.codes ();
+  const PixelCode *const upper = upper_.codes ();
+  std::uint8_t *const kinds = kinds_.data () + 1;
+  const std::uint16_t *const contexts = contexts_.data ();
+  const PixelCode upper_left = upper[static_cast<std::ptrdiff_t> (begin) - 1];
+  const Components steps = steps_;
+  const PixelLimits limits = limits_;
+  PixelCode left = kNoPixel;
+  std::uint32_t left_kind = 0;
+  bool no_code = contexts[begin] == 0 && upper_left == kNoPixel; /* no neighbour: no choice */
+  PackedReader code = slice_code;
+  for (std::size_t x = begin; x < end; x++) {
+    const std::uint32_t context = contexts[x] + left_kind;
+    const PackedStep step = code.next_step (context);
+    const unsigned chosen = no_code ? unsigned{kCorrect} : step.chosen ();
+    if (chosen < kPredict) [[likely]] {
+      code.take_step (step);
+      left = select (
+          zero_mask (chosen), left, upper[static_cast<std::ptrdiff_t> (x + chosen) - kTakeUpper]);
+      if (left == kNoPixel) /* equals an invalid one */
+        return false;
+      left_kind = step.kind ();
+    } else {
+      if (chosen > kCorrect)
+        return false;
+      Components made = predict_packed (left, upper + x, contexts[x], last_, limits.max);
+      if (chosen == kCorrect) {
+        if (!no_code)
+          code.take_correct (context);
+        Components residual;
+        if (!code.residual (!no_code, residual))
+          return false;
+        made = correct (made, residual, steps, limits);
+      } else {
+        code.take_step (step);
+      }
+      left = pack_components (made);
+      left_kind = PackedStep::context (3);
+      no_code = false;
+    }
+    codes[x] = left;
+    kinds[x] = static_cast<std::uint8_t> (left_kind >> kMaxChoiceBits);
+  }
+  last_ = left;
+  slice_code = code;
+  return true;
+}
+
+bool
+CompactDecoder::decode_packed_row (PackedReader &code, const CompactQuantisers &quantisers,
+    int columns, std::uint16_t *depth, Rgbx *colour, std::uint64_t &points)
+{
+  if (!decode_run_ends (code, columns))
+    return false;
+  return for_this_cpu ([&, width = static_cast<std::size_t> (columns)] {
+    std::uint8_t *const kinds = kinds_.data () + 1;
+    std::uint16_t *const contexts = contexts_.data ();
+    for (std::size_t x = 0, n = width; x < n; x++) /* a copy: bytes may alias what is captured */
+      contexts[x] = static_cast<std::uint16_t> (
+          PackedStep::context (unsigned{kinds[x]} << 2 | unsigned{kinds[x + 1]} << 4));
+    std::fill_n (row_.codes (), width, kNoPixel);
+    std::fill_n (kinds, width, std::uint8_t{0});
+    std::fill_n (depth, width, std::uint16_t{0});
+    std::fill_n (colour, width, Rgbx{});
+    for (std::size_t i = 1; i < runs_.size (); i += 2) { /* of valid pixels */
+      const auto begin = static_cast<std::size_t> (runs_[i - 1]);
+      const auto end = static_cast<std::size_t> (runs_[i]);
+      if (!decode_packed_run (code, begin, end))
+        return false;
+      points += end - begin;
+      show (row_.codes (), begin, end, width, quantisers, limits_, depth, colour);
+    }
+    return !code.overrun ();
+  });
+}
+
+/* The same as decode_runs(), with bits for the pixels. */
+bool
+CompactDecoder::decode_run_ends (PackedReader &slice_code, int columns)
+{
+  PackedReader code = slice_code;
+  std::ranges::fill (valid_, std::uint32_t{0});
+  runs_.clear ();
+  bool now = false;
+  for (int x = 0; x < columns; now = !now) {
+    std::int32_t later = 0;
+    if (!code.run (now, later))
+      return false;
+    const int end = bits_end (upper_valid_, x, now, columns) + later;
+    if (end > columns || end < x || (end == x && (x > 0 || now)))
+      return false;
+    if (now)
+      set_bits (valid_, x, end);
+    runs_.push_back (end);
+    x = end;
+  }
+  std::swap (valid_, upper_valid_);
   slice_code = code;
   return true;
 }
@@ -247,6 +418,13 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
   row_.reset (columns, 0);
   upper_.reset (columns, 0);
   runs_.reserve (most + 1);
+  kinds_.reserve (most + 2);
+  kinds_.assign (columns + 2, 0);
+  for (auto *valid : {&valid_, &upper_valid_}) {
+    valid->reserve (bit_words (most));
+    valid->assign (bit_words (columns), 0);
+  }
+  contexts_.resize (std::max (contexts_.size (), most));
   if constexpr (Delta) {
     earlier_codes_.reserve (most);
     motions_.reserve (most / kMotionBlock + 2);
@@ -262,11 +440,17 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
       if (!load_earlier (code, header, reference, y))
         return false;
     std::uint64_t points = 0, unknown = 0;
-    if (!decode_row<Code, Delta> (code, quantisers, header.columns, points))
-      return false;
     const int image_row = header.first_row + y;
-    write_row (row_.shown (), columns, image.depth.row (image_row) + header.first_column,
-        image.colour.row (image_row) + header.first_column);
+    std::uint16_t *const depth = image.depth.row (image_row) + header.first_column;
+    Rgbx *const colour = image.colour.row (image_row) + header.first_column;
+    if constexpr (std::is_same_v<Code, PackedReader> && !Delta) {
+      if (!decode_packed_row (code, quantisers, header.columns, depth, colour, points))
+        return false;
+    } else {
+      if (!decode_row<Code, Delta> (code, quantisers, header.columns, points))
+        return false;
+      write_row (row_.shown (), columns, depth, colour);
+    }
     if constexpr (Delta)
       for (int x = 0; x < header.columns; x++)
         if (row_.states ()[x] != 0 && row_.codes ()[x] == kNoPixel) {
@@ -277,7 +461,7 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
     decoded.unknown += unknown;
     if (reference.now)
       reference.now->keep (header.roi.x + header.first_column, header.roi.y + image_row,
-          row_.as_reference (columns));
+          Delta ? row_.as_reference (columns) : row_.as_key_reference (columns));
     std::swap (row_, upper_);
   }
   return code.at_clean_end ();

@@ -7,7 +7,7 @@
 
 #include "../../geometry/range_image.hpp"
 #include "encoder.hpp"
-#include "entropy_code.hpp"
+#include "packed_code.hpp"
 #include "row.hpp"
 
 namespace rangecast {
@@ -39,11 +39,20 @@ private:
   template <class Code, bool Delta>
   [[gnu::always_inline]] bool decode_run (
       Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
+  [[gnu::always_inline]] bool decode_packed_run (
+      PackedReader &slice_code, std::size_t begin, std::size_t end);
+  bool decode_run_ends (PackedReader &code, int columns);
+  bool decode_packed_row (PackedReader &code, const CompactQuantisers &quantisers, int columns,
+      std::uint16_t *depth, Rgbx *colour, std::uint64_t &points);
   template <class Code, bool Delta>
   [[gnu::always_inline]] bool decode_full (
       Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
 
   CompactRow row_, upper_;
+  std::vector<std::uint8_t> kinds_;      /* of the row and, before it is decoded, the one above: see
+                                            PixelState; with one before and after it */
+  std::vector<std::uint16_t> contexts_;  /* of the row above, see PackedStep */
+  PixelBits valid_, upper_valid_;        /* of the row and of the one above */
   std::vector<int> runs_;                /* ends of the row's runs */
   std::vector<PixelCode> earlier_codes_; /* pixels of the earlier frame set for the row */
   std::vector<BlockMotion> motions_;     /* of the blocks that the row touches */

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,8 +11,10 @@
 #include "../bitstream/encoder_result.hpp"
 #include "../bitstream/refresh.hpp"
 #include "entropy_code.hpp"
+#include "packed_code.hpp"
 #include "pixel_key.hpp"
 #include "row.hpp"
+#include "wave_memory.hpp"
 
 namespace rangecast {
 
@@ -38,6 +41,7 @@ struct CompactPicture {
   const ConstRangeImage &image;
   CodingReference reference;
   CompactQuantisers quantisers;
+  const PlainCodes &codes; ///< the same as quantisers
   CompactSettings settings;
   MotionMemory &motions; ///< of the view
   int refresh_rows;      ///< of the bands of its full image that refer to their own pixels only
@@ -84,7 +88,17 @@ private:
   void load_earlier (int y);
   void find_motions (const ConstRangeImage &image, int y, const RowBand &band);
   void resize (int columns);
+  void reserve_bytes ();
   [[nodiscard]] std::size_t header_size () const;
+
+  /* Waves: wave_encoder.cpp */
+  [[nodiscard]] bool can_do_waves (const CompactPicture &picture, bool key) const;
+  std::optional<bool> code_waves (
+      const CompactPicture &picture, const RowBand &band, std::vector<std::uint8_t> &to);
+  void begin_waves ();
+  int load_wave (const CompactPicture &picture, int y, int end);
+  void run_wave (int y, int rows);
+  void code_wave_row (PackedWriter &slice_code, int y, int row);
 
   CompactSettings settings_{};
   const CompactQuantisers *quantisers_ =
@@ -108,6 +122,7 @@ private:
   std::vector<PixelKey> earlier_keys_;
   std::vector<BlockMotion> motions_; /* of the blocks that the row touches */
   MotionSearch search_;
+  EncoderWaveMemory waves_;
   PixelCode last_ = kNoPixel;
   int refresh_rows_ = 1;
   int columns_ = 0;

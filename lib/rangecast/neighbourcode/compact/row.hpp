@@ -8,6 +8,44 @@
 
 namespace rangecast {
 
+/** @name Rows of one bit a pixel, set if it is valid @{ */
+inline constexpr int kBitsOfWord = 32;
+using PixelBits = std::vector<std::uint32_t>;
+
+constexpr std::size_t
+bit_words (std::size_t columns)
+{
+  return columns / kBitsOfWord + 1;
+}
+
+/** The first column from `begin` on whose bit is not `bit`, or `columns`. */
+inline int
+bits_end (const PixelBits &bits, int begin, bool bit, int columns)
+{
+  const std::uint32_t flip = bit ? ~std::uint32_t{0} : 0;
+  auto word = static_cast<std::size_t> (begin / kBitsOfWord);
+  std::uint32_t others = (bits[word] ^ flip) & ~std::uint32_t{0} << begin % kBitsOfWord;
+  while (others == 0 && word + 1 < bits.size ())
+    others = bits[++word] ^ flip;
+  return std::min (columns, static_cast<int> (word) * kBitsOfWord + std::countr_zero (others));
+}
+
+/** Sets the bits from `begin` to `end`, which is greater. */
+inline void
+set_bits (PixelBits &bits, int begin, int end)
+{
+  const auto first = static_cast<std::size_t> (begin / kBitsOfWord);
+  const auto last = static_cast<std::size_t> ((end - 1) / kBitsOfWord);
+  const std::uint32_t from = ~std::uint32_t{0} << begin % kBitsOfWord;
+  const std::uint32_t to = ~std::uint32_t{0} >> (kBitsOfWord - 1 - (end - 1) % kBitsOfWord);
+  bits[first] |= first == last ? from & to : from;
+  for (std::size_t word = first + 1; word < last; word++)
+    bits[word] = ~std::uint32_t{0};
+  if (first < last)
+    bits[last] |= to;
+}
+/** @} */
+
 /** A coded row of a slice in the profiles packed and entropy, the same in encoder and decoder. It
  *  has one invalid pixel before it and a few after it, because vectors read beyond its end. */
 class CompactRow {
@@ -57,6 +95,14 @@ public:
   {
     for (std::size_t x = 0; x < columns; x++)
       reference_[x] = states ()[x] != 0 ? codes ()[x] : kEmptyPixel;
+    return std::span (reference_).first (columns);
+  }
+
+  /** The same in key slices, where the codes alone tell which pixels are valid. */
+  [[nodiscard]] std::span<const PixelCode> as_key_reference (std::size_t columns)
+  {
+    for (std::size_t x = 0; x < columns; x++)
+      reference_[x] = codes ()[x] != kNoPixel ? codes ()[x] : kEmptyPixel;
     return std::span (reference_).first (columns);
   }
 
