@@ -15,7 +15,7 @@ trap 'rm -rf "$work"' EXIT
 cd "$work"
 
 gst-launch-1.0 -q -e avatartestsrc "${scene[@]}" ! video/x-range,width=640,height=480,framerate=4/1 ! neighbourcodeenc depth-threshold=0 colour-threshold=0 \
-  ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location=head.rcnc
+  ! filesink location=head.rcnc
 
 # Inside the display: $window gets keys, the pointer moves over the screen.
 take_pictures () {

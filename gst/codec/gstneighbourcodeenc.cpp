@@ -12,12 +12,16 @@
  * flag. Damage from losses ends after refresh-period at the latest.
  *
  * A buffer is a frame set, or a slice if downstream requires alignment=slice; the last slice of a
- * frame set has the MARKER flag.
+ * frame set has the MARKER flag. Where downstream takes anything, as filesink and tcpserversink do,
+ * it is a frame set of the byte stream (alignment=byte-stream), which plays without caps.
  *
- * ## Example launch line
+ * ## Example launch lines
  * |[
- * gst-launch-1.0 avatartestsrc num-buffers=30 ! neighbourcodeenc ! neighbourcodedec ! plyenc !
- * multifilesink location=cloud-%05d.ply
+ * gst-launch-1.0 avatartestsrc num-buffers=60 ! neighbourcodeenc ! filesink location=head.rcnc
+ * ]|
+ * |[
+ * gst-launch-1.0 filesrc location=head.rcnc ! neighbourcodeparse ! neighbourcodedec !
+ * cylinderfilter ! striprender ! glimagesink
  * ]|
  *
  * Since: 0.1
@@ -42,6 +46,7 @@
 #include "common/streamlock.hpp"
 #include "encsettings.hpp"
 #include "keyunitrequests.hpp"
+#include "streamprefixes.hpp"
 
 using rangecast::EncoderResult;
 using rangecast::EncoderSettings;
@@ -82,7 +87,8 @@ struct GstNeighbourCodeEncPrivate {
   bool is_key = true;                          /* the frame set in encoder */
   GstClockTime last_key = GST_CLOCK_TIME_NONE; /* running time */
   RecycledMemories memories;
-  bool by_slices = false;          /* alignment of the output */
+  bool by_slices = false, writes_stream = false; /* alignment of the output */
+  StreamPrefixes prefixes;                       /* writes_stream */
   GstBuffer *input = nullptr;      /* the frame set in encoder, until all of it is pushed */
   std::size_t part = 0;            /* by_slices: the next of encoder's parts */
   rangecast::UnitReader units{{}}; /* by_slices: rest of the previous part */
@@ -96,8 +102,11 @@ struct _GstNeighbourCodeEnc {
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
-static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
-    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
+static GstStaticPadTemplate src_template =
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
+        GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
+            ", version = (int) 2, alignment = (string) { access-unit, slice, byte-stream "
+            "}, " GST_RANGE_SIZE_CAPS_));
 
 G_DEFINE_TYPE (GstNeighbourCodeEnc, gst_neighbour_code_enc, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
@@ -109,7 +118,35 @@ static GstCaps *
 gst_neighbour_code_enc_transform_caps (
     GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *filter)
 {
-  return gstrange::recode_caps (caps, direction == GST_PAD_SINK, filter);
+  if (direction == GST_PAD_SRC)
+    return gstrange::recode_caps (caps, false, filter);
+  GstCaps *coded = gstrange::recode_caps (caps, true, nullptr);
+  GstCaps *stream = gst_caps_copy (coded);
+  gst_caps_set_simple (stream, "alignment", G_TYPE_STRING, "byte-stream", nullptr);
+  gst_caps_append (coded, stream);
+  if (filter) {
+    GstCaps *filtered = gst_caps_intersect_full (filter, coded, GST_CAPS_INTERSECT_FIRST);
+    gst_caps_unref (coded);
+    coded = filtered;
+  }
+  return coded;
+}
+
+static GstCaps *
+gst_neighbour_code_enc_fixate_caps (
+    GstBaseTransform *base, GstPadDirection direction, GstCaps *caps, GstCaps *other)
+{
+  if (direction == GST_PAD_SINK) {
+    GstCaps *wanted = gst_caps_new_simple (GST_NEIGHBOUR_CODE_MEDIA_TYPE, "alignment",
+        G_TYPE_STRING, preferred_alignment (GST_BASE_TRANSFORM_SRC_PAD (base)), nullptr);
+    GstCaps *preferred = gst_caps_intersect (other, wanted);
+    if (!gst_caps_is_empty (preferred))
+      gst_caps_replace (&other, preferred);
+    gst_caps_unref (preferred);
+    gst_caps_unref (wanted);
+  }
+  return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_enc_parent_class)
+      ->fixate_caps (base, direction, caps, other);
 }
 
 static gboolean
@@ -121,7 +158,11 @@ gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   priv->is_configured = false;
   priv->reporter.set_views (priv->info.rig);
   priv->encoder.request_key (); /* decoders reset their references at new caps */
-  priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
+  const gchar *alignment = gst_structure_get_string (structure, "alignment");
+  priv->by_slices = g_strcmp0 (alignment, "slice") == 0;
+  priv->writes_stream = g_strcmp0 (alignment, "byte-stream") == 0;
+  if (status.ok ())
+    priv->prefixes.set_rig (priv->info);
   gst_clear_buffer (&priv->input);
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
   return priv->caps_errors.accept (GST_ELEMENT (base), status);
@@ -315,6 +356,21 @@ make_output (GstNeighbourCodeEnc *self, std::span<const std::span<const guint8>>
   return buffer;
 }
 
+static void
+prepend_prefix (GstNeighbourCodeEncPrivate *priv, GstBuffer *access_unit)
+{
+  rangecast::AccessUnitHeader header;
+  rangecast::SliceHeader slice;
+  rangecast::UnitHeader unit;
+  const auto &parts = priv->encoder.parts ();
+  const auto first = parts.empty () ? std::nullopt : rangecast::UnitReader (parts[0]).next (unit);
+  if (first && rangecast::read_slice_header (*first, slice).ok ())
+    header.capture_time_ns = slice.capture_time_ns;
+  header.key = priv->is_key;
+  gst_buffer_prepend_memory (access_unit, priv->prefixes.make (header, GST_BUFFER_PTS (access_unit),
+                                              gst_buffer_get_size (access_unit)));
+}
+
 /* The encoder's next slice; empty after the last one. */
 static std::span<const guint8>
 next_slice (GstNeighbourCodeEncPrivate *priv)
@@ -375,7 +431,15 @@ gst_neighbour_code_enc_generate_output (GstBaseTransform *base, GstBuffer **outp
   if (priv->by_slices) {
     *output = make_slice (self);
   } else {
-    *output = make_output (self, priv->encoder.parts ());
+    if (priv->writes_stream && priv->encoder.size () > priv->prefixes.max_access_unit ())
+      GST_ELEMENT_ERROR (self, STREAM, ENCODE,
+          ("A frame set of %zu bytes: expected at most 32 MiB with its rig in a byte stream",
+              priv->encoder.size ()),
+          (nullptr));
+    else
+      *output = make_output (self, priv->encoder.parts ());
+    if (*output && priv->writes_stream)
+      prepend_prefix (priv, *output);
     gst_clear_buffer (&priv->input);
   }
   return *output ? GST_FLOW_OK : GST_FLOW_ERROR;
@@ -407,6 +471,7 @@ gst_neighbour_code_enc_sink_event (GstBaseTransform *base, GstEvent *event)
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
     priv->encoder.request_key ();
     priv->key_requests.reset ();
+    priv->prefixes.repeat_rig ();
   } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS) {
     priv->reporter.finish ();
   }
@@ -568,6 +633,7 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
   transform_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_stop);
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform_caps);
+  transform_class->fixate_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_fixate_caps);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_set_caps);
   transform_class->generate_output = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_generate_output);
   transform_class->transform = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform);

@@ -3,14 +3,16 @@
  * SECTION:element-neighbourcodeparse
  * @title: neighbourcodeparse
  *
- * Converts between files of coded frame sets and access units, as downstream requires. Parsing
+ * Converts between the byte stream of coded frame sets, as in files, and access units: to the byte
+ * stream where downstream's caps name no alignment, as those of filesink. Parsing
  * resumes at the next start code after damage. Files can be sought by time. Comes with a
  * typefinder.
  *
  * ## Example launch lines
  * |[
- * gst-launch-1.0 avatartestsrc num-buffers=60 ! neighbourcodeenc ! neighbourcodeparse !
- * application/x-neighbour-code,alignment=byte-stream ! filesink location=head.rcnc
+ * gst-launch-1.0 udpsrc port=5100
+ * caps="application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
+ * rtpneighbourcodedepay ! neighbourcodeparse ! filesink location=head.rcnc
  * ]|
  * Writes a file.
  * |[
@@ -40,10 +42,9 @@
 
 #include "common/codedunits.hpp"
 #include "seek.hpp"
+#include "streamprefixes.hpp"
 
 using rangecast::AccessUnitHeader;
-using rangecast::kAccessUnitHeaderSize;
-using rangecast::kStartCode;
 using rangecast::kStreamPrefixSize;
 using rangecast::SliceHeader;
 using rangecast::StreamPart;
@@ -58,8 +59,6 @@ namespace {
 
 using Bytes = std::span<const guint8>;
 
-/* The rig is repeated in the byte stream at this interval. */
-constexpr GstClockTime kRigInterval = GST_SECOND;
 /* Maximum bytes in front of the first access unit; a stream that begins with more is another type.
  */
 constexpr gsize kMaxLeadingRubbish = 2 << 20;
@@ -87,8 +86,7 @@ struct Stream {               /* streaming thread only */
   std::vector<Range> output;         /* units of the current access unit but rig views */
 
   rangecast::KeyCheck key_check;
-  std::vector<guint8> rig_units; /* of the sink caps, for the byte stream */
-  GstClockTime last_rig = GST_CLOCK_TIME_NONE;
+  StreamPrefixes prefixes; /* from access units */
 };
 
 } // namespace
@@ -146,23 +144,6 @@ GST_ELEMENT_REGISTER_DEFINE_CUSTOM (neighbourcodeparse, register_with_typefinder
 
 /* ---- caps ---- */
 
-/* Access units are preferred. Queries the peer, because the base class makes the pad answer with
- * its current caps. */
-static bool
-downstream_wants_stream (GstBaseParse *base)
-{
-  GstPad *pad = GST_BASE_PARSE_SRC_PAD (base);
-  GstCaps *ours = gst_pad_get_pad_template_caps (pad);
-  GstCaps *allowed = gst_pad_peer_query_caps (pad, ours);
-  GstCaps *access_units = gst_caps_from_string (ACCESS_UNIT_CAPS);
-  const bool wants =
-      !gst_caps_is_empty (allowed) && !gst_caps_can_intersect (allowed, access_units);
-  gst_caps_unref (ours);
-  gst_caps_unref (allowed);
-  gst_caps_unref (access_units);
-  return wants;
-}
-
 /* After a frame or a discontinuity: requests no more than a header, until the size is known. */
 static void
 reset_min_frame_size (GstBaseParse *base)
@@ -176,9 +157,9 @@ set_source_caps (GstBaseParse *base)
 {
   Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)); /* clears the flag */
-  stream.writes_stream = downstream_wants_stream (base);
-  GstCaps *caps = gstrange::make_neighbour_code_caps (
-      stream.info, stream.writes_stream ? "byte-stream" : "access-unit");
+  const char *alignment = preferred_alignment (GST_BASE_PARSE_SRC_PAD (base));
+  stream.writes_stream = g_str_equal (alignment, "byte-stream");
+  GstCaps *caps = gstrange::make_neighbour_code_caps (stream.info, alignment);
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
   stream.src_caps_set = gst_pad_set_caps (GST_BASE_PARSE_SRC_PAD (base), caps);
   gst_caps_unref (caps);
@@ -209,10 +190,7 @@ gst_neighbour_code_parse_set_sink_caps (GstBaseParse *base, GstCaps *caps)
   const rangecast::Status status = gstrange::parse_caps (caps, stream.info);
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
     return FALSE;
-  stream.rig_units.clear ();
-  rangecast::write_rig_units (
-      {stream.info.rig, stream.info.fps_n, stream.info.fps_d}, stream.rig_units);
-  stream.last_rig = GST_CLOCK_TIME_NONE;
+  stream.prefixes.set_rig (stream.info);
   return set_source_caps (base);
 }
 
@@ -325,42 +303,16 @@ set_key (GstBuffer *buffer, bool key)
     GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
 }
 
-static bool
-rig_is_due (Stream &stream, GstClockTime pts)
-{
-  const GstClockTime last = stream.last_rig;
-  const bool due = !GST_CLOCK_TIME_IS_VALID (last) || !GST_CLOCK_TIME_IS_VALID (pts) ||
-                   pts < last || pts - last >= kRigInterval;
-  if (due)
-    stream.last_rig = pts;
-  return due;
-}
-
-/* Start code, header, and the rig if it is due. */
-static GstMemory *
-make_stream_prefix (AccessUnitHeader &header, Bytes rig, gsize access_unit_size)
-{
-  header.size = guint32 (rig.size () + access_unit_size);
-  const gsize size = kStreamPrefixSize + rig.size ();
-  auto bytes = static_cast<guint8 *> (g_malloc (size));
-  std::copy (kStartCode.begin (), kStartCode.end (), bytes);
-  rangecast::write_access_unit_header (header, bytes + kStartCode.size ());
-  std::copy (rig.begin (), rig.end (), bytes + kStreamPrefixSize);
-  return gst_memory_new_wrapped (GstMemoryFlags (0), bytes, size, 0, size, bytes, g_free);
-}
-
 /* The access unit in the byte stream; its own bytes are shared, not copied. */
 static GstBuffer *
-make_stream_buffer (Stream &stream, GstBuffer *access_unit, AccessUnitHeader header)
+make_stream_buffer (Stream &stream, GstBuffer *access_unit, const AccessUnitHeader &header)
 {
-  header.pts_ns = GST_BUFFER_PTS (access_unit);
-  const Bytes rig = rig_is_due (stream, header.pts_ns) ? Bytes (stream.rig_units) : Bytes ();
   GstBuffer *buffer = gst_buffer_copy_region (access_unit,
       GstBufferCopyFlags (
           GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS | GST_BUFFER_COPY_MEMORY),
       0, gst_buffer_get_size (access_unit));
-  gst_buffer_prepend_memory (
-      buffer, make_stream_prefix (header, rig, gst_buffer_get_size (access_unit)));
+  gst_buffer_prepend_memory (buffer, stream.prefixes.make (header, GST_BUFFER_PTS (access_unit),
+                                         gst_buffer_get_size (access_unit)));
   return buffer;
 }
 
@@ -387,7 +339,7 @@ handle_access_unit (GstBaseParse *base, GstBaseParseFrame *frame)
   const gsize size = gst_buffer_get_size (frame->buffer);
   if (gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)) && !set_source_caps (base))
     return caps_refused_flow (base);
-  if (size + stream.rig_units.size () > rangecast::kMaxAccessUnitSize)
+  if (size > stream.prefixes.max_access_unit ())
     return refuse_long_access_unit (base, size);
   AccessUnitHeader header;
   if (!summarise (frame->buffer, stream.key_check, header))
@@ -663,7 +615,7 @@ handle_key_unit_event (GstBaseParse *base, GstEvent *event)
       gst_video_event_parse_downstream_force_key_unit (
           event, nullptr, nullptr, nullptr, &all_headers, nullptr) &&
       all_headers)
-    GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.last_rig = GST_CLOCK_TIME_NONE;
+    GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.prefixes.repeat_rig ();
 }
 
 static gboolean
@@ -736,8 +688,8 @@ gst_neighbour_code_parse_class_init (GstNeighbourCodeParseClass *klass)
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Neighbour code parser",
-      "Codec/Parser/Video", "Converts between neighbour code byte streams and access units",
-      "gst-rangecast");
+      "Codec/Parser/Converter/Video",
+      "Converts between neighbour code byte streams and access units", "gst-rangecast");
 
   parse_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_start);
   parse_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_stop);

@@ -55,7 +55,8 @@ buffer_of (const std::vector<std::vector<guint8>> &units, GstClockTime time = 0)
   return buffer;
 }
 
-/** One element with its properties, which gst_harness_new_parse() would hide in a bin. */
+/** One element with its properties, which gst_harness_new_parse() would hide in a bin. Encoder and
+ * parser are asked for access units, until other sink caps are set. */
 inline GstHarness *
 harness_of (const std::string &launch)
 {
@@ -63,6 +64,8 @@ harness_of (const std::string &launch)
   fail_unless (element != nullptr);
   GstHarness *h = gst_harness_new_with_element (element, "sink", "src");
   gst_object_unref (element);
+  if (launch.starts_with ("neighbourcodeenc") || launch.starts_with ("neighbourcodeparse"))
+    gst_harness_set_sink_caps_str (h, kAccessUnitsOrSlices);
   return h;
 }
 

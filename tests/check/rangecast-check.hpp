@@ -83,6 +83,10 @@ make_frame_set (const Rig &rig, GstClockTime time = 0, Roi roi = {})
   return buffer;
 }
 
+/** For the sink of a harness, whose default takes anything and so is sent a byte stream. */
+inline constexpr const char *kAccessUnitsOrSlices =
+    "application/x-neighbour-code,alignment={access-unit,slice}";
+
 /** Waits for the bus's next error (or warning) and gives its text; empty if none came in 5 s. */
 inline std::string
 next_message_text (GstBus *bus, GstMessageType type)

@@ -9,9 +9,9 @@ source "$here/need-browser.sh"
 # The known scene, and what striprender makes of it from five angles.
 source=$work/scene.rcnc
 gst-launch-1.0 -q avatartestsrc views=4 num-buffers=1 range-person-only=true ! video/x-range,width=320,height=240,framerate=15/1 \
-  ! neighbourcodeenc ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$source"
+  ! neighbourcodeenc ! filesink "location=$source"
 gst-launch-1.0 -q avatartestsrc views=4 num-buffers=40 range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 \
-  ! neighbourcodeenc ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$work/moving.rcnc"
+  ! neighbourcodeenc ! filesink "location=$work/moving.rcnc"
 for mode in blend strips; do
   for angle in 0 -30 45 100 180; do
     gst-launch-1.0 -q filesrc "location=$source" ! neighbourcodeparse ! neighbourcodedec ! striprender "mode=$mode" fit=true "azimuth=$angle" \

@@ -27,6 +27,7 @@ encoded (const Rig &rig, GstBuffer *frame_set,
                           "colour-threshold=0")
 {
   GstHarness *h = harness (rig, encoder);
+  gst_harness_set_sink_caps_str (h, kAccessUnitsOrSlices);
   GstBuffer *buffer = gst_harness_push_and_pull (h, frame_set);
   gst_harness_teardown (h);
   return buffer;

@@ -358,7 +358,7 @@ GST_END_TEST;
 GST_START_TEST (test_access_units_pass_as_they_are)
 {
   const Recording recording;
-  GstHarness *h = gst_harness_new ("neighbourcodeparse");
+  GstHarness *h = harness_of ("neighbourcodeparse");
   gst_harness_set_src_caps (h, gstrange::make_neighbour_code_caps (
                                    gstrange::make_info (recording.rig, 25, 1), "access-unit"));
   for (GstBuffer *coded : recording.access_units) {

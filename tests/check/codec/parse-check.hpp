@@ -25,7 +25,7 @@ struct Recording {
   explicit Recording (int frames = 10, int width = 64, GstClockTime start = GST_SECOND)
       : rig (ring_rig (2, width, width * 3 / 4))
   {
-    GstHarness *encoder = gst_harness_new_parse ("neighbourcodeenc profile=plain");
+    GstHarness *encoder = harness_of ("neighbourcodeenc profile=plain");
     GstHarness *writer = gst_harness_new ("neighbourcodeparse");
     const auto info = gstrange::make_info (rig, 25, 1);
     gst_harness_set_src_caps (encoder, gstrange::make_range_caps (info));
@@ -57,7 +57,7 @@ struct Recording {
 inline GstHarness *
 new_parser ()
 {
-  GstHarness *h = gst_harness_new ("neighbourcodeparse");
+  GstHarness *h = harness_of ("neighbourcodeparse");
   gst_harness_set_src_caps_str (h, kStreamCaps);
   GstSegment segment;
   gst_segment_init (&segment, GST_FORMAT_BYTES);

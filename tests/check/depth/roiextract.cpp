@@ -510,6 +510,7 @@ GST_START_TEST (test_nobody_goes_through_coder_and_splitter_as_a_tiny_frame_set)
 {
   const Rig rig = ring_rig (2);
   GstHarness *coder = roi_harness (rig, "roiextract background-frames=1 ! neighbourcodeenc");
+  gst_harness_set_sink_caps_str (coder, kAccessUnitsOrSlices);
   GstHarness *whole =
       roi_harness (rig, "roiextract background-frames=1 ! neighbourcodeenc ! neighbourcodedec "
                         "! rangesplit name=s s.depth ! identity");

@@ -24,6 +24,7 @@ struct Sent {
       const Rig &rig, int frames = 3, const char *launch = "rtpneighbourcodepay mtu=1400")
   {
     GstHarness *encoder = gst_harness_new_parse ("neighbourcodeenc profile=plain");
+    gst_harness_set_sink_caps_str (encoder, kAccessUnitsOrSlices);
     gst_harness_set_src_caps (
         encoder, gstrange::make_range_caps (gstrange::make_info (rig, 25, 1)));
     GstHarness *h = gst_harness_new_parse (launch);
