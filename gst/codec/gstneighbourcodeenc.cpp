@@ -137,8 +137,9 @@ gst_neighbour_code_enc_fixate_caps (
     GstBaseTransform *base, GstPadDirection direction, GstCaps *caps, GstCaps *other)
 {
   if (direction == GST_PAD_SINK) {
-    GstCaps *wanted = gst_caps_new_simple (GST_NEIGHBOUR_CODE_MEDIA_TYPE, "alignment",
-        G_TYPE_STRING, preferred_alignment (GST_BASE_TRANSFORM_SRC_PAD (base)), nullptr);
+    GstCaps *wanted =
+        gst_caps_new_simple (GST_NEIGHBOUR_CODE_MEDIA_TYPE, "alignment", G_TYPE_STRING,
+            preferred_alignment (GST_BASE_TRANSFORM_SRC_PAD (base), "byte-stream"), nullptr);
     GstCaps *preferred = gst_caps_intersect (other, wanted);
     if (!gst_caps_is_empty (preferred))
       gst_caps_replace (&other, preferred);

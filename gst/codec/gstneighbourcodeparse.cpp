@@ -3,9 +3,9 @@
  * SECTION:element-neighbourcodeparse
  * @title: neighbourcodeparse
  *
- * Converts between the byte stream of coded frame sets, as in files, and access units: to the byte
- * stream where downstream's caps name no alignment, as those of filesink. Parsing
- * resumes at the next start code after damage. Files can be sought by time. Comes with a
+ * Converts between the byte stream of coded frame sets, as in files, and access units. Where
+ * downstream's caps name no alignment, as those of filesink, the output is what the input is not.
+ * Parsing resumes at the next start code after damage. Files can be sought by time. Comes with a
  * typefinder.
  *
  * ## Example launch lines
@@ -157,7 +157,9 @@ set_source_caps (GstBaseParse *base)
 {
   Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)); /* clears the flag */
-  const char *alignment = preferred_alignment (GST_BASE_PARSE_SRC_PAD (base));
+  /* Decoders that are plugged behind a file later take access units. */
+  const char *alignment = preferred_alignment (
+      GST_BASE_PARSE_SRC_PAD (base), stream.reads_stream ? "access-unit" : "byte-stream");
   stream.writes_stream = g_str_equal (alignment, "byte-stream");
   GstCaps *caps = gstrange::make_neighbour_code_caps (stream.info, alignment);
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);

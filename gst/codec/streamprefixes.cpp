@@ -43,13 +43,14 @@ StreamPrefixes::make (rangecast::AccessUnitHeader header, GstClockTime pts, gsiz
 }
 
 const char *
-preferred_alignment (GstPad *source)
+preferred_alignment (GstPad *source, const char *otherwise)
 {
   if (!gst_pad_is_linked (source))
     return "access-unit";
   GstCaps *caps = gst_pad_peer_query_caps (source, nullptr);
-  const char *preferred = "byte-stream";
-  for (const char *alignment : {"slice", "access-unit"}) { /* the last match counts */
+  const char *preferred = otherwise;
+  for (const char *alignment :
+      {"byte-stream", "slice", "access-unit"}) { /* the last match counts */
     GstStructure *wanted = gst_structure_new (
         GST_NEIGHBOUR_CODE_MEDIA_TYPE, "alignment", G_TYPE_STRING, alignment, nullptr);
     for (guint i = 0; i < gst_caps_get_size (caps); i++) {

@@ -33,6 +33,6 @@ private:
 };
 
 /** Alignment of a source pad's coded frame sets: access-unit, slice or byte-stream, the first that
- *  the peer's caps name. byte-stream if they name none, as those of a filesink: what it writes must
- *  be readable without caps. */
-const char *preferred_alignment (GstPad *source);
+ *  the peer's caps name.
+ *  @param otherwise  if they name none, as those of a filesink */
+const char *preferred_alignment (GstPad *source, const char *otherwise);
