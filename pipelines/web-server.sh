@@ -79,7 +79,7 @@ fi
 settings=("port=$port" "address=$address")
 [ -z "$anonymous" ] || settings+=(anonymous=true)
 [ -z "$certificate" ] || settings+=("certificate=$certificate" "private-key=${private_key:-$certificate}")
-[ -z "$title" ] || settings+=("title=$(sed 's/["\\]/\\&/g' <<<"$title")")
+[ -z "$title" ] || settings+=("title=\"$(sed 's/["\\]/\\&/g' <<<"$title")\"") # as launch strings quote
 [ -z "$origins" ] || settings+=("origins=$origins")
 if [ -n "$stats" ]; then
   stats_address=0.0.0.0

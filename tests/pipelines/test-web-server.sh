@@ -156,7 +156,7 @@ test_errors_of_the_server_name_the_property () {
 
 test_page_and_server_json_are_answered () {
   need_server
-  serve --title "The \"red\" room, 2 & 3"
+  serve --title "The \"red\" room, 2 & 3 \\ \""
   [ "${#links[@]}" = 1 ] || fail "$(cat links.txt)"
   [[ "${links[0]}" =~ ^http://127\.0\.0\.1:[0-9]+/$ ]] || fail "${links[0]}"
   curl -sSf "${links[0]}" >page.html
@@ -173,7 +173,7 @@ test_page_and_server_json_are_answered () {
   python3 -c '
 import json
 server = json.load(open("server.json"))
-assert server["version"] == 1 and server["token"] is False and server["title"] == "The \"red\" room, 2 & 3", server'
+assert server["version"] == 1 and server["token"] is False and server["title"] == "The \"red\" room, 2 & 3 \\ \"", server'
   gets 5 watch "${links[0]}" "" 5
   stop_server
 }

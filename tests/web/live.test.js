@@ -25,7 +25,7 @@ test ('the page shows a live stream, and reports its latency', async () => {
   assert.equal (await message (page), '');
   assert.equal (await page.title (), 'A person');
   assert.equal (await page.$eval ('#bar', (bar) => bar.className), 'live');
-  await page.waitForFunction (() => /WebSocket: \d+ frame sets left out/.test (document.getElementById ('stats').textContent));
+  await page.waitForFunction (() => /Web(Socket|RTC): \d+ frame sets left out/.test (document.getElementById ('stats').textContent));
   const latencies = await page.evaluate (() => window.rangecastPage.stats.latencies);
   assert.ok (latencies.length > 10 && latencies.every ((ms) => ms > 0 && ms < 10000), JSON.stringify (latencies));
   fs.writeFileSync (path.join (work, 'page-live.png'), await page.screenshot ());

@@ -30,15 +30,18 @@ const bytesOf = (frameSet) => frameSet.units.flatMap ((units) => [...units]);
 test ('a header gives its fields, times in milliseconds', () => {
   const { units, ...fields } = readMessage (message ({ flags: 3, count: 7, frameSet: 0xfffffffe, index: 6, number: 9, dropped: 4, delay: 2500, sent: 3000000n,
     units: [1, 2] }));
-  assert.deepEqual (fields, { key: true, discontinuity: true, count: 7, frameSet: 0xfffffffe, index: 6, number: 9, dropped: 4, delay: 2.5, sent: 3000 });
+  assert.deepEqual (fields, { kind: 1, key: true, discontinuity: true, count: 7, frameSet: 0xfffffffe, index: 6, number: 9, dropped: 4, delay: 2.5, sent: 3000 });
   assert.deepEqual ([...units], [1, 2]);
 });
 
-test ('a message that is too short, of another kind or with an index beyond its count is refused', () => {
+test ('a message of another kind is ignored', () => {
+  const assembler = new FrameAssembler (() => assert.fail ('delivered'));
+  assert.equal (assembler.add (message ({ kind: 2, units: [1] })), true);
+});
+test ('a message that is too short or has an index beyond its count is refused', () => {
   const whole = message ({ units: [1] });
   for (let size = 0; size < 32; size++)
     assert.equal (readMessage (whole.slice (0, size)), null);
-  assert.equal (readMessage (message ({ kind: 2 })), null);
   assert.equal (readMessage (message ({ count: 0 })), null);
   assert.equal (readMessage (message ({ count: 2, index: 2 })), null);
 });
