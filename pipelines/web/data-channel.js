@@ -4,9 +4,10 @@
 const PATIENCE = 8000; // ms
 
 export class DataChannel {
-  // send (message): to the server; receive (ArrayBuffer): a message of the channel
-  constructor (iceServers, { send, receive }) {
+  // send (message): to the server; receive (ArrayBuffer): a message of the channel; failed (): there is no channel, or no longer
+  constructor (iceServers, { send, receive, failed }) {
     this.send = send;
+    this.failed = failed;
     this.receive = receive;
     this.candidates = []; // that came before the offer was applied
     this.timer = setTimeout (() => this.fail (), PATIENCE);
@@ -58,6 +59,7 @@ export class DataChannel {
       return;
     this.close ();
     this.send ({ type: 'rtc-stop' });
+    this.failed ();
   }
   close () {
     this.closed = true;

@@ -39,6 +39,8 @@ const timeText = (ms) => {
   return `${Math.floor (seconds / 60)}:${(seconds % 60).toFixed (1).padStart (4, '0')}`;
 };
 
+const CHANNEL_WAIT = 10000; // ms until another data channel is tried
+
 class Page {
   constructor (module) {
     this.camera = new Core (module);
@@ -102,9 +104,17 @@ class Page {
   welcome ({ rtc, iceServers }) {
     if (!rtc || parameters.get ('transport') === 'websocket')
       return;
+    this.openChannel (iceServers, 3);
+  }
+  // tries: the server allows four in a connection
+  openChannel (iceServers, tries) {
     this.channel = new DataChannel (iceServers, {
       send: (message) => this.worker.postMessage ({ type: 'signal', message }),
       receive: (data) => this.worker.postMessage ({ type: 'transmit', data }, [data]),
+      failed: () => {
+        if (tries > 1)
+          this.channelTimer = setTimeout (() => this.openChannel (iceServers, tries - 1), CHANNEL_WAIT);
+      },
     });
   }
   signal ({ message }) { this.channel?.signal (message); }
@@ -119,6 +129,7 @@ class Page {
     element ('welcome').hidden = true;
   }
   closeChannel () {
+    clearTimeout (this.channelTimer);
     this.channel?.close ();
     this.channel = null;
   }
