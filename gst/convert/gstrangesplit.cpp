@@ -5,12 +5,13 @@
  *
  * Converts single views to depth and colour video, at the full size of the view. Request pads:
  * `depth` and `colour` of the view #GstRangeSplit:view-id, `depth_%u` and `colour_%u` of the view
- * with that id.
+ * with that id. Depth is GRAY16_LE or GRAY16_BE, as downstream takes it, or a picture to look at
+ * (#GstRangeSplit:depth-map).
  *
  * ## Example launch line
  * |[
  * gst-launch-1.0 avatartestsrc num-buffers=100 ! rangesplit name=s s.colour ! videoconvert !
- * autovideosink s.depth_1 ! videoconvert ! autovideosink
+ * autovideosink s.depth_1 ! queue ! videoconvert ! autovideosink
  * ]|
  *
  * Since: 0.1
@@ -32,6 +33,7 @@
 #include <memory>
 #include <mutex>
 #include <rangecast/geometry/paste.hpp>
+#include <rangecast/geometry/point_cloud.hpp>
 #include <vector>
 
 using rangecast::ConstRangeImage;
@@ -46,9 +48,13 @@ namespace {
 
 constexpr int kFirstView = -1;
 
+/* What depth pads show. */
+enum class DepthMap { kNone, kGrey, kTurbo };
+
 struct SplitSettings {
   int view_id = kFirstView;
   bool mask = true;
+  DepthMap depth_map = DepthMap::kNone;
 };
 
 /* A request pad and its stream. The members below view_id belong to the streaming thread, which
@@ -59,7 +65,9 @@ struct SplitPad {
   int view_id; /* kFirstView: that of the property */
 
   bool needs_start = true, needs_caps = true, needs_segment = true;
+  bool refused = false;  /* downstream's refusal of these caps has been posted */
   int current_view = -1; /* of the caps */
+  DepthMap current_map = DepthMap::kNone;
   GstVideoInfo video;
   GstBufferPool *pool = nullptr;
 
@@ -97,7 +105,7 @@ struct _GstRangeSplit {
   GstRangeSplitPrivate *priv;
 };
 
-#define DEPTH_CAPS GST_VIDEO_CAPS_MAKE ("GRAY16_LE")
+#define DEPTH_CAPS GST_VIDEO_CAPS_MAKE ("{ GRAY16_LE, GRAY16_BE, GRAY8, RGBx }")
 #define COLOUR_CAPS GST_VIDEO_CAPS_MAKE ("RGBx")
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
@@ -153,21 +161,50 @@ set_up_pool (SplitPad &pad, GstCaps *caps)
          gst_buffer_pool_set_active (pad.pool, TRUE);
 }
 
+/* Of 16-bit depth, the byte order that downstream takes; GRAY16_LE if it takes both. */
+static GstVideoFormat
+choose_format (const SplitPad &pad, DepthMap map)
+{
+  if (!pad.depth || map == DepthMap::kTurbo)
+    return GST_VIDEO_FORMAT_RGBx;
+  if (map == DepthMap::kGrey)
+    return GST_VIDEO_FORMAT_GRAY8;
+  GstCaps *little = gst_caps_from_string (GST_VIDEO_CAPS_MAKE ("GRAY16_LE"));
+  GstCaps *big = gst_caps_from_string (GST_VIDEO_CAPS_MAKE ("GRAY16_BE"));
+  GstCaps *taken = gst_pad_peer_query_caps (pad.pad, nullptr);
+  const bool swap = !gst_caps_can_intersect (little, taken) && gst_caps_can_intersect (big, taken);
+  for (GstCaps *caps : {little, big, taken})
+    gst_caps_unref (caps);
+  return swap ? GST_VIDEO_FORMAT_GRAY16_BE : GST_VIDEO_FORMAT_GRAY16_LE;
+}
+
 static bool
-push_caps (GstRangeSplit *self, SplitPad &pad, const View &view)
+push_caps (GstRangeSplit *self, SplitPad &pad, const View &view, DepthMap map)
 {
   const gstrange::RangeInfo &info = self->priv->info;
-  gst_video_info_set_format (&pad.video,
-      pad.depth ? GST_VIDEO_FORMAT_GRAY16_LE : GST_VIDEO_FORMAT_RGBx, guint (view.width),
-      guint (view.height));
+  gst_video_info_set_format (
+      &pad.video, choose_format (pad, map), guint (view.width), guint (view.height));
   pad.video.fps_n = info.fps_n;
   pad.video.fps_d = info.fps_d;
   GstCaps *caps = gst_video_info_to_caps (&pad.video);
   GST_INFO_OBJECT (pad.pad, "view %d, caps %" GST_PTR_FORMAT, view.id, caps);
-  const bool accepted =
-      gst_pad_push_event (pad.pad, gst_event_new_caps (caps)) && set_up_pool (pad, caps);
+  /* Asked first, because pushing a sticky event succeeds even if the peer refuses it. */
+  const bool refused = gst_pad_is_linked (pad.pad) && !GST_PAD_IS_FLUSHING (pad.pad) &&
+                       !gst_pad_peer_query_accept_caps (pad.pad, caps);
+  const bool accepted = !refused && gst_pad_push_event (pad.pad, gst_event_new_caps (caps)) &&
+                        set_up_pool (pad, caps);
   gst_caps_unref (caps);
+  if (refused && !pad.refused && !GST_PAD_IS_FLUSHING (pad.pad))
+    GST_ELEMENT_ERROR (self, CORE, NEGOTIATION,
+        ("pad %s: downstream does not accept %s%s", GST_PAD_NAME (pad.pad),
+            gst_video_format_to_string (GST_VIDEO_INFO_FORMAT (&pad.video)),
+            pad.depth && map == DepthMap::kNone
+                ? "; depth has 16 bits, property depth-map makes pictures of it"
+                : ""),
+        (nullptr));
+  pad.refused = refused;
   pad.current_view = view.id;
+  pad.current_map = map;
   if (!accepted)
     GST_DEBUG_OBJECT (pad.pad, "caps or pool refused downstream");
   return accepted;
@@ -196,8 +233,9 @@ make_ready (GstRangeSplit *self, SplitPad &pad, const SplitSettings &settings)
     g_free (id);
     pad.needs_start = false;
   }
-  if (gst_pad_check_reconfigure (pad.pad) || pad.needs_caps || pad.current_view != view->id) {
-    if (!push_caps (self, pad, *view)) {
+  if (gst_pad_check_reconfigure (pad.pad) || pad.needs_caps || pad.current_view != view->id ||
+      (pad.depth && pad.current_map != settings.depth_map)) {
+    if (!push_caps (self, pad, *view, settings.depth_map)) {
       gst_pad_mark_reconfigure (pad.pad);
       return GST_PAD_IS_FLUSHING (pad.pad) ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED;
     }
@@ -211,6 +249,32 @@ make_ready (GstRangeSplit *self, SplitPad &pad, const SplitSettings &settings)
 }
 
 /* ---- data ---- */
+
+static void
+paste (const SplitPad &pad, const View &view, bool mask, const ConstRangeImage &image,
+    GstVideoFrame &video)
+{
+  const auto plane = [&]<typename T> (T *pixels) {
+    return ImageView<T>{pixels, GST_VIDEO_FRAME_WIDTH (&video), GST_VIDEO_FRAME_HEIGHT (&video),
+        GST_VIDEO_FRAME_PLANE_STRIDE (&video, 0)};
+  };
+  void *data = GST_VIDEO_FRAME_PLANE_DATA (&video, 0);
+  const auto grey = plane (static_cast<std::uint8_t *> (data));
+  const auto depth = plane (static_cast<std::uint16_t *> (data));
+  const auto colour = plane (static_cast<Rgbx *> (data));
+  const std::uint16_t near = rangecast::depth_units (view.near_m, view.depth_unit_m),
+                      far = rangecast::depth_units (view.far_m, view.depth_unit_m);
+  if (!pad.depth)
+    rangecast::paste_colour (image, mask, colour);
+  else if (pad.current_map == DepthMap::kGrey)
+    rangecast::paste_depth_map (image, near, far, grey);
+  else if (pad.current_map == DepthMap::kTurbo)
+    rangecast::paste_depth_map (image, near, far, colour);
+  else
+    rangecast::paste_depth (image, depth);
+  if (GST_VIDEO_FRAME_FORMAT (&video) == GST_VIDEO_FORMAT_GRAY16_BE)
+    rangecast::swap_bytes (depth, depth);
+}
 
 static GstFlowReturn
 push_view (GstRangeSplit *self, SplitPad &pad, const SplitSettings &settings,
@@ -238,14 +302,7 @@ push_view (GstRangeSplit *self, SplitPad &pad, const SplitSettings &settings,
     GST_ELEMENT_ERROR (self, RESOURCE, WRITE, (nullptr), ("cannot map an output buffer"));
     return GST_FLOW_ERROR;
   }
-  const int width = GST_VIDEO_FRAME_WIDTH (&video), height = GST_VIDEO_FRAME_HEIGHT (&video);
-  const int stride = GST_VIDEO_FRAME_PLANE_STRIDE (&video, 0);
-  void *pixels = GST_VIDEO_FRAME_PLANE_DATA (&video, 0);
-  if (pad.depth)
-    rangecast::paste_depth (image, {static_cast<std::uint16_t *> (pixels), width, height, stride});
-  else
-    rangecast::paste_colour (
-        image, settings.mask, {static_cast<Rgbx *> (pixels), width, height, stride});
+  paste (pad, *self->priv->info.rig.find (pad.current_view), settings.mask, image, video);
   gst_video_frame_unmap (&video);
   gst_buffer_copy_into (
       out, in, GstBufferCopyFlags (GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS), 0, -1);
@@ -405,9 +462,25 @@ gst_range_split_change_state (GstElement *element, GstStateChange transition)
     for (const auto &pad : self->priv->pads) {
       drop_pool (pad->pool);
       pad->needs_start = pad->needs_caps = pad->needs_segment = true;
+      pad->refused = false;
     }
   }
   return result;
+}
+
+#define GST_TYPE_RANGE_SPLIT_DEPTH_MAP (gst_range_split_depth_map_get_type ())
+static GType
+gst_range_split_depth_map_get_type (void)
+{
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {int (DepthMap::kNone), "Depth units, 16 bits (0 = invalid)", "none"},
+        {int (DepthMap::kGrey), "8 bits, white at near, dark at far, black where invalid", "grey"},
+        {int (DepthMap::kTurbo), "Colours, red at near, blue at far, black where invalid", "turbo"},
+        {}};
+    return g_enum_register_static ("GstRangeSplitDepthMap", values);
+  }();
+  return type;
 }
 
 static PropertyTable<SplitSettings> &
@@ -419,6 +492,8 @@ split_properties ()
       P::number<&S::view_id> ("view-id", "View ID",
           "view-id shown by the pads depth and colour (-1 = first view of the rig)", kFirstView,
           rangecast::kMaxViews - 1, kMutablePlaying),
+      P::enumeration<&S::depth_map> ("depth-map", "Depth map", "What depth pads show",
+          GST_TYPE_RANGE_SPLIT_DEPTH_MAP, kMutablePlaying),
       P::boolean<&S::mask> (
           "mask", "Mask colour", "Make colour black where depth is invalid", kMutablePlaying),
   };

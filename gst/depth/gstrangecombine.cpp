@@ -5,14 +5,14 @@
  *
  * Combines the colour and depth images of any depth camera into range images of one view. The two
  * may be registered pixel to pixel, differ in size, or come from separate cameras (see
- * #GstRangeCombine:colour-view-id and #GstRangeCombine:into). Depth is GRAY16_LE in any unit
- * (default: millimetres).
+ * #GstRangeCombine:colour-view-id and #GstRangeCombine:into). Depth is GRAY16 of either
+ * byte order in any unit (default: millimetres).
  *
  * ## Example launch line
  * |[
  * gst-launch-1.0 rangecombine name=c focal-length=525 ! plyenc ! filesink location=cloud.ply
  * filesrc location=colour.jpg ! jpegdec ! videoconvert ! c.colour filesrc location=depth.png !
- * pngdec ! videoconvert ! c.depth
+ * pngdec ! c.depth
  * ]|
  *
  * Since: 0.1
@@ -35,10 +35,12 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
 #include <optional>
+#include <rangecast/geometry/paste.hpp>
 #include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/geometry/size_text.hpp>
 #include <rangecast/registration/registration.hpp>
 #include <string>
+#include <vector>
 
 using rangecast::RangeImage;
 using rangecast::RegisterInto;
@@ -87,6 +89,7 @@ struct GstRangeCombinePrivate {
   bool registered = true;                    /* colour and depth are registered pixel to pixel */
   rangecast::Registration registration;      /* if not */
   GstBuffer *unregistered = nullptr;         /* RGBx colour before registration */
+  std::vector<guint16> swapped;              /* depth of GRAY16_BE */
   double depth_scale = kDefaultDepthScale;
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE; /* of the output */
   GstBufferPool *pool = nullptr;
@@ -101,8 +104,8 @@ struct _GstRangeCombine {
 
 static GstStaticPadTemplate colour_template = GST_STATIC_PAD_TEMPLATE ("colour", GST_PAD_SINK,
     GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE (GST_VIDEO_FORMATS_ALL)));
-static GstStaticPadTemplate depth_template = GST_STATIC_PAD_TEMPLATE (
-    "depth", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE ("GRAY16_LE")));
+static GstStaticPadTemplate depth_template = GST_STATIC_PAD_TEMPLATE ("depth", GST_PAD_SINK,
+    GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE ("{ GRAY16_LE, GRAY16_BE }")));
 static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
 
@@ -336,10 +339,17 @@ combine (GstRangeCombinePrivate *priv, GstBuffer *colour, GstBuffer *depth, GstB
   GstVideoFrame from;
   if (!gst_video_frame_map (&from, &*priv->depth, depth, GST_MAP_READ))
     return {StatusCode::kBadData, "pad depth: a buffer is smaller than its caps require"};
-  const rangecast::ImageView<const std::uint16_t> picture = {
+  rangecast::ImageView<const std::uint16_t> picture = {
       static_cast<const std::uint16_t *> (GST_VIDEO_FRAME_PLANE_DATA (&from, 0)),
       GST_VIDEO_FRAME_WIDTH (&from), GST_VIDEO_FRAME_HEIGHT (&from),
       GST_VIDEO_FRAME_PLANE_STRIDE (&from, 0)};
+  if (GST_VIDEO_FRAME_FORMAT (&from) == GST_VIDEO_FORMAT_GRAY16_BE) {
+    priv->swapped.resize (std::size_t (picture.width) * std::size_t (picture.height));
+    const rangecast::ImageView<std::uint16_t> little = {
+        priv->swapped.data (), picture.width, picture.height, 2 * picture.width};
+    rangecast::swap_bytes (picture, little);
+    picture = {little.data, little.width, little.height, little.stride};
+  }
   const auto work = priv->registered ? combine_registered : combine_cameras;
   const Status status = work (priv, colour, picture, frame.views ()[0]);
   gst_video_frame_unmap (&from);

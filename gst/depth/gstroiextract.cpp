@@ -10,7 +10,7 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 avatartestsrc empty-frames=30 num-buffers=100 ! roiextract background-frames=30 !
- * rangesplit name=s s.depth ! videoconvert ! autovideosink
+ * rangesplit name=s depth-map=turbo s.depth ! videoconvert ! autovideosink
  * ]|
  *
  * Since: 0.1

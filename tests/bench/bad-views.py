@@ -21,7 +21,7 @@ def export_views():
     for i in range(VIEWS):
         launch(f'avatartestsrc views={VIEWS} view-id={i} num-buffers=1 motion=0 noise=0 dress=all '
                f'! video/x-range,width=320,height=240 ! rangesplit name=s '
-               f's.depth ! queue ! videoconvert ! video/x-raw,format=GRAY16_BE ! pngenc ! filesink location=d{i}.png '
+               f's.depth ! queue ! pngenc ! filesink location=d{i}.png '
                f's.colour ! queue ! videoconvert ! pngenc ! filesink location=c{i}.png')
 
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* before check.h, whose fail() is a macro */
 #include <atomic>
+#include <cmath>
 #include <thread>
 
 #include "../rangecast-check.hpp"
@@ -53,6 +54,98 @@ GST_START_TEST (test_depth_has_the_full_size_with_the_roi_in_its_place)
   fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (output), 123);
   gst_caps_unref (caps);
   gst_buffer_unref (output);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* The pixel of a depth pad's picture at the middle of a frame set, as bytes, and the caps' format.
+ */
+static std::string
+middle_pixel (const char *properties, const char *sink_caps, std::size_t bytes, guint16 &depth,
+    GstVideoFormat &format)
+{
+  const Rig rig = ring_rig (1);
+  GstBuffer *input = make_frame_set (rig);
+  {
+    gstrange::RangeFrameMap frame (input, GST_MAP_READ);
+    depth = frame.views ()[0].depth.at (160, 120);
+  }
+  GstHarness *h = split_harness (rig, "depth");
+  if (sink_caps)
+    gst_harness_set_sink_caps_str (h, sink_caps);
+  gst_util_set_object_arg (G_OBJECT (h->element), "depth-map", properties);
+  GstBuffer *output = gst_harness_push_and_pull (h, input);
+  GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
+  GstVideoInfo info;
+  fail_unless (gst_video_info_from_caps (&info, caps));
+  format = GST_VIDEO_INFO_FORMAT (&info);
+  std::string pixel (bytes, '\0');
+  const gsize at = 120 * gsize (GST_VIDEO_INFO_PLANE_STRIDE (&info, 0)) + 160 * bytes;
+  fail_unless_equals_int (gst_buffer_extract (output, at, pixel.data (), bytes), bytes);
+  gst_caps_unref (caps);
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+  return pixel;
+}
+
+GST_START_TEST (test_depth_is_big_endian_only_where_downstream_wants_it)
+{
+  guint16 depth;
+  GstVideoFormat format;
+  std::string pixel = middle_pixel ("none", "video/x-raw,format=GRAY16_BE", 2, depth, format);
+  fail_unless_equals_int (format, GST_VIDEO_FORMAT_GRAY16_BE);
+  ck_assert_int_gt (depth, 255);
+  fail_unless_equals_int (GST_READ_UINT16_BE (pixel.data ()), depth);
+  pixel =
+      middle_pixel ("none", "video/x-raw,format={ GRAY16_BE, GRAY16_LE, RGBx }", 2, depth, format);
+  fail_unless_equals_int (format, GST_VIDEO_FORMAT_GRAY16_LE);
+  fail_unless_equals_int (GST_READ_UINT16_LE (pixel.data ()), depth);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_depth_maps_are_pictures_between_near_and_far)
+{
+  const View view = ring_rig (1).views[0];
+  guint16 depth;
+  GstVideoFormat format;
+  const std::string grey = middle_pixel ("grey", nullptr, 1, depth, format);
+  fail_unless_equals_int (format, GST_VIDEO_FORMAT_GRAY8);
+  const double part =
+      (view.far_m - depth * view.depth_unit_m) / (view.far_m - view.near_m); /* 1 at near */
+  fail_unless_equals_int (guint8 (grey[0]), int (std::lround (1 + 254 * part)));
+  const std::string turbo = middle_pixel ("turbo", nullptr, 4, depth, format);
+  fail_unless_equals_int (format, GST_VIDEO_FORMAT_RGBx);
+  fail_unless (guint8 (turbo[0]) != guint8 (turbo[1]) || guint8 (turbo[1]) != guint8 (turbo[2]));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_eight_bits_of_depth_are_one_error_that_names_the_property)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = split_harness (rig, "depth");
+  gst_harness_set_sink_caps_str (h, "video/x-raw,format=GRAY8");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  for (int i = 0; i < 2; i++)
+    fail_unless_equals_int (gst_harness_push (h, make_frame_set (rig)), GST_FLOW_NOT_NEGOTIATED);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "depth-map");
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_depth_map_changes_while_playing)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = split_harness (rig, "depth");
+  for (const auto &[map, bytes] : {std::pair{"none", 2}, {"grey", 1}, {"turbo", 4}, {"none", 2}}) {
+    gst_util_set_object_arg (G_OBJECT (h->element), "depth-map", map);
+    GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig));
+    fail_unless_equals_int (gst_buffer_get_size (output), 320 * 240 * bytes);
+    gst_buffer_unref (output);
+  }
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -231,6 +324,10 @@ rangesplit_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_depth_has_the_full_size_with_the_roi_in_its_place);
+  tcase_add_test (tc, test_depth_is_big_endian_only_where_downstream_wants_it);
+  tcase_add_test (tc, test_depth_maps_are_pictures_between_near_and_far);
+  tcase_add_test (tc, test_eight_bits_of_depth_are_one_error_that_names_the_property);
+  tcase_add_test (tc, test_depth_map_changes_while_playing);
   tcase_add_test (tc, test_colour_without_depth_is_black_unless_unmasked);
   tcase_add_test (tc, test_view_missing_in_a_frame_set_is_an_empty_picture);
   tcase_add_test (tc, test_view_that_the_rig_lacks_is_one_error);

@@ -76,6 +76,22 @@ GST_START_TEST (test_millimetres_become_depth_units_and_colour_stays)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_big_endian_depth_is_taken)
+{
+  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
+      "video/x-raw,format=GRAY16_BE,width=5,height=3,framerate=10/1");
+  c.push_colour (0, 77);
+  c.push_depth (0, GUINT16_SWAP_LE_BE (1234));
+  GstBuffer *output = gst_harness_pull (c.colour);
+  {
+    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+    fail_unless_equals_int (frame.views ()[0].depth.at (3, 2), 12340);
+    fail_unless_equals_int (frame.views ()[0].depth.at (4, 2), 0);
+  }
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_depth_outside_near_and_far_is_invalid)
 {
   Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
@@ -511,6 +527,7 @@ rangecombine_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_millimetres_become_depth_units_and_colour_stays);
+  tcase_add_test (tc, test_big_endian_depth_is_taken);
   tcase_add_test (tc, test_depth_outside_near_and_far_is_invalid);
   tcase_add_test (tc, test_pairs_by_pts_and_drops_what_has_no_partner);
   tcase_add_test (tc, test_gap_costs_its_frame_and_nothing_else);
