@@ -9,7 +9,7 @@
 namespace {
 
 const char kRtpCaps[] =
-    "application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE";
+    "application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE";
 
 const char kHint[] = "drag to turn, wheel to zoom, h for all keys";
 
