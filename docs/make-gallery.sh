@@ -16,7 +16,7 @@ cd "$work"
 
 raw=video/x-raw,width=640,height=480,framerate=12/1
 range=video/x-range,width=640,height=480,framerate=12/1
-stream=application/x-neighbour-code,alignment=byte-stream
+stream=video/x-neighbour-code,alignment=byte-stream
 
 # Six views in exact depth: one frame set. usage: record_exact RECORDING avatartestsrc's properties...
 record_exact () {

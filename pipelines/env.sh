@@ -66,5 +66,5 @@ drop_empty () {
   [[ "${RANGECAST_LAUNCH:-}" != rangecast-run* ]] || RANGECAST_LAUNCH+=" --drop-empty $(printf %q "$1")"
 }
 
-rtp_fields='media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE'
+rtp_fields='media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE'
 rtp_caps="application/x-rtp,$rtp_fields"

@@ -10,9 +10,9 @@
  * ## Example launch lines
  * |[
  * gst-launch-1.0 udpsrc port=5100
- * caps="application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
+ * caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
  * rtpneighbourcodedepay ! neighbourcodeparse !
- * application/x-neighbour-code,alignment=byte-stream ! filesink location=head.rcnc
+ * video/x-neighbour-code,alignment=byte-stream ! filesink location=head.rcnc
  * ]|
  * Writes a file.
  * |[
@@ -133,7 +133,7 @@ static gboolean
 register_with_typefinder (GstPlugin *plugin)
 {
   GstCaps *caps = gst_caps_from_string (STREAM_CAPS);
-  const gboolean typefinder = gst_type_find_register (plugin, "application/x-neighbour-code",
+  const gboolean typefinder = gst_type_find_register (plugin, "video/x-neighbour-code",
       GST_RANK_PRIMARY, find_type, "rcnc", caps, nullptr, nullptr);
   gst_caps_unref (caps);
   return typefinder && gst_element_register (plugin, "neighbourcodeparse", GST_RANK_PRIMARY + 1,

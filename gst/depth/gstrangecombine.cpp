@@ -63,6 +63,8 @@ constexpr double kDefaultDepthScale = 0.001;
  */
 constexpr double kDefaultFocalLength = 0.82;
 constexpr double kDefaultFar = 6;
+/* Frames whose depth is looked at: cameras may begin with empty ones. */
+constexpr int kCheckedFrames = 5;
 
 struct CombineSettings {
   ViewSettings view;
@@ -90,6 +92,7 @@ struct GstRangeCombinePrivate {
   rangecast::Registration registration;      /* if not */
   GstBuffer *unregistered = nullptr;         /* RGBx colour before registration */
   std::vector<guint16> swapped;              /* depth of GRAY16_BE */
+  int frames_to_check = kCheckedFrames;      /* 0: depth was found, or a warning was posted */
   double depth_scale = kDefaultDepthScale;
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE; /* of the output */
   GstBufferPool *pool = nullptr;
@@ -330,9 +333,36 @@ combine_cameras (GstRangeCombinePrivate *priv, GstBuffer *colour,
   return status;
 }
 
-static Status
-combine (GstRangeCombinePrivate *priv, GstBuffer *colour, GstBuffer *depth, GstBuffer *output)
+/* Warns once if the first frames have depth, but none between near and far: most likely
+ * depth-scale is wrong.
+ * @param depth  of the input */
+static void
+check_range (
+    GstRangeCombine *self, rangecast::ImageView<const std::uint16_t> depth, const RangeImage &image)
 {
+  GstRangeCombinePrivate *priv = self->priv;
+  if (priv->frames_to_check == 0)
+    return;
+  if (rangecast::count_points (image) > 0) {
+    priv->frames_to_check = 0;
+    return;
+  }
+  const rangecast::DepthRange range = rangecast::find_depth_range (depth);
+  if (range.max == 0 || --priv->frames_to_check > 0)
+    return;
+  const auto metres = [&] (int units) { return units * priv->depth_scale; };
+  GST_ELEMENT_WARNING (self, STREAM, FORMAT,
+      ("pad depth: no pixel lies between near (%g m) and far (%g m); values are %d to %d, with "
+       "depth-scale=%g %g to %g m; expected another depth-scale, near or far",
+          priv->view.near_m, priv->view.far_m, range.min, range.max, priv->depth_scale,
+          metres (range.min), metres (range.max)),
+      (nullptr));
+}
+
+static Status
+combine (GstRangeCombine *self, GstBuffer *colour, GstBuffer *depth, GstBuffer *output)
+{
+  GstRangeCombinePrivate *priv = self->priv;
   gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
   if (!frame.status ().ok ())
     return frame.status ();
@@ -352,6 +382,8 @@ combine (GstRangeCombinePrivate *priv, GstBuffer *colour, GstBuffer *depth, GstB
   }
   const auto work = priv->registered ? combine_registered : combine_cameras;
   const Status status = work (priv, colour, picture, frame.views ()[0]);
+  if (status.ok ())
+    check_range (self, picture, frame.views ()[0]);
   gst_video_frame_unmap (&from);
   return status;
 }
@@ -370,7 +402,7 @@ push_pair (GstRangeCombine *self, const PairMatcher::Pair &pair)
   const View &view = priv->view;
   Status status = gstrange::add_view (output, view.id, {0, 0, view.width, view.height}, capture);
   if (status.ok ())
-    status = combine (priv, pair.first, pair.second, output);
+    status = combine (self, pair.first, pair.second, output);
   flow = gst_range_flow_return (GST_ELEMENT (self), status);
   if (flow != GST_FLOW_OK) {
     gst_buffer_unref (output);
@@ -451,6 +483,7 @@ gst_range_combine_start (GstAggregator *aggregator)
   priv->colour.reset ();
   priv->depth.reset ();
   priv->negotiate = true;
+  priv->frames_to_check = kCheckedFrames;
   priv->matcher->reset ();
   std::lock_guard guard (priv->lock);
   priv->frames = 0;

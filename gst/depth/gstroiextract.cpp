@@ -7,6 +7,10 @@
  * background of each view is learnt from the first frames or on #GstRoiExtract::capture-background,
  * or loaded from a file. While learning, views have an empty ROI.
  *
+ * ## Element messages
+ * - `roiextract-learning` (`view-id`: int; `frames`, `of`: int, learnt so far and needed): when a
+ *   view begins to learn its background, after each tenth of it, and when it has learnt it.
+ *
  * ## Example launch line
  * |[
  * gst-launch-1.0 avatartestsrc empty-frames=30 num-buffers=100 ! roiextract background-frames=30 !
@@ -65,6 +69,10 @@ namespace {
 constexpr double kMinAdaptInterval = 0.2;
 /* Margin of the region requested from upstream around the foreground's bounding box, pixels. */
 constexpr int kRequestMargin = 16;
+/* Number of frames since learning that are foreground on so much of the picture before that is
+ * reported. Nobody fills as much of it from the first frame on. */
+constexpr int kSuspectFrames = 60;
+constexpr double kSuspectShare = 0.8;
 
 /* One view of the stream. */
 struct ViewState {
@@ -73,6 +81,8 @@ struct ViewState {
   bool learnt = false;
   int learning_target = 0; /* frames */
   int settled = 0;         /* frames skipped before learning */
+  int reported = -1;       /* frames learnt when progress was last reported */
+  int suspect = 0;         /* frames since learning, all foreground; -1: there was another */
   guint64 adapted_ns = 0;  /* capture time of the frame of the last adaptation */
   int adapted_area = 0;    /* pixels of its ROI */
   Roi requested;           /* from upstream; empty: everything */
@@ -130,6 +140,8 @@ begin_learning (ViewState &state, const View &view, int frames)
   state.adapted_area = 0;
   state.learning_target = frames;
   state.learnt = false;
+  state.reported = -1;
+  state.suspect = 0;
 }
 
 /* ---- caps ---- */
@@ -181,6 +193,7 @@ load_background_file (GstRoiExtractPrivate *priv, const std::string &path)
     ViewState &state = *priv->views[view.id];
     state.background = std::move (found->second);
     state.learnt = true;
+    state.suspect = 0;
   }
   return {};
 }
@@ -382,6 +395,41 @@ relearn_all (GstRoiExtract *self, int frames)
 }
 
 static void
+report_learning (GstRoiExtract *self, ViewState &state, int view_id)
+{
+  const int frames = state.background.frames (), step = std::max (state.learning_target / 10, 1);
+  if (state.reported >= 0 && frames < state.reported + step && frames < state.learning_target)
+    return;
+  state.reported = frames;
+  gst_element_post_message (GST_ELEMENT (self),
+      gst_message_new_element (GST_OBJECT (self),
+          gst_structure_new ("roiextract-learning", "view-id", G_TYPE_INT, view_id, "frames",
+              G_TYPE_INT, frames, "of", G_TYPE_INT, state.learning_target, nullptr)));
+}
+
+/* Warns once if nearly the whole picture has been foreground since the background became known. */
+static void
+check_foreground (GstRoiExtract *self, ViewState &state, int view_id)
+{
+  if (state.suspect < 0)
+    return;
+  const double pixels = double (state.background.width ()) * double (state.background.height ());
+  if (double (state.points_out) < kSuspectShare * pixels) {
+    state.suspect = -1;
+    return;
+  }
+  if (++state.suspect < kSuspectFrames)
+    return;
+  state.suspect = -1;
+  gst_range_post_warning (GST_ELEMENT (self),
+      {StatusCode::kBadData, "view " + std::to_string (view_id) +
+                                 ": nearly the whole picture differs from the background; expected "
+                                 "one that was learnt from "
+                                 "the empty scene by a camera that has not moved since "
+                                 "(capture-background learns it again)"});
+}
+
+static void
 after_frame (GstRoiExtract *self, const gstrange::RangeFrameMap &frame, const RoiSettings &settings)
 {
   GstRoiExtractPrivate *priv = self->priv;
@@ -396,7 +444,11 @@ after_frame (GstRoiExtract *self, const gstrange::RangeFrameMap &frame, const Ro
         image.view_id, state.points_out, state.points_in, state.box.width, state.box.height);
     if (state.learnt) {
       request_roi (self, state, image.view_id);
-    } else if (state.background.frames () >= state.learning_target) {
+      check_foreground (self, state, image.view_id);
+      continue;
+    }
+    report_learning (self, state, image.view_id);
+    if (state.background.frames () >= state.learning_target) {
       state.background.finish ();
       state.learnt = learnt_now = true;
       GST_DEBUG_OBJECT (self, "view %d: background learnt from %d frames", image.view_id,

@@ -3,10 +3,11 @@
  * SECTION:element-rangerender
  * @title: rangerender
  *
- * Renders range images as raw video: cylinderfilter, striprender and gldownload in one bin, which
- * playbin and decodebin plug as the decoder of range images. Pictures stay in OpenGL memory if
- * downstream accepts it. The elements inside are named `cylinder` and `render`; gst-launch-1.0 sets
- * their properties with names such as `render::auto-orbit=30`.
+ * Renders range images, raw or coded, as raw video: neighbourcodedec where needed, cylinderfilter,
+ * striprender and gldownload in one bin, which playbin, playbin3 and decodebin plug as the decoder.
+ * Pictures stay in OpenGL memory if downstream accepts it. The elements inside are named `decoder`,
+ * `cylinder` and `render`; gst-launch-1.0 sets their properties with names such as
+ * `render::auto-orbit=30`.
  *
  * ## Example launch lines
  * |[
@@ -29,18 +30,21 @@ GST_DEBUG_CATEGORY_STATIC (gst_range_render_debug);
 struct _GstRangeRender {
   GstBin parent;
   const char *missing; /* factory of an element that could not be created */
+  GstPad *sink;
+  GstElement *cylinder, *decoder; /* owned by the bin; decoder: nullptr if the input is raw */
 };
 
-static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
-    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK,
+    GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_CAPS));
 static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
         GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE_WITH_FEATURES (
             "memory:GLMemory", "RGBA") "; " GST_VIDEO_CAPS_MAKE ("RGBA")));
 
 G_DEFINE_TYPE (GstRangeRender, gst_range_render, GST_TYPE_BIN)
-/* SECONDARY suffices: no other element decodes range images. */
-GST_ELEMENT_REGISTER_DEFINE (rangerender, "rangerender", GST_RANK_SECONDARY, GST_TYPE_RANGE_RENDER)
+/* Above neighbourcodedec: decodebin3 plugs a single decoder, and video sinks want pictures. */
+GST_ELEMENT_REGISTER_DEFINE (
+    rangerender, "rangerender", GST_RANK_PRIMARY + 1, GST_TYPE_RANGE_RENDER)
 
 namespace {
 
@@ -107,6 +111,94 @@ query_downstream (GstPad *pad, GstObject *parent, GstQuery *query)
   return TRUE;
 }
 
+void
+report_missing (GstRangeRender *self, const char *factory)
+{
+  GST_ELEMENT_ERROR (self, CORE, MISSING_PLUGIN, ("There is no element %s", factory),
+      ("expected it in the plugins of GStreamer and gst-rangecast"));
+}
+
+void
+set_target (GstRangeRender *self, GstElement *element)
+{
+  GstPad *target = gst_element_get_static_pad (element, "sink");
+  gst_ghost_pad_set_target (GST_GHOST_PAD (self->sink), target);
+  gst_object_unref (target);
+}
+
+/* Puts a decoder before cylinderfilter, or removes it. In the streaming thread. */
+bool
+use_decoder (GstRangeRender *self, bool coded)
+{
+  if (coded == (self->decoder != nullptr))
+    return true;
+  gst_ghost_pad_set_target (GST_GHOST_PAD (self->sink), nullptr);
+  if (!coded) {
+    gst_element_set_state (self->decoder, GST_STATE_NULL);
+    gst_bin_remove (GST_BIN (self), self->decoder);
+    self->decoder = nullptr;
+    set_target (self, self->cylinder);
+    return true;
+  }
+  GstElement *decoder = gst_element_factory_make ("neighbourcodedec", "decoder");
+  if (!decoder) {
+    report_missing (self, "neighbourcodedec");
+    return false;
+  }
+  self->decoder = decoder;
+  gst_bin_add (GST_BIN (self), decoder);
+  gst_element_link (decoder, self->cylinder);
+  gst_element_sync_state_with_parent (decoder);
+  set_target (self, decoder);
+  return true;
+}
+
+gboolean
+handle_sink_event (GstPad *pad, GstObject *parent, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
+    GstCaps *caps;
+    gst_event_parse_caps (event, &caps);
+    GST_INFO_OBJECT (pad, "caps %" GST_PTR_FORMAT, caps);
+    const bool coded =
+        gst_structure_has_name (gst_caps_get_structure (caps, 0), GST_NEIGHBOUR_CODE_MEDIA_TYPE);
+    if (!use_decoder (GST_RANGE_RENDER (parent), coded)) {
+      gst_event_unref (event);
+      return FALSE;
+    }
+  }
+  return gst_pad_event_default (pad, parent, event);
+}
+
+/* Answers for both kinds of input, of which the target knows one. */
+gboolean
+answer_sink_query (GstPad *pad, GstObject *parent, GstQuery *query)
+{
+  switch (GST_QUERY_TYPE (query)) {
+    case GST_QUERY_CAPS: {
+      GstCaps *filter = nullptr, *caps = gst_pad_get_pad_template_caps (pad);
+      gst_query_parse_caps (query, &filter);
+      if (filter) {
+        GstCaps *wanted = gst_caps_intersect_full (filter, caps, GST_CAPS_INTERSECT_FIRST);
+        gst_caps_unref (caps);
+        caps = wanted;
+      }
+      gst_query_set_caps_result (query, caps);
+      gst_caps_unref (caps);
+      return TRUE;
+    }
+    case GST_QUERY_ACCEPT_CAPS: {
+      GstCaps *caps, *accepted = gst_pad_get_pad_template_caps (pad);
+      gst_query_parse_accept_caps (query, &caps);
+      gst_query_set_accept_caps_result (query, gst_caps_can_intersect (caps, accepted));
+      gst_caps_unref (accepted);
+      return TRUE;
+    }
+    default:
+      return gst_pad_query_default (pad, parent, query);
+  }
+}
+
 GstPad *
 add_ghost_pad (
     GstRangeRender *self, GstElement *element, const char *name, GstStaticPadTemplate *ghost)
@@ -127,8 +219,7 @@ gst_range_render_change_state (GstElement *element, GstStateChange transition)
 {
   auto self = GST_RANGE_RENDER (element);
   if (transition == GST_STATE_CHANGE_NULL_TO_READY && self->missing) {
-    GST_ELEMENT_ERROR (self, CORE, MISSING_PLUGIN, ("There is no element %s", self->missing),
-        ("expected it in the plugins of GStreamer and gst-rangecast"));
+    report_missing (self, self->missing);
     return GST_STATE_CHANGE_FAILURE;
   }
   return GST_ELEMENT_CLASS (gst_range_render_parent_class)->change_state (element, transition);
@@ -144,8 +235,10 @@ gst_range_render_init (GstRangeRender *self)
     return;
   g_object_set (render, "fit", TRUE, "background-shade", 0.5, nullptr); /* for viewers */
   gst_element_link_many (cylinder, render, download, nullptr);
-  GstPad *sink = add_ghost_pad (self, cylinder, "sink", &sink_template);
-  GST_PAD_SET_ACCEPT_INTERSECT (sink); /* cylinderfilter refuses caps that lack a field */
+  self->cylinder = cylinder;
+  self->sink = add_ghost_pad (self, cylinder, "sink", &sink_template);
+  gst_pad_set_event_function (self->sink, GST_DEBUG_FUNCPTR (handle_sink_event));
+  gst_pad_set_query_function (self->sink, GST_DEBUG_FUNCPTR (answer_sink_query));
   GstPad *src = add_ghost_pad (self, download, "src", &src_template);
   GstProxyPad *inner = gst_proxy_pad_get_internal (GST_PROXY_PAD (src));
   gst_pad_set_query_function (GST_PAD (inner), GST_DEBUG_FUNCPTR (query_downstream));
@@ -163,7 +256,7 @@ gst_range_render_class_init (GstRangeRenderClass *klass)
   gst_element_class_add_static_pad_template (element_class, &src_template);
   /* Of what converts something to raw video, decodebin tries only decoders. */
   gst_element_class_set_static_metadata (element_class, "Range image renderer",
-      "Codec/Decoder/Video", "Renders range images as raw video, for playbin and decodebin",
-      "gst-rangecast");
+      "Codec/Decoder/Video",
+      "Renders raw or coded range images as raw video, for playbin and decodebin", "gst-rangecast");
   element_class->change_state = GST_DEBUG_FUNCPTR (gst_range_render_change_state);
 }

@@ -10,7 +10,7 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 udpsrc port=5004
- * caps="application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
+ * caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
  * rtpneighbourcodeguard ! rtpjitterbuffer ! rtpneighbourcodedepay ! neighbourcodedec !
  * cylinderfilter ! striprender ! glimagesink
  * ]|
@@ -83,7 +83,7 @@ struct _GstRtpNeighbourCodeDepay {
 
 static GstStaticPadTemplate sink_template =
     GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
-        GST_STATIC_CAPS ("application/x-rtp, media = (string) application, "
+        GST_STATIC_CAPS ("application/x-rtp, media = (string) video, "
                          "clock-rate = (int) 90000, encoding-name = (string) X-NEIGHBOUR-CODE"));
 static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,

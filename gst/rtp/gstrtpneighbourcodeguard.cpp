@@ -12,7 +12,7 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 udpsrc port=5004
- * caps="application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
+ * caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
  * rtpneighbourcodeguard ! rtpjitterbuffer ! rtpneighbourcodedepay ! neighbourcodedec !
  * cylinderfilter ! striprender ! glimagesink
  * ]|

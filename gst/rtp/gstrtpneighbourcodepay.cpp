@@ -78,7 +78,7 @@ static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
 static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
-        GST_STATIC_CAPS ("application/x-rtp, media = (string) application, "
+        GST_STATIC_CAPS ("application/x-rtp, media = (string) video, "
                          "payload = (int) [ 96, 127 ], clock-rate = (int) 90000, "
                          "encoding-name = (string) X-NEIGHBOUR-CODE"));
 
@@ -96,7 +96,7 @@ set_output_caps (GstRTPBasePayload *base, const gstrange::RangeInfo &info)
   const std::vector<guint8> blob = rangecast::encode_rig (info.rig);
   gchar *rig = g_base64_encode (blob.data (), blob.size ());
   const std::string rate = std::to_string (info.fps_n) + "/" + std::to_string (info.fps_d);
-  gst_rtp_base_payload_set_options (base, "application", TRUE, "X-NEIGHBOUR-CODE", 90000);
+  gst_rtp_base_payload_set_options (base, "video", TRUE, "X-NEIGHBOUR-CODE", 90000);
   const gboolean set = gst_rtp_base_payload_set_outcaps (base, "version", G_TYPE_STRING, "2",
       "views", G_TYPE_STRING, std::to_string (info.views ()).c_str (), "width", G_TYPE_STRING,
       std::to_string (info.width).c_str (), "height", G_TYPE_STRING,

@@ -6,7 +6,7 @@
 G_BEGIN_DECLS
 
 #define GST_RANGE_MEDIA_TYPE "video/x-range"
-#define GST_NEIGHBOUR_CODE_MEDIA_TYPE "application/x-neighbour-code"
+#define GST_NEIGHBOUR_CODE_MEDIA_TYPE "video/x-neighbour-code"
 
 #define GST_RANGE_SIZE_CAPS_                                                                       \
   "width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "                                      \

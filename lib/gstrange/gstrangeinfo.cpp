@@ -162,7 +162,7 @@ recode_caps (const GstCaps *caps, bool coded, GstCaps *filter)
 
 /**
  * gst_range_caps_get_camera:
- * @caps: fixed video/x-range or application/x-neighbour-code caps
+ * @caps: fixed video/x-range or video/x-neighbour-code caps
  * @view_id: 0 to 63
  * @camera: (out caller-allocates): the view's calibration
  *

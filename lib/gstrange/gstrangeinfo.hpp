@@ -36,12 +36,12 @@ GST_RANGE_API GstCaps *make_range_caps (const RangeInfo &info);
 /** Copies caps and replaces their rig. Returns: (transfer full) */
 GST_RANGE_API GstCaps *with_rig (const GstCaps *caps, const rangecast::Rig &rig);
 
-/** application/x-neighbour-code with alignment "access-unit" or "slice". Returns: (transfer full)
+/** video/x-neighbour-code with alignment "access-unit" or "slice". Returns: (transfer full)
  */
 GST_RANGE_API GstCaps *make_neighbour_code_caps (const RangeInfo &info, const char *alignment);
 
 /** transform_caps() of encoder and decoder: the same fields as video/x-range or, if `coded`, as
- *  application/x-neighbour-code with any alignment but byte-stream. Returns: (transfer full) */
+ *  video/x-neighbour-code with any alignment but byte-stream. Returns: (transfer full) */
 GST_RANGE_API GstCaps *recode_caps (const GstCaps *caps, bool coded, GstCaps *filter);
 
 } // namespace gstrange

@@ -10,7 +10,7 @@
 
 namespace {
 
-const char kCodedType[] = "application/x-neighbour-code";
+const char kCodedType[] = "video/x-neighbour-code";
 /* Object data of a media: it has its first frame set; it is live. */
 const char kPreparedKey[] = "rangecast-prepared", kLiveKey[] = "rangecast-live";
 /* Maximum time for which EOS waits for the time of the last frame set and for its packets. */

@@ -9,7 +9,7 @@
 namespace {
 
 const char kRtpCaps[] =
-    "application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE";
+    "application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE";
 
 const char kHint[] = "drag to turn, wheel to zoom, h for all keys";
 
@@ -232,6 +232,12 @@ on_source_setup (GstElement *, GstElement *source, gpointer user_data)
 void
 build_opener (Viewer &viewer, const char *uri)
 {
+  /* Frame sets are wanted, not the pictures of the element that players plug. */
+  if (GstPluginFeature *renderer =
+          gst_registry_lookup_feature (gst_registry_get (), "rangerender")) {
+    gst_plugin_feature_set_rank (renderer, GST_RANK_NONE);
+    gst_object_unref (renderer);
+  }
   GstElement *opener = add (viewer, "uridecodebin");
   GstCaps *caps = gst_caps_new_empty_simple ("video/x-range");
   g_object_set (opener, "uri", uri, "caps", caps, nullptr);

@@ -8,7 +8,7 @@ import os, subprocess, sys, tempfile
 import cv2, numpy as np
 
 VIEWS, BAD, AZIMUTH, SIZE, FRAMES = 6, 1, 40, 400, 16
-STREAM = 'application/x-neighbour-code,alignment=byte-stream'
+STREAM = 'video/x-neighbour-code,alignment=byte-stream'
 
 
 def launch(text):

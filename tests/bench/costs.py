@@ -33,7 +33,7 @@ EMPTY = 40  # frame sets of the empty room, before those that stereodepth's cost
 VIEWS = (1, 2, 4, 8, 16)
 SIZES = ("320x240", "640x480", "1280x960")
 VIEWERS = (1, 10, 50)
-PARSE = "neighbourcodeparse ! application/x-neighbour-code,alignment=access-unit"
+PARSE = "neighbourcodeparse ! video/x-neighbour-code,alignment=access-unit"
 DRAW = "video/x-raw(memory:GLMemory),width=640,height=480 ! fakesink"
 
 
@@ -86,7 +86,7 @@ def recording(folder, views, size):
             f"avatartestsrc views={views} num-buffers={count} range-person-only=true "
             f"! video/x-range,width={width},height={height},framerate=30/1 "
             f"! neighbourcodeenc profile=packed depth-bits=16 depth-threshold=0 colour-threshold=0 ! neighbourcodeparse "
-            f"! application/x-neighbour-code,alignment=byte-stream ! filesink location={shlex.quote(str(path))}")
+            f"! video/x-neighbour-code,alignment=byte-stream ! filesink location={shlex.quote(str(path))}")
     return paths
 
 

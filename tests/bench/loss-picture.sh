@@ -11,7 +11,7 @@ width=640 height=480
 for temporal in false true; do
   gst-launch-1.0 -q avatartestsrc views=1 num-buffers=40 range-person-only=true \
     ! "video/x-range,width=$width,height=$height,framerate=15/1" ! neighbourcodeenc profile=entropy "temporal=$temporal" max-slice-size=600 \
-    ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$temporal.rcnc"
+    ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink "location=$temporal.rcnc"
   python3 - "$tests/data" "$temporal.rcnc" <<'END'
 import random, sys
 from importlib import import_module

@@ -19,7 +19,7 @@ for n in "${views[@]}"; do
   if [ ! -s "$file" ]; then
     gst-launch-1.0 -q avatartestsrc "views=$n" num-buffers=80 empty-frames=20 ! video/x-range,width=320,height=240,framerate=30/1 \
       ! roiextract background-frames=18 ! neighbourcodeenc profile=plain ! neighbourcodeparse \
-      ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$file.part"
+      ! video/x-neighbour-code,alignment=byte-stream ! filesink "location=$file.part"
     mv "$file.part" "$file"
   fi
   recordings+=(--recording "$file")

@@ -8,7 +8,7 @@ source "$(dirname "$0")/../../pipelines/env.sh"
 seconds=${1:-40} skip=10
 port=$((21000 + $$ % 40 * 50))
 twcc='extmap-1=(string)http://www.ietf.org/id/draft-holmer-rmcat-transport-wide-cc-extensions-01'
-caps="application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE,payload=96"
+caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE,payload=96"
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"; jobs -p | xargs -r kill 2>/dev/null || true' EXIT
 cd "$folder"

@@ -158,7 +158,7 @@ test_sequences_run_through_a_video_codec () {
 test_recording_gives_its_frame_sets () {
   gst-launch-1.0 -q avatartestsrc views=2 num-buffers=3 range-person-only=true ! video/x-range,width=96,height=72 \
     ! neighbourcodeenc profile=plain depth-bits=16 depth-threshold=0 colour-threshold=0 ! neighbourcodeparse \
-    ! application/x-neighbour-code,alignment=byte-stream ! filesink location=three.rcnc
+    ! video/x-neighbour-code,alignment=byte-stream ! filesink location=three.rcnc
   codec_bench --recording three.rcnc "${quick[@]}" --only plain --json out.json >table.txt
   head -1 table.txt | grep -q "frame sets: 3, views: 2 of 96x72" || fail "$(head -1 table.txt)"
   check_json out.json "[r['psnr_db'] for r in of('plain') if r['settings'].endswith('=0 colour-threshold=0')] == [None]" "lossless"

@@ -6,7 +6,7 @@ PATH="$bench:$PATH"
 
 make_recording () { # FILE
   timeout 60 gst-launch-1.0 -q avatartestsrc views=2 num-buffers=6 ! video/x-range,width=64,height=48,framerate=30/1 \
-    ! neighbourcodeenc profile=plain ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$1"
+    ! neighbourcodeenc profile=plain ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink "location=$1"
 }
 
 test_every_process_has_a_row_in_table_and_json () {

@@ -85,7 +85,7 @@ make_frame_set (const Rig &rig, GstClockTime time = 0, Roi roi = {})
 
 /** For the sink of a harness, whose default takes anything and so is sent a byte stream. */
 inline constexpr const char *kAccessUnitsOrSlices =
-    "application/x-neighbour-code,alignment={access-unit,slice}";
+    "video/x-neighbour-code,alignment={access-unit,slice}";
 
 /** Waits for the bus's next error (or warning) and gives its text; empty if none came in 5 s. */
 inline std::string

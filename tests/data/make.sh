@@ -11,7 +11,7 @@ record () { # stream 'properties of avatartestsrc' [property of neighbourcodeenc
   shift 2
   # shellcheck disable=SC2086
   gst-launch-1.0 -q avatartestsrc "views=$views" $source ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc "$@" \
-    ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$stream.rcnc"
+    ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink "location=$stream.rcnc"
 }
 
 record default "num-buffers=2 range-person-only=true" profile=plain

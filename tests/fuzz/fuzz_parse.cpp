@@ -108,7 +108,7 @@ find_type (Bytes bytes)
 {
   static GstTypeFindFactory *factory = [] {
     auto feature = gst_registry_find_feature (
-        gst_registry_get (), "application/x-neighbour-code", GST_TYPE_TYPE_FIND_FACTORY);
+        gst_registry_get (), "video/x-neighbour-code", GST_TYPE_TYPE_FIND_FACTORY);
     expect (feature != nullptr);
     return GST_TYPE_FIND_FACTORY (gst_plugin_feature_load (feature));
   }();

@@ -67,7 +67,7 @@ Session::Session ()
   rtp = gst_harness_new_with_element (element, "sink", "src");
   rtcp = gst_harness_new_with_element (element, "rtcp_sink", "rtcp_src");
   gst_harness_set_src_caps_str (
-      rtp, "application/x-rtp, media=application, clock-rate=90000, payload=96");
+      rtp, "application/x-rtp, media=video, clock-rate=90000, payload=96");
   gst_harness_set_src_caps_str (rtcp, "application/x-rtcp");
   gst_harness_set_drop_buffers (rtp, TRUE);
   gst_harness_set_drop_buffers (rtcp, TRUE);

@@ -33,7 +33,7 @@ add (GstCaps *caps, const char *field, const char *text)
 static GstCaps *
 make_caps (int kind, Bytes bytes)
 {
-  GstCaps *caps = gst_caps_new_simple ("application/x-rtp", "media", G_TYPE_STRING, "application",
+  GstCaps *caps = gst_caps_new_simple ("application/x-rtp", "media", G_TYPE_STRING, "video",
       "clock-rate", G_TYPE_INT, 90000, "encoding-name", G_TYPE_STRING, "X-NEIGHBOUR-CODE", nullptr);
   if (kind & kVersion)
     add (caps, "version", take_string (bytes).c_str ());

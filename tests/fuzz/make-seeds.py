@@ -264,9 +264,9 @@ def range_meta_seeds() -> list[bytes]:
 
 def caps_seeds(rigs: list[bytes]) -> list[bytes]:
     fields = "width=(int)80, height=(int)60, views=(int)%d, framerate=(fraction)30/1, rig=(buffer)%s"
-    media = ("video/x-range, format=(string)Z16_RGBx, ", "application/x-neighbour-code, version=(int)2, alignment=(string)slice, ")
+    media = ("video/x-range, format=(string)Z16_RGBx, ", "video/x-neighbour-code, version=(int)2, alignment=(string)slice, ")
     texts = [(media[i % 2] + fields % (1 + i // 2, rig.hex())).encode() for i, rig in enumerate(rigs)]
-    texts += [b"ANY", b"video/x-range, width=[ 1, 80 ], alignment={ access-unit, slice }; application/x-neighbour-code(memory:GLMemory)"]
+    texts += [b"ANY", b"video/x-range, width=[ 1, 80 ], alignment={ access-unit, slice }; video/x-neighbour-code(memory:GLMemory)"]
     numbers = struct.pack("<5i", 80, 60, 1, 30, 1)
     return [b"\1" + text for text in texts] + [bytes((2 * (i % 2),)) + numbers + rig for i, rig in enumerate(rigs)]
 

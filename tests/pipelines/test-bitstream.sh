@@ -43,7 +43,7 @@ record () {
   # shellcheck disable=SC2086
   gst-launch-1.0 -q avatartestsrc "views=$views" $source \
     ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc "$@" \
-    ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$file"
+    ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink "location=$file"
 }
 
 test_recording_script_writes_what_the_document_says () {

@@ -59,7 +59,7 @@ test_file_that_is_no_recording_is_refused () {
 
 test_corrupted_recording_plays_on () {
   run avatartestsrc views=2 num-buffers=10 range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 \
-    ! neighbourcodeenc profile=plain ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream \
+    ! neighbourcodeenc profile=plain ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream \
     ! filesink location=good.rcnc
   python3 -c '
 import random

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # A viewer that asks a camera for a key frame set: RTCP from one process to another.
 
-caps='application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE,payload=96,rtcp-fb-nack-pli=(boolean)true'
+caps='application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE,payload=96,rtcp-fb-nack-pli=(boolean)true'
 
 start_viewer () { # port seconds
   GST_DEBUG=neighbourcodedec:5 GST_DEBUG_NO_COLOR=1 timeout "$2" gst-launch-1.0 -q rtpbin name=r rtp-profile=avpf latency=50 \

@@ -4,7 +4,7 @@
 side_by_side=3 # they wait for slow links
 
 twcc='extmap-1=(string)http://www.ietf.org/id/draft-holmer-rmcat-transport-wide-cc-extensions-01'
-caps="application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE,payload=96"
+caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE,payload=96"
 
 # Ports: +0 into the relay, +1 RTP out of it, +2 RTCP to the viewer, +3 RTCP to the sender.
 start_viewer () { # port seconds name caps

@@ -60,7 +60,7 @@ test_password_lets_in_and_keeps_out () {
 
 # Nothing comes from such a launch string; what waits for it would wait 20 seconds.
 test_ends_at_once_while_it_waits_for_its_first_frame_set () {
-  local way nothing="udpsrc port=$((ports + 240)) caps=application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE ! rtpneighbourcodedepay"
+  local way nothing="udpsrc port=$((ports + 240)) caps=application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE ! rtpneighbourcodedepay"
   for way in --always "--linger 1"; do
     # shellcheck disable=SC2086 # one or two words
     serve $way -- "$nothing"
@@ -338,7 +338,7 @@ runs_again () { grep -q 'runs again' server.log; }
 
 test_failure_of_every_run_is_told_once_and_when_it_is_over () {
   gst-launch-1.0 -q -e avatartestsrc num-buffers=20 range-person-only=true ! video/x-range,width=160,height=120,framerate=2/1 \
-    ! neighbourcodeenc ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location=good.rcnc
+    ! neighbourcodeenc ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink location=good.rcnc
   serve --always -- filesrc location=late.rcnc ! neighbourcodeparse
   until_true 30 grep -q 'late.rcnc' server.log
   sleep 4

@@ -14,7 +14,7 @@ test_sdp_carries_the_rig_and_the_version () {
   gst-launch-1.0 -q avatartestsrc num-buffers=1 rig-export=rig.yaml ! video/x-range,width=160,height=120 ! fakesink
   serve -- "$figure"
   count "$url" --describe >sdp.txt
-  grep -q '^m=application 0 RTP/AVPF 96' sdp.txt || fail "$(cat sdp.txt)"
+  grep -q '^m=video 0 RTP/AVPF 96' sdp.txt || fail "$(cat sdp.txt)"
   grep -q 'a=rtpmap:96 X-NEIGHBOUR-CODE/90000' sdp.txt || fail "$(cat sdp.txt)"
   grep -q 'a=rtcp-fb:96 nack pli' sdp.txt || fail "$(cat sdp.txt)"
   grep -q 'a=rtcp-fb:96 ccm fir' sdp.txt || fail "$(cat sdp.txt)"
@@ -69,7 +69,7 @@ test_joiner_gets_a_key_frame_set_at_once () {
 # A frame set that says what changed is of no use to who has not got the one before: it shows scraps.
 record_joiner () { # udp or tcp, number
   timeout -k 5 60 gst-launch-1.0 -e rtspsrc "location=$url" "protocols=$1" latency=50 ! rtpneighbourcodedepay ! identity eos-after=12 \
-    ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink "location=$1$2.rcnc" >"$1$2.log" 2>&1 || true
+    ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink "location=$1$2.rcnc" >"$1$2.log" 2>&1 || true
 }
 test_first_frame_set_of_joiners_is_whole () {
   serve -- "$figure profile=entropy temporal=true refresh-period=0"
@@ -132,7 +132,7 @@ test_twenty_viewers_watch_over_udp_and_tcp () {
 
 test_recording_ends_for_viewers_and_begins_for_the_next () {
   gst-launch-1.0 -q -e avatartestsrc num-buffers=40 range-person-only=true ! video/x-range,width=160,height=120,framerate=20/1 \
-    ! neighbourcodeenc ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location=still.rcnc
+    ! neighbourcodeenc ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink location=still.rcnc
   serve --linger 0 -- filesrc location=still.rcnc ! neighbourcodeparse
   play 100000 "location=$url" || fail "$(tail -n 5 player.log)"
   grep -q 'Got EOS' player.log || fail "$(cat player.log)"
@@ -143,7 +143,7 @@ test_recording_ends_for_viewers_and_begins_for_the_next () {
 # When a stream ends all its viewers must be gone from it, or its elements are freed while they run.
 test_recordings_end_while_viewers_come_and_watch () {
   gst-launch-1.0 -q -e avatartestsrc num-buffers=30 range-person-only=true ! video/x-range,width=160,height=120,framerate=20/1 \
-    ! neighbourcodeenc ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location=short.rcnc
+    ! neighbourcodeenc ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink location=short.rcnc
   serve --linger 0 -- filesrc location=short.rcnc ! neighbourcodeparse
   local i
   watchers=()
@@ -162,7 +162,7 @@ test_recordings_end_while_viewers_come_and_watch () {
 
 # Cameras by RTP, as parent-host.sh takes them; they run whether anybody watches or not.
 test_parent_of_two_cameras_is_served () {
-  local caps='application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE' i
+  local caps='application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE' i
   for i in 0 1; do
     timeout 110 gst-launch-1.0 -q avatartestsrc is-live=true views=2 view-id=$i range-person-only=true \
       ! video/x-range,width=160,height=120,framerate=10/1 ! neighbourcodeenc ! rtpneighbourcodepay \
@@ -316,7 +316,7 @@ END
 # The RTP session says goodbye when it gets EOS, and players end there.
 test_recording_arrives_to_its_last_frame_set () {
   gst-launch-1.0 -q avatartestsrc num-buffers=40 range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 \
-    ! neighbourcodeenc ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location=recording.rcnc
+    ! neighbourcodeenc ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink location=recording.rcnc
   serve -- "filesrc location=$PWD/recording.rcnc ! neighbourcodeparse"
   local protocol n
   for protocol in tcp udp; do

@@ -10,7 +10,7 @@ side_by_side=2 # they wait for pictures
 record_moving () {
   gst-launch-1.0 -q -e avatartestsrc views=2 num-buffers=50 noise=0 range-person-only=true \
     ! video/x-range,width=160,height=120,framerate=5/1 ! neighbourcodeenc ! neighbourcodeparse \
-    ! application/x-neighbour-code,alignment=byte-stream ! filesink location=moving.rcnc
+    ! video/x-neighbour-code,alignment=byte-stream ! filesink location=moving.rcnc
 }
 
 # usage: look_at NAME: the window of 320x240, as it is on the screen.
@@ -252,7 +252,7 @@ survives () {
   expect_error "cut.rcnc: " rangecast-viewer cut.rcnc
   # as many views as there may be, and a rig with more than there are keys
   gst-launch-1.0 -q -e avatartestsrc views=64 num-buffers=6 range-person-only=true ! video/x-range,width=32,height=24,framerate=5/1 \
-    ! neighbourcodeenc ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location=many.rcnc
+    ! neighbourcodeenc ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink location=many.rcnc
   open_viewer many.rcnc --size 320x240
   snap all.png
   for key in 1 2 3 4 5 6 7 8 9; do press $key; done

@@ -16,7 +16,7 @@ need_viewer () {
 record_still () { # [frame sets]
   gst-launch-1.0 -q -e avatartestsrc views=2 "num-buffers=${1:-12}" motion=0 noise=0 range-person-only=true \
     ! video/x-range,width=160,height=120,framerate=15/1 ! neighbourcodeenc ! neighbourcodeparse \
-    ! application/x-neighbour-code,alignment=byte-stream ! filesink location=still.rcnc
+    ! video/x-neighbour-code,alignment=byte-stream ! filesink location=still.rcnc
 }
 
 open_viewer () { # arguments of the viewer

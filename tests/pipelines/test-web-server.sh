@@ -221,7 +221,7 @@ test_tokens_come_from_options_and_files () {
 test_recording_is_shown_once () {
   need_server
   gst-launch-1.0 -q avatartestsrc num-buffers=40 views=2 ! video/x-range,width=64,height=48,framerate=10/1 ! neighbourcodeenc \
-    ! neighbourcodeparse ! application/x-neighbour-code,alignment=byte-stream ! filesink location="the recording.rcnc"
+    ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink location="the recording.rcnc"
   serve --file "the recording.rcnc"
   watch "${links[0]}" "" 1000 >watched.txt || fail "$(cat watched.txt)"
   grep -qF '{"type":"end"}' watched.txt || grep -q '^CLOSED 1001' watched.txt || fail "$(cat watched.txt)"

@@ -26,6 +26,12 @@ std::size_t count_points (const ConstRangeImage &image);
 Status rescale_depth (ImageView<const std::uint16_t> in, double factor, std::uint16_t near,
     std::uint16_t far, ImageView<std::uint16_t> out);
 
+/** Least and greatest value of a depth image's pixels other than 0; both 0 if there are none. */
+struct DepthRange {
+  int min = 0, max = 0;
+};
+[[nodiscard]] DepthRange find_depth_range (ImageView<const std::uint16_t> depth);
+
 /** Surface normal at a pixel, from a least-squares plane through the valid pixels of the
  * surrounding 5x5 that differ by less than 3 % of its depth. On a plane 1 / depth is linear in the
  * pixel's column and row, so the fit is exact there, at any slant.

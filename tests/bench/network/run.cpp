@@ -24,7 +24,7 @@ constexpr int kMediaType = 96; /* payload types */
 constexpr const char *kRtxMap = "\"application/x-rtp-pt-map,96=(uint)97,122=(uint)123\"";
 constexpr const char *kRtpCaps =
     "application/"
-    "x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE,payload=96,"
+    "x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE,payload=96,"
     "rtcp-fb-nack-pli=(boolean)true,rtcp-fb-nack=(boolean)true";
 
 int64_t

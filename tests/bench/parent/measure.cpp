@@ -25,7 +25,7 @@ using Command = std::vector<std::string>;
 
 constexpr double kWarmUpSeconds = 1, kStartSeconds = 20;
 const char *const kCaps =
-    "caps=application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE";
+    "caps=application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE";
 
 void
 sleep_s (double seconds)

@@ -444,7 +444,7 @@ GST_START_TEST (test_slices_and_access_units_decode_to_the_same)
   for (const bool slices : {false, true}) {
     GstHarness *h = harness (rig,
         slices
-            ? "neighbourcodeenc ! application/x-neighbour-code,alignment=slice ! neighbourcodedec"
+            ? "neighbourcodeenc ! video/x-neighbour-code,alignment=slice ! neighbourcodedec"
             : "neighbourcodeenc ! neighbourcodedec");
     for (GstClockTime time = 0; time < 3; time++)
       gst_harness_push (h, make_frame_set (rig, time));

@@ -8,7 +8,7 @@
 using namespace rangecast;
 using namespace rangecast::testing;
 
-static constexpr const char *kSliceCaps = "application/x-neighbour-code,alignment=slice";
+static constexpr const char *kSliceCaps = "video/x-neighbour-code,alignment=slice";
 
 static GstHarness *
 encoder (const Rig &rig, const char *properties = "", const char *sink_caps = nullptr)
@@ -63,7 +63,7 @@ note_order (GstPad *, GstPadProbeInfo *info, gpointer data)
 
 GST_START_TEST (test_eos_comes_out_after_the_last_frame_set)
 {
-  for (const char *caps : {"application/x-neighbour-code,alignment=access-unit", kSliceCaps}) {
+  for (const char *caps : {"video/x-neighbour-code,alignment=access-unit", kSliceCaps}) {
     const Rig rig = ring_rig (1);
     GstHarness *h = encoder (rig, "", caps);
     std::string order;
@@ -287,7 +287,7 @@ GST_END_TEST;
 GST_START_TEST (test_view_that_the_rig_lacks_is_one_error)
 {
   const Rig one = ring_rig (1), two = ring_rig (2);
-  for (const char *caps : {"application/x-neighbour-code,alignment=access-unit", kSliceCaps}) {
+  for (const char *caps : {"video/x-neighbour-code,alignment=access-unit", kSliceCaps}) {
     GstHarness *h = encoder (one, "", caps);
     {
       ErrorCounter errors (h);
@@ -336,7 +336,7 @@ GST_END_TEST;
 GST_START_TEST (test_frame_set_without_views_is_an_empty_buffer)
 {
   const Rig rig = ring_rig (2);
-  for (const char *caps : {"application/x-neighbour-code,alignment=access-unit", kSliceCaps}) {
+  for (const char *caps : {"video/x-neighbour-code,alignment=access-unit", kSliceCaps}) {
     GstHarness *h = encoder (rig, "", caps);
     GstBuffer *coded = gst_harness_push_and_pull (h, gst_range_buffer_new (2, 320, 240));
     fail_unless_equals_int (gst_buffer_get_size (coded), 0);
@@ -507,7 +507,7 @@ GST_START_TEST (test_all_headers_make_parser_and_payloader_repeat_the_rig_with_t
     std::size_t before; /* start code; RTP header */
     std::string all_headers, none;
   } cases[] = {
-      {"neighbourcodeparse ! capsfilter caps=application/x-neighbour-code,alignment=byte-stream", 4,
+      {"neighbourcodeparse ! capsfilter caps=video/x-neighbour-code,alignment=byte-stream", 4,
           "20020", "20000"},
       {"rtpneighbourcodepay config-interval=3600 mtu=60000", 12, "20020", "20000"},
       {"rtpneighbourcodepay config-interval=0 mtu=60000", 12, "00000", "00000"},

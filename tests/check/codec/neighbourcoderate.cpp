@@ -49,7 +49,7 @@ play (const std::string &source, const std::string &properties,
       " ! video/x-range,width=160,height=120,framerate=15/1 ! neighbourcodeenc name=encoder " +
       properties +
       " ! appsink name=sink sync=false max-buffers=1 "
-      "caps=application/x-neighbour-code,alignment=access-unit";
+      "caps=video/x-neighbour-code,alignment=access-unit";
   GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
   fail_unless (pipeline != nullptr);
   GstElement *encoder = gst_bin_get_by_name (GST_BIN (pipeline), "encoder");

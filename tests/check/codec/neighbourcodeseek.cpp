@@ -215,7 +215,7 @@ GST_START_TEST (test_error_after_a_seek_in_a_file_is_posted_too)
   auto bytes = first.bytes;
   bytes.insert (bytes.end (), second.bytes.begin (), second.bytes.end ());
   const TemporaryFile file (bytes);
-  Player player (file, "", "application/x-neighbour-code,width=64 !");
+  Player player (file, "", "video/x-neighbour-code,width=64 !");
   GstBus *bus = gst_element_get_bus (player.pipeline);
   for (int round = 0; round < 2; round++) {
     fail_unless (player.seek (0, GST_SEEK_FLAG_KEY_UNIT));

@@ -367,9 +367,9 @@ GST_START_TEST (test_rtp_and_the_parser_keep_the_delta_flag)
   const Rig rig = ring_rig (2);
   for (const char *between : {"rtpneighbourcodepay ! rtpneighbourcodedepay",
            "neighbourcodeparse ! capsfilter "
-           "caps=application/x-neighbour-code,alignment=byte-stream ! "
+           "caps=video/x-neighbour-code,alignment=byte-stream ! "
            "neighbourcodeparse ! capsfilter "
-           "caps=application/x-neighbour-code,alignment=access-unit"}) {
+           "caps=video/x-neighbour-code,alignment=access-unit"}) {
     GstHarness *h = gst_harness_new_parse (
         (std::string ("neighbourcodeenc temporal=true profile=entropy ! ") + between).c_str ());
     gst_harness_set_src_caps (h, range_caps (rig));

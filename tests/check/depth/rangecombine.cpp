@@ -111,6 +111,33 @@ GST_START_TEST (test_depth_outside_near_and_far_is_invalid)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_wrong_depth_scale_is_one_warning_that_names_it)
+{
+  Combine c; /* millimetres: 12 m is beyond far */
+  for (guint64 i = 0; i < 8; i++) {
+    c.push_colour (i * 100 * GST_MSECOND, 1);
+    c.push_depth (i * 100 * GST_MSECOND, 12000);
+    gst_buffer_unref (gst_harness_pull (c.colour));
+  }
+  const std::string text = next_message_text (c.bus, GST_MESSAGE_WARNING);
+  fail_unless_contains (text, "depth-scale=0.001");
+  fail_unless_contains (text, "12000");
+  fail_unless (gst_bus_pop_filtered (c.bus, GST_MESSAGE_WARNING) == nullptr);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_empty_frames_and_later_depth_give_no_warning)
+{
+  Combine c;
+  for (guint64 i = 0; i < 12; i++) {
+    c.push_colour (i * 100 * GST_MSECOND, 1);
+    c.push_depth (i * 100 * GST_MSECOND, i < 8 ? 0 : i == 8 ? 1500 : 12000);
+    gst_buffer_unref (gst_harness_pull (c.colour));
+  }
+  fail_unless (gst_bus_pop_filtered (c.bus, GST_MESSAGE_WARNING) == nullptr);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_pairs_by_pts_and_drops_what_has_no_partner)
 {
   Combine c;
@@ -529,6 +556,8 @@ rangecombine_suite ()
   tcase_add_test (tc, test_millimetres_become_depth_units_and_colour_stays);
   tcase_add_test (tc, test_big_endian_depth_is_taken);
   tcase_add_test (tc, test_depth_outside_near_and_far_is_invalid);
+  tcase_add_test (tc, test_wrong_depth_scale_is_one_warning_that_names_it);
+  tcase_add_test (tc, test_empty_frames_and_later_depth_give_no_warning);
   tcase_add_test (tc, test_pairs_by_pts_and_drops_what_has_no_partner);
   tcase_add_test (tc, test_gap_costs_its_frame_and_nothing_else);
   tcase_add_test (tc, test_gap_on_one_pad_is_a_gap_of_what_it_took_with_it);

@@ -93,6 +93,59 @@ GST_START_TEST (test_learns_then_crops_to_the_person_without_copying)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_learning_is_reported_view_by_view)
+{
+  const Rig rig = ring_rig (2);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=20");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  for (int i = 0; i < 25; i++)
+    push (h, scene (rig, i, false));
+  std::vector<int> frames[2];
+  while (GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_ELEMENT)) {
+    const GstStructure *s = gst_message_get_structure (message);
+    int view = -1, learnt = -1, of = -1;
+    if (gst_structure_has_name (s, "roiextract-learning")) {
+      fail_unless (gst_structure_get (s, "view-id", G_TYPE_INT, &view, "frames", G_TYPE_INT,
+          &learnt, "of", G_TYPE_INT, &of, nullptr));
+      fail_unless_equals_int (of, 20);
+      frames[view].push_back (learnt);
+    }
+    gst_message_unref (message);
+  }
+  const std::vector<int> expected = {1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 20};
+  fail_unless (frames[0] == expected && frames[1] == expected);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* A wall nearer than the one that was learnt, as after a camera was moved. */
+GST_START_TEST (test_picture_that_is_all_foreground_is_one_warning)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=2");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  for (int i = 0; i < 70; i++) {
+    GstBuffer *buffer = scene (rig, i, false);
+    if (i >= 2) {
+      gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
+      const RangeImage &image = frame.views ()[0];
+      for (int y = 0; y < image.roi.height; y++)
+        std::fill_n (image.depth.row (y), image.roi.width, guint16{8000});
+    }
+    push (h, buffer);
+  }
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_WARNING), "capture-background");
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_WARNING) == nullptr);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_nobody_is_an_empty_roi_and_no_error)
 {
   const Rig rig = ring_rig (1);
@@ -574,6 +627,8 @@ roiextract_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_learns_then_crops_to_the_person_without_copying);
+  tcase_add_test (tc, test_learning_is_reported_view_by_view);
+  tcase_add_test (tc, test_picture_that_is_all_foreground_is_one_warning);
   tcase_add_test (tc, test_nobody_is_an_empty_roi_and_no_error);
   tcase_add_test (tc, test_frames_before_the_camera_has_settled_teach_nothing);
   tcase_add_test (tc, test_margin_grows_the_roi);

@@ -129,7 +129,7 @@ GST_START_TEST (test_coded_views_have_their_own_units_and_caps)
   Demux demux;
   const Rig rig = ring_rig (2, 32, 24);
   demux.set_caps (coded_caps (rig));
-  fail_unless_cmp (encode_rig (rig_of_pad (demux[1], "application/x-neighbour-code")), ==,
+  fail_unless_cmp (encode_rig (rig_of_pad (demux[1], "video/x-neighbour-code")), ==,
       encode_rig (views_of (rig, {1})));
   const auto a = slice_unit (0, true, 11, 1, 2), b = slice_unit (1, true, 12, 2, 4),
              c = slice_unit (0, true, 11, 3, 2, 2);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* rangerender, and that decodebin and playbin find it. */
+/* rangerender, and that decodebin, playbin and playbin3 find it. */
 #include "render-check.hpp"
 
 #include <glib/gstdio.h>
@@ -25,7 +25,7 @@ struct Recording {
     const std::string launch =
         "avatartestsrc views=2 num-buffers=8 range-person-only=true ! "
         "video/x-range,width=160,height=120,framerate=10/1 ! neighbourcodeenc ! neighbourcodeparse "
-        "! application/x-neighbour-code,alignment=byte-stream ! filesink location=" +
+        "! video/x-neighbour-code,alignment=byte-stream ! filesink location=" +
         path;
     GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
     play_to_the_end (pipeline);
@@ -59,10 +59,14 @@ drawn_share (GstSample *sample)
   return drawn / double (info.width * info.height);
 }
 
-/* Plays to the end and counts the pictures in the appsink, each of which must show somebody. */
+/* Plays to the end and counts the pictures in the appsink, each of which must show somebody.
+ * playbin3 adds its sink only when the stream is known. */
 static int
 count_pictures (GstElement *pipeline, GstElement *appsink)
 {
+  gst_element_set_state (pipeline, GST_STATE_PAUSED);
+  fail_unless_equals_int (gst_element_get_state (pipeline, nullptr, nullptr, 20 * GST_SECOND),
+      GST_STATE_CHANGE_SUCCESS);
   gst_element_set_state (pipeline, GST_STATE_PLAYING);
   int pictures = 0;
   while (
@@ -124,32 +128,84 @@ GST_START_TEST (test_decodebin_shows_a_recording_as_pictures)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_decodebin_stops_at_frame_sets_where_those_are_asked_for)
+/* Plays until the appsink has a frame set of both views. */
+static void
+expect_frame_set (const std::string &launch)
 {
-  const Recording recording;
-  const std::string launch = "filesrc location=" + recording.path +
-                             " ! decodebin caps=video/x-range ! appsink name=s sync=false";
   GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
   GstElement *sink = gst_bin_get_by_name (GST_BIN (pipeline), "s");
   gst_element_set_state (pipeline, GST_STATE_PLAYING);
   GstSample *sample = gst_app_sink_try_pull_sample (GST_APP_SINK (sink), 20 * GST_SECOND);
-  fail_unless (sample != nullptr);
+  fail_unless (sample != nullptr, "%s", launch.c_str ());
   fail_unless_equals_int (gst_buffer_n_range_metas (gst_sample_get_buffer (sample)), 2);
   gst_sample_unref (sample);
   gst_element_set_state (pipeline, GST_STATE_NULL);
   gst_object_unref (sink);
   gst_object_unref (pipeline);
 }
+
+GST_START_TEST (test_frame_sets_are_decoded_behind_parsebin_or_with_another_rank)
+{
+  const Recording recording;
+  const std::string source = "filesrc location=" + recording.path;
+  expect_frame_set (source + " ! parsebin ! neighbourcodedec ! appsink name=s sync=false");
+  GstPluginFeature *feature = gst_registry_lookup_feature (gst_registry_get (), "rangerender");
+  const guint rank = gst_plugin_feature_get_rank (feature);
+  gst_plugin_feature_set_rank (feature, GST_RANK_NONE);
+  expect_frame_set (source + " ! decodebin caps=video/x-range ! appsink name=s sync=false");
+  gst_plugin_feature_set_rank (feature, rank);
+  gst_object_unref (feature);
+}
+GST_END_TEST;
+
+/* A coded frame set, and its caps. */
+static GstBuffer *
+code (const Rig &rig, GstCaps **caps)
+{
+  GstHarness *h = gst_harness_new ("neighbourcodeenc");
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  gst_harness_set_sink_caps_str (h, GST_NEIGHBOUR_CODE_MEDIA_TYPE ",alignment=access-unit");
+  GstBuffer *coded = gst_harness_push_and_pull (h, make_frame_set (rig));
+  *caps = gst_pad_get_current_caps (h->sinkpad);
+  gst_harness_teardown (h);
+  return coded;
+}
+
+GST_START_TEST (test_input_changes_between_coded_and_raw)
+{
+  if (!opengl_works ())
+    RANGECAST_SKIP ("no OpenGL context");
+  const Rig rig = ring_rig (2);
+  GstCaps *caps = nullptr;
+  GstBuffer *coded = code (rig, &caps);
+  GstHarness *h = gst_harness_new ("rangerender");
+  gst_harness_set_sink_caps_str (h, "video/x-raw,format=RGBA,width=200,height=150");
+  for (int i = 0; i < 2; i++) {
+    gst_harness_set_src_caps (h, gst_caps_ref (caps));
+    gst_buffer_unref (gst_harness_push_and_pull (h, gst_buffer_copy (coded)));
+    GstElement *decoder = gst_bin_get_by_name (GST_BIN (h->element), "decoder");
+    fail_unless (decoder != nullptr);
+    gst_object_unref (decoder);
+    gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+    gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig)));
+    fail_unless (gst_bin_get_by_name (GST_BIN (h->element), "decoder") == nullptr);
+  }
+  gst_buffer_unref (coded);
+  gst_caps_unref (caps);
+  gst_harness_teardown (h);
+}
 GST_END_TEST;
 
 /* The sink takes nothing but system memory, and says so before anything is decoded: playbin then
  * looks for decoders whose output it takes. */
-GST_START_TEST (test_playbin_shows_a_recording_to_a_sink_of_plain_video)
+static const char *const kPlayers[] = {"playbin", "playbin3"};
+
+GST_START_TEST (test_players_show_a_recording_to_a_sink_of_plain_video)
 {
   if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Recording recording;
-  GstElement *playbin = gst_element_factory_make ("playbin", nullptr);
+  GstElement *playbin = gst_element_factory_make (kPlayers[__i__], nullptr);
   GstElement *sink = gst_element_factory_make ("appsink", nullptr);
   GstCaps *caps = gst_caps_from_string ("video/x-raw,format=RGBA");
   g_object_set (sink, "caps", caps, "sync", FALSE, nullptr);
@@ -161,12 +217,12 @@ GST_START_TEST (test_playbin_shows_a_recording_to_a_sink_of_plain_video)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_playbin_seeks_to_the_frame_set_at_a_time)
+GST_START_TEST (test_players_seek_to_the_frame_set_at_a_time)
 {
   if (!opengl_works ())
     RANGECAST_SKIP ("no OpenGL context");
   const Recording recording;
-  GstElement *playbin = gst_element_factory_make ("playbin", nullptr);
+  GstElement *playbin = gst_element_factory_make (kPlayers[__i__], nullptr);
   GstElement *sink = gst_element_factory_make ("appsink", nullptr);
   g_object_set (playbin, "uri", recording.uri ().c_str (), "video-sink", sink, nullptr);
   gst_element_set_state (playbin, GST_STATE_PAUSED);
@@ -244,9 +300,10 @@ rangerender_suite ()
   tcase_add_test (tc, test_draws_into_system_memory_of_the_size_asked_for);
   tcase_add_test (tc, test_picture_stays_in_opengl_where_downstream_takes_that);
   tcase_add_test (tc, test_decodebin_shows_a_recording_as_pictures);
-  tcase_add_test (tc, test_decodebin_stops_at_frame_sets_where_those_are_asked_for);
-  tcase_add_test (tc, test_playbin_shows_a_recording_to_a_sink_of_plain_video);
-  tcase_add_test (tc, test_playbin_seeks_to_the_frame_set_at_a_time);
+  tcase_add_test (tc, test_frame_sets_are_decoded_behind_parsebin_or_with_another_rank);
+  tcase_add_test (tc, test_input_changes_between_coded_and_raw);
+  tcase_add_loop_test (tc, test_players_show_a_recording_to_a_sink_of_plain_video, 0, 2);
+  tcase_add_loop_test (tc, test_players_seek_to_the_frame_set_at_a_time, 0, 2);
   tcase_add_test (tc, test_properties_inside_can_be_set);
   tcase_add_test (tc, test_rate_that_downstream_limits_is_kept_to);
   return suite;

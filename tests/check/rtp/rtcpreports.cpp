@@ -23,7 +23,7 @@ struct Session {
     rtp = gst_harness_new_with_element (element, "sink", "src");
     rtcp = gst_harness_new_with_element (element, "rtcp_sink", "rtcp_src");
     gst_harness_set_src_caps_str (
-        rtp, "application/x-rtp, media=application, clock-rate=90000, payload=96");
+        rtp, "application/x-rtp, media=video, clock-rate=90000, payload=96");
     gst_harness_set_src_caps_str (rtcp, "application/x-rtcp");
     gst_harness_set_drop_buffers (rtp, FALSE);
   }
@@ -556,7 +556,7 @@ GST_START_TEST (test_a_session_behind_keeps_few_sources_in_a_flood)
   GstHarness *rtp = gst_harness_new_with_element (bin, "sink", "src");
   GstHarness *rtcp = gst_harness_new_with_element (bin, "rtcp_sink", nullptr);
   gst_harness_set_src_caps_str (
-      rtp, "application/x-rtp, media=application, clock-rate=90000, payload=96, ssrc=(uint)4660");
+      rtp, "application/x-rtp, media=video, clock-rate=90000, payload=96, ssrc=(uint)4660");
   gst_harness_set_src_caps_str (rtcp, "application/x-rtcp");
   GstBuffer *packet = gst_rtp_buffer_new_allocate (100, 0, 0);
   GstRTPBuffer mapped = GST_RTP_BUFFER_INIT;

@@ -198,7 +198,7 @@ GST_START_TEST (test_slices_sent_one_by_one_come_through_loss_and_disorder)
   const Received received = send (ring_rig (2, 160, 120),
       "drop-probability=0.1 duplicate-probability=0.1 delay-probability=0.2 min-delay=1 "
       "max-delay=30",
-      "", "application/x-neighbour-code,alignment=slice !");
+      "", "video/x-neighbour-code,alignment=slice !");
   fail_unless (received.frames > kFrames - 5, "%d frames", received.frames);
   fail_unless_equals_int (received.in_order, received.frames);
   fail_unless (std::abs (received.right_pixels - 0.9) < 0.06, "%g right", received.right_pixels);

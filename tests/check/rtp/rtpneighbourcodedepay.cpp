@@ -12,7 +12,7 @@ using namespace rangecast;
 using namespace rangecast::testing;
 
 static constexpr const char *kPlainRtpCaps =
-    "application/x-rtp,media=application,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE";
+    "application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE";
 
 /* The packets of some access units of a rig, with the payloader's caps. */
 struct Sent {

@@ -61,7 +61,7 @@ struct Guard {
   Guard ()
   {
     gst_element_set_bus (h->element, bus);
-    gst_harness_set_src_caps_str (h, "application/x-rtp,media=application,clock-rate=90000,"
+    gst_harness_set_src_caps_str (h, "application/x-rtp,media=video,clock-rate=90000,"
                                      "encoding-name=X-NEIGHBOUR-CODE,payload=96");
   }
   ~Guard ()

@@ -19,7 +19,7 @@ struct Encrypter {
     h = gst_harness_new_with_element (element, "rtp_sink_0", "rtp_src_0");
     gst_object_unref (element);
     gst_harness_set_src_caps_str (
-        h, "application/x-rtp,media=application,clock-rate=90000,payload=96");
+        h, "application/x-rtp,media=video,clock-rate=90000,payload=96");
   }
   ~Encrypter () { gst_harness_teardown (h); }
   Encrypter (const Encrypter &) = delete;

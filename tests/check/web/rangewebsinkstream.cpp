@@ -73,7 +73,7 @@ GST_START_TEST (test_welcome_has_the_caps_without_the_rig)
   push_to (sink, early, "one");
   WebClient late (sink);
   late.enter ();
-  fail_unless_contains (late.texts[0], "application/x-neighbour-code");
+  fail_unless_contains (late.texts[0], "video/x-neighbour-code");
   fail_unless_contains (late.texts[0], "views=(int)2");
   fail_if (late.texts[0].find ("rig=") != std::string::npos, "%s", late.texts[0].c_str ());
 }
