@@ -33,13 +33,26 @@ GST_DEBUG_CATEGORY_STATIC (gst_ply_enc_debug);
 
 using rangecast::PointCloudFormat;
 
+namespace {
+
+/* Output formats that may be negotiated. */
+enum class Choice { kAuto, kPly, kPcd };
+
+struct PlyEncSettings {
+  PointCloudFormat format; /* kind: not used */
+  Choice choice = Choice::kAuto;
+};
+
+} // namespace
+
 struct GstPlyEncPrivate {
-  std::mutex lock; /* guards settings, kind, started */
-  PointCloudFormat settings;
-  PointCloudFormat::Kind kind = PointCloudFormat::kPly; /* of the stream: settings.kind at start */
+  std::mutex lock; /* guards settings, choice, started */
+  PlyEncSettings settings;
+  Choice choice = Choice::kAuto; /* of the stream: settings.choice at start */
   bool started = false;
 
   /* streaming thread */
+  PointCloudFormat::Kind kind = PointCloudFormat::kPly; /* of the output caps */
   gstrange::RangeInfo info;
   CapsErrors caps_errors;
 };
@@ -61,21 +74,32 @@ static PointCloudFormat
 current_format (GstPlyEncPrivate *priv)
 {
   std::lock_guard guard (priv->lock);
-  PointCloudFormat format = priv->settings;
-  if (priv->started)
-    format.kind = priv->kind;
+  PointCloudFormat format = priv->settings.format;
+  format.kind = priv->kind;
   return format;
+}
+
+/* Of the output; PLY is the first where both are possible. */
+static GstCaps *
+possible_caps (GstPlyEncPrivate *priv)
+{
+  std::lock_guard guard (priv->lock);
+  switch (priv->started ? priv->choice : priv->settings.choice) {
+    case Choice::kPly:
+      return gst_caps_new_empty_simple ("application/x-ply");
+    case Choice::kPcd:
+      return gst_caps_new_empty_simple ("application/x-pcd");
+    default:
+      return gst_static_pad_template_get_caps (&src_template);
+  }
 }
 
 static GstCaps *
 gst_ply_enc_transform_caps (
     GstBaseTransform *base, GstPadDirection direction, GstCaps *, GstCaps *filter)
 {
-  const bool is_pcd = current_format (GST_PLY_ENC (base)->priv).kind == PointCloudFormat::kPcd;
-  GstCaps *other =
-      direction == GST_PAD_SRC
-          ? gst_static_pad_template_get_caps (&sink_template)
-          : gst_caps_new_empty_simple (is_pcd ? "application/x-pcd" : "application/x-ply");
+  GstCaps *other = direction == GST_PAD_SRC ? gst_static_pad_template_get_caps (&sink_template)
+                                            : possible_caps (GST_PLY_ENC (base)->priv);
   if (!filter)
     return other;
   GstCaps *filtered = gst_caps_intersect_full (filter, other, GST_CAPS_INTERSECT_FIRST);
@@ -84,10 +108,13 @@ gst_ply_enc_transform_caps (
 }
 
 static gboolean
-gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
+gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
 {
   auto self = GST_PLY_ENC (base);
-  GST_INFO_OBJECT (self, "caps %" GST_PTR_FORMAT, in);
+  GST_INFO_OBJECT (self, "caps %" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
+  self->priv->kind = gst_structure_has_name (gst_caps_get_structure (out, 0), "application/x-pcd")
+                         ? PointCloudFormat::kPcd
+                         : PointCloudFormat::kPly;
   const rangecast::Status status =
       rangecast::guarded ("plyenc", [&] { return gstrange::parse_caps (in, self->priv->info); });
   return self->priv->caps_errors.accept (GST_ELEMENT (self), status);
@@ -152,7 +179,7 @@ gst_ply_enc_start (GstBaseTransform *base)
   GstPlyEncPrivate *priv = GST_PLY_ENC (base)->priv;
   priv->caps_errors.reset ();
   std::lock_guard guard (priv->lock);
-  priv->kind = priv->settings.kind;
+  priv->choice = priv->settings.choice;
   priv->started = true;
   return TRUE;
 }
@@ -175,25 +202,28 @@ static GType
 gst_ply_enc_format_get_type (void)
 {
   static const GType type = [] {
-    static const GEnumValue values[] = {{PointCloudFormat::kPly, "PLY, binary", "ply"},
-        {PointCloudFormat::kPcd, "Binary PCD 0.7 (Point Cloud Library)", "pcd"}, {}};
+    static const GEnumValue values[] = {
+        {int (Choice::kAuto), "As downstream's caps name it, else PLY", "auto"},
+        {int (Choice::kPly), "PLY, binary", "ply"},
+        {int (Choice::kPcd), "Binary PCD 0.7 (Point Cloud Library)", "pcd"}, {}};
     return g_enum_register_static ("GstPlyEncFormat", values);
   }();
   return type;
 }
 
-static PropertyTable<PointCloudFormat> &
+static PropertyTable<PlyEncSettings> &
 ply_enc_properties ()
 {
-  using S = PointCloudFormat;
+  using S = PlyEncSettings;
+  using F = PointCloudFormat;
   using P = PropertyTable<S>;
   static P table = {
-      P::boolean<&S::with_view_id> ("view-id", "View ID",
+      P::boolean<&S::format, &F::with_view_id> ("view-id", "View ID",
           "Write the view-id of each point as property view_id", kMutablePlaying),
-      P::boolean<&S::with_normals> ("normals", "Normals",
+      P::boolean<&S::format, &F::with_normals> ("normals", "Normals",
           "Write a unit normal for each point, estimated from the neighbouring pixels",
           kMutablePlaying),
-      P::enumeration<&S::kind> (
+      P::enumeration<&S::choice> (
           "format", "Format", "Output file format", GST_TYPE_PLY_ENC_FORMAT, kMutableReady),
   };
   return table;

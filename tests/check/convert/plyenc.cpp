@@ -458,6 +458,23 @@ expect_format (GstHarness *h, const Rig &rig, bool pcd)
   gst_caps_unref (caps);
 }
 
+GST_START_TEST (test_format_is_the_one_that_downstream_names)
+{
+  const Rig rig = ring_rig (1);
+  for (const bool pcd : {false, true}) {
+    GstHarness *h = gst_harness_new ("plyenc");
+    gst_harness_set_sink_caps_str (h, pcd ? "application/x-pcd" : "application/x-ply");
+    gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+    expect_format (h, rig, pcd);
+    gst_harness_teardown (h);
+  }
+  GstHarness *h = gst_harness_new ("plyenc"); /* both are possible */
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  expect_format (h, rig, false);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_format_set_while_playing_waits_for_ready)
 {
   const Rig rig = ring_rig (1, 32, 24);
@@ -536,6 +553,7 @@ plyenc_suite ()
   tcase_add_test (tc, test_points_and_normals_of_a_cut_roi_are_those_of_the_whole_image);
   tcase_add_test (tc, test_pcd_read_by_its_header_has_the_points_of_the_ply);
   tcase_add_test (tc, test_pcd_header_says_what_readers_ask_for);
+  tcase_add_test (tc, test_format_is_the_one_that_downstream_names);
   tcase_add_test (tc, test_format_set_while_playing_waits_for_ready);
   tcase_add_test (tc, test_memory_that_ends_anywhere_is_one_error);
 #ifdef RANGECAST_HAVE_ASSIMP
