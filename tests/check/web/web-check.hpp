@@ -110,7 +110,8 @@ struct WebSink {
   {
     root.write ("index.html", "<title>page</title>");
     GstElement *element = gst_parse_launch (
-        ("rangewebsink port=0 sync=false webrtc=true stats-interval=0 root=" + root.path + " " + properties)
+        ("rangewebsink port=0 sync=false webrtc=true stats-interval=0 root=" + root.path + " " +
+            properties)
             .c_str (),
         nullptr);
     fail_unless (element != nullptr);
