@@ -378,7 +378,8 @@ test_stream_is_served_with_tls () {
   stop_server
 }
 
-# A tree whose setup.sh has nothing to do.
+# A tree whose setup.sh has nothing to do. demo.sh is started with signals as a terminal has them: a shell that was started with
+# one ignored cannot take it.
 make_tree () {
   mkdir tree
   ln -s "$pipelines" tree/pipelines
@@ -392,7 +393,7 @@ test_demo_is_shown_in_browsers () {
   make_tree
   local demo port
   set -m
-  tree/pipelines/demo.sh --input range --views 2 --size 64x48 --fps 8 --port $((ports + 10)) --out demo --web 0 >demo.log 2>&1 &
+  env --default-signal=INT,TERM tree/pipelines/demo.sh --input range --views 2 --size 64x48 --fps 8 --port $((ports + 10)) --out demo --web 0 >demo.log 2>&1 &
   demo=$!
   set +m
   trap 'kill -KILL -- -$demo 2>/dev/null || true' EXIT
@@ -429,7 +430,7 @@ test_demo_can_be_interrupted_while_it_starts () {
   for wait_for in setup.txt demo/rig.yaml demo/log/parent.log; do
     rm -rf setup.txt demo
     set -m
-    tree/pipelines/demo.sh --input range --views 2 --size 64x48 --fps 8 --port $((ports + 50)) --out demo --web 0 >demo.log 2>&1 &
+    env --default-signal=INT,TERM tree/pipelines/demo.sh --input range --views 2 --size 64x48 --fps 8 --port $((ports + 50)) --out demo --web 0 >demo.log 2>&1 &
     demo=$!
     set +m
     trap 'kill -KILL -- -$demo 2>/dev/null || true' EXIT
@@ -453,7 +454,7 @@ test_demo_ends_with_term_and_says_when_the_server_failed () {
   expect_error "--web: expected a whole number from 0 to 65535" tree/pipelines/demo.sh --web 65536
   [ ! -e setup.txt ] || fail "setup.sh was run"
   set -m
-  tree/pipelines/demo.sh --input range --views 1 --size 64x48 --fps 8 --port $((ports + 20)) --out demo --web 0 >demo.log 2>&1 &
+  env --default-signal=INT,TERM tree/pipelines/demo.sh --input range --views 1 --size 64x48 --fps 8 --port $((ports + 20)) --out demo --web 0 >demo.log 2>&1 &
   demo=$!
   set +m
   trap 'kill -KILL -- -$demo 2>/dev/null || true' EXIT
