@@ -40,6 +40,12 @@ With RANGECAST_STATS=udp://HOST:PORT (or a file) the hosts send their statistics
 END
 }
 
+# Also while a program in the foreground runs, which takes a signal as its regular end: the shell would go on.
+for signal in INT TERM HUP; do
+  trap "trap - $signal; stop_hosts; kill -$signal \$\$" $signal
+done
+stop_hosts () { :; } # until there are any
+
 input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 web= window= film=yes trace= jitter= latency= loop= threads= mtu= depth=
 while [ $# -gt 0 ]; do
   option=$1
@@ -107,8 +113,18 @@ esac
 source pipelines/env.sh
 
 pids=()
+# Ends all hosts, and waits until they are gone.
 stop_hosts () {
-  [ ${#pids[@]} = 0 ] || kill -TERM "${pids[@]}" 2>/dev/null || true
+  local i
+  [ ${#pids[@]} -gt 0 ] || return 0
+  kill -TERM "${pids[@]}" 2>/dev/null || true
+  for ((i = 0; i < 100; i++)); do
+    kill -0 "${pids[@]}" 2>/dev/null || break # true while one of them is left
+    sleep 0.1
+  done
+  kill -KILL "${pids[@]}" 2>/dev/null || true
+  wait || true
+  pids=()
 }
 trap stop_hosts EXIT
 declare -A names=()
@@ -216,6 +232,4 @@ done
 [ "$status" = 0 ] || { echo "demo.sh: the viewer failed" >&2; exit 1; }
 
 stop_hosts
-wait || true
-pids=()
 python3 pipelines/demo-report.py "$out"

@@ -9,7 +9,7 @@ usage () {
   cat <<'END'
 usage: web-server.sh [options]                        a built-in scene
        web-server.sh [options] --listen PORT          the parent's stream, by RTP as viewer-host.sh receives it
-       web-server.sh [options] --file RECORDING       a recording, once
+       web-server.sh [options] --file RECORDING       a recording, once; again and again with --loop
        web-server.sh [options] -- LAUNCH STRING       whatever ends with coded frame sets, as "... ! neighbourcodeenc"
   --address IP    address to listen at (default 127.0.0.1: browsers of this machine only); 0.0.0.0: all
   --port N        TCP port (default 8080; 0: any that is free)
@@ -21,13 +21,17 @@ usage: web-server.sh [options]                        a built-in scene
   --title TEXT    title of the page
   --stats PORT    UDP port for statistics of all hosts, for the dashboard: run them with RANGECAST_STATS=udp://THIS-MACHINE:PORT
   --origins LIST  origins of other servers' pages that may connect, e.g. "https://example.org"
+  --window N      frame sets on the way to a client (default 3); raise it where a round trip takes more than 3 frame periods
+  --webrtc        also offer data channels (WebRTC), which the link then asks for; opens UDP ports on all interfaces. The WebSocket
+                  works better on most links: see docs/guide/web.md
+  --stun HOST:PORT, --turn USER:PASSWORD@HOST:PORT  with --webrtc: servers for clients behind NAT, who learn the password
   --jitter MS     with --listen: jitter buffer (default 30)
   --multicast GROUP, --interface IF  with --listen: as in viewer-host.sh
 END
   rtp_usage_receiver
 }
 
-listen= file= jitter= group= port=8080 address=127.0.0.1 token= token_file= anonymous= certificate= private_key= title= stats= origins= string=()
+listen= file= jitter= group= port=8080 address=127.0.0.1 token= token_file= anonymous= certificate= private_key= title= stats= origins= loop= window= webrtc= stun= turn= string=()
 while [ $# -gt 0 ]; do
   option=$1
   [ $# = 1 ] || [ -n "$2" ] || die "option $1: expected a value, got ''"
@@ -39,6 +43,11 @@ while [ $# -gt 0 ]; do
   case "$1" in
     --listen) listen=${2:-}; shift ;;
     --file) file=${2:-}; shift ;;
+    --loop) loop=yes ;;
+    --window) window=${2:-}; shift ;;
+    --webrtc) webrtc=yes ;;
+    --stun) stun=${2:-}; shift ;;
+    --turn) turn=${2:-}; shift ;;
     --address) address=${2:-}; shift ;;
     --port) port=${2:-}; shift ;;
     --token) token=${2:-}; shift ;;
@@ -60,6 +69,7 @@ while [ $# -gt 0 ]; do
 done
 need_number "$port" --port 0 65535
 [ -z "$jitter" ] || need_number "$jitter" --jitter 0 10000
+[ -z "$window" ] || need_number "$window" --window 1 1000
 [ -z "$stats" ] || need_number "$stats" --stats 1 65535
 [ -z "$group" ] || need_group "$group"
 [ -z "$group$rtp_interface$rtp_fec$rtp_rtx$rtp_key$rtp_feedback$jitter" ] || [ -n "$listen" ] || die "options of RTP: expected with --listen"
@@ -69,6 +79,8 @@ need_number "$port" --port 0 65535
 for needed in "$certificate" "$private_key" "$token_file" "$file"; do
   [ -z "$needed" ] || [ -f "$needed" ] || die "no file '$needed'"
 done
+[ -z "$loop" ] || [ -n "$file" ] || die "--loop: expected with --file"
+[ -z "$stun$turn" ] || [ -n "$webrtc" ] || die "--stun and --turn: expected with --webrtc"
 [ -z "$private_key" ] || [ -n "$certificate" ] || die "--private-key: expected with --certificate"
 command -v rangecast-run >/dev/null || die "rangecast-run is missing, which prints the link; run $root/setup.sh"
 gst-inspect-1.0 --exists --atleast-version=0.0.0 rangewebsink || die "rangewebsink is missing: it needs libsoup-3.0 and json-glib; run $root/setup.sh"
@@ -81,6 +93,11 @@ settings=("port=$port" "address=$address")
 [ -z "$certificate" ] || settings+=("certificate=$certificate" "private-key=${private_key:-$certificate}")
 [ -z "$title" ] || settings+=("title=\"$(sed 's/["\\]/\\&/g' <<<"$title")\"") # as launch strings quote
 [ -z "$origins" ] || settings+=("origins=$origins")
+[ -z "$window" ] || settings+=("window=$window")
+[ -z "$webrtc" ] || settings+=(webrtc=true)
+[ -z "$stun" ] || settings+=("stun-server=stun://$stun")
+[ -z "$turn" ] || settings+=("turn-server=turn://$turn")
+[ -z "$loop" ] || export RANGECAST_LAUNCH="${RANGECAST_LAUNCH:-rangecast-run} --loop"
 if [ -n "$stats" ]; then
   stats_address=0.0.0.0
   [[ ! "$address" =~ ^(127\.|::1$|localhost$) ]] || stats_address=127.0.0.1
@@ -122,7 +139,7 @@ print_links () {
   case "$host" in 0.0.0.0 | '[::]') hosts="$(hostname) $(hostname -I 2>/dev/null || true)" ;; esac
   for one in $hosts; do
     [[ "$one" != *:*:* || "$one" == \[* ]] || one="[$one]"
-    echo "$scheme://$one:$link_port/${token:+#token=$token}"
+    echo "$scheme://$one:$link_port/${webrtc:+?transport=webrtc}${token:+#token=$token}"
   done
   [ -z "$token_file" ] || [ -n "$private" ] || echo "(each user's link ends with #token= and their token)"
 }

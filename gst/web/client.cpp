@@ -168,7 +168,10 @@ Client::enter (const JsonMessage &message)
     return refuse (kCloseBadMessage, error);
   if (hello->version != kProtocolVersion)
     return refuse (kCloseVersion, "expected version " + std::to_string (kProtocolVersion));
-  if (!host_.admit (hello->token, user_))
+  const auto admission = host_.admit (address_, hello->token, user_);
+  if (admission == Host::Admission::kTooManyWrongTokens)
+    return refuse (kCloseLimit, "too many wrong tokens from this address");
+  if (admission == Host::Admission::kWrongToken)
     return refuse (kCloseUnauthorized, "wrong or missing token");
   hello_ = *hello;
   hello_.token.clear ();
@@ -288,6 +291,7 @@ Client::send (const FrameSet &frame_set)
     first_ = frame_set.number;
   else if (frame_set.number != last_ + 1) /* the server was too busy for one */
     needs_key_ = true;
+  needs_key_ |= frame_set.discontinuity;
   any_ = true;
   last_ = frame_set.number;
   const bool new_rig = rig_units_ != frame_set.rig_units;

@@ -23,6 +23,7 @@ struct FrameSet {
   BytesPtr units;
   std::shared_ptr<const std::string> rig_units; ///< of the rig that it belongs to
   bool key;                                     ///< refers to no earlier frame set
+  bool discontinuity;                           ///< does not continue the ones before
   guint32 number;
   gint64 captured_us; ///< on g_get_monotonic_time(); -1: unknown
 };
@@ -34,9 +35,11 @@ public:
   class Host {
   public:
     virtual ~Host () = default;
-    /** @return whether the token lets the client in
+    enum class Admission { kAdmitted, kWrongToken, kTooManyWrongTokens };
+    /** @param address  of the client
      *  @param[out] name  of the user, if tokens have names */
-    virtual bool admit (const std::string &token, std::string &name) = 0;
+    virtual Admission admit (
+        const std::string &address, const std::string &token, std::string &name) = 0;
     virtual void request_key (Client &client) = 0;
     virtual std::string welcome () = 0; ///< the message
     virtual bool offers_rtc () = 0;

@@ -14,15 +14,11 @@
 namespace web {
 
 struct DataChannel::Link {
-  GMainContext *context;
   DataChannel *channel; /* server's thread only; null when it is gone */
   std::mutex lock;      /* held while the pipeline's state changes */
   bool closed = false;  /* with the lock */
 
-  explicit Link (GMainContext *of) : context (g_main_context_ref (of)), channel (nullptr) {}
-  ~Link () { g_main_context_unref (context); }
-  Link (const Link &) = delete;
-  Link &operator= (const Link &) = delete;
+  Link (DataChannel *of, GMainContext *server) : channel (of), context_ (server) {}
 
   /* For signals and threads: a reference of their own. */
   static gpointer hold (const std::shared_ptr<Link> &link) { return new std::shared_ptr (link); }
@@ -32,6 +28,15 @@ struct DataChannel::Link {
   }
   static void release (gpointer data) { delete static_cast<std::shared_ptr<Link> *> (data); }
   static void release_closure (gpointer data, GClosure *) { release (data); }
+
+  /* On the server's thread. Nothing is posted to its main context from here on, so that what is
+   * posted to it goes with it. */
+  void detach ()
+  {
+    std::lock_guard guard (context_lock_);
+    channel = nullptr;
+    context_ = nullptr;
+  }
 
   /* Calls on the server's thread, unless the owner is gone by then. */
   template <class Call> static void post (const std::shared_ptr<Link> &link, Call call)
@@ -47,12 +52,19 @@ struct DataChannel::Link {
       return G_SOURCE_REMOVE;
     };
     const auto free = [] (gpointer data) { delete static_cast<Posted *> (data); };
+    std::lock_guard guard (link->context_lock_);
+    if (!link->context_)
+      return;
     GSource *source = g_idle_source_new ();
     g_source_set_priority (source, G_PRIORITY_DEFAULT); /* in the order of posting */
     g_source_set_callback (source, run, new Posted{link, std::move (call)}, free);
-    g_source_attach (source, link->context);
+    g_source_attach (source, link->context_);
     g_source_unref (source);
   }
+
+private:
+  std::mutex context_lock_;
+  GMainContext *context_; /* with its lock; null when the channel is gone */
 };
 
 namespace {
@@ -220,13 +232,12 @@ DataChannel::open (GstElement *pipeline, const std::shared_ptr<Link> &link)
 /* ---- on the server's thread ---- */
 
 DataChannel::DataChannel (GMainContext *context, Owner &owner, const Settings &settings)
-    : link_ (std::make_shared<Link> (context)), owner_ (owner),
+    : link_ (std::make_shared<Link> (this, context)), owner_ (owner),
       pipeline_ (gst_pipeline_new (nullptr)),
       webrtc_ (gst_element_factory_make ("webrtcbin", "webrtc")),
       created_us_ (g_get_monotonic_time ())
 {
   gst_object_ref_sink (pipeline_);
-  link_->channel = this;
   channels++;
   switch_upnp_off (webrtc_);
   g_object_set (webrtc_, "bundle-policy", GST_WEBRTC_BUNDLE_POLICY_MAX_BUNDLE, nullptr);
@@ -249,12 +260,14 @@ DataChannel::DataChannel (GMainContext *context, Owner &owner, const Settings &s
 
 DataChannel::~DataChannel ()
 {
-  link_->channel = nullptr;
+  link_->detach ();
   channel_.reset ();
   const GstElementCallAsyncFunc stop = [] (GstElement *pipeline, gpointer data) {
     const auto &link = Link::held (data);
     std::lock_guard guard (link->lock);
     link->closed = true;
+    gst_element_set_state (pipeline, GST_STATE_NULL);
+    /* Once more for elements that webrtcbin's thread started meanwhile, which has ended by now. */
     gst_element_set_state (pipeline, GST_STATE_NULL);
     channels--;
   };

@@ -34,6 +34,7 @@
 #include <mutex>
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "category.hpp"
@@ -52,9 +53,14 @@ struct GstRangeWebSinkPrivate {
   Settings settings;
   std::shared_ptr<web::Server> server; /* from PAUSED on */
   StatsReporter reporter;
+  std::atomic<bool> requesting_key = false;
+
+  /* state changes only: servers of before, whose clients have not closed their connections yet */
+  std::vector<std::shared_ptr<web::Server>> stopped;
 
   /* streaming thread only */
   CapsErrors caps_errors;
+  GstClockTime last_pts = GST_CLOCK_TIME_NONE;
 };
 
 struct _GstRangeWebSink {
@@ -91,11 +97,7 @@ gst_range_web_sink_set_caps (GstBaseSink *base, GstCaps *caps)
   priv->reporter.set_views (info.rig);
   std::vector<guint8> rig;
   rangecast::write_rig_units ({info.rig, info.fps_n, info.fps_d}, rig);
-  GstCaps *without_rig = gst_caps_copy (caps);
-  gst_structure_remove_field (gst_caps_get_structure (without_rig, 0), "rig");
-  g_autofree gchar *text = gst_caps_to_string (without_rig);
-  gst_caps_unref (without_rig);
-  current_server (priv)->set_stream (text, std::string (rig.begin (), rig.end ()));
+  current_server (priv)->set_rig (std::string (rig.begin (), rig.end ()));
   return TRUE;
 }
 
@@ -115,6 +117,18 @@ capture_time_us (GstElement *element, GstBuffer *buffer)
   return ABS (age) < 10 * GstClockTimeDiff (GST_SECOND) ? g_get_monotonic_time () - age / 1000 : -1;
 }
 
+/* Whether decoders should not use earlier frame sets. As in neighbourcodedec, DISCONT alone does
+ * not say so: it comes with each lost packet, and slices name the frame sets that they refer to. */
+static bool
+is_discontinuity (GstRangeWebSinkPrivate *priv, GstBuffer *buffer)
+{
+  const GstClockTime last = std::exchange (priv->last_pts, GST_BUFFER_PTS (buffer));
+  if (!GST_BUFFER_IS_DISCONT (buffer))
+    return false;
+  return !GST_BUFFER_PTS_IS_VALID (buffer) || !GST_CLOCK_TIME_IS_VALID (last) ||
+         GST_BUFFER_PTS (buffer) < last || GST_BUFFER_PTS (buffer) - last > GST_SECOND;
+}
+
 static GstFlowReturn
 gst_range_web_sink_render (GstBaseSink *base, GstBuffer *buffer)
 {
@@ -125,7 +139,7 @@ gst_range_web_sink_render (GstBaseSink *base, GstBuffer *buffer)
   GST_LOG_OBJECT (base, "%" G_GSIZE_FORMAT " bytes of %" GST_TIME_FORMAT, size,
       GST_TIME_ARGS (GST_BUFFER_PTS (buffer)));
   current_server (priv)->push (web::BytesPtr (g_bytes_new_take (units, size)),
-      !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT),
+      !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT), is_discontinuity (priv, buffer),
       capture_time_us (GST_ELEMENT (base), buffer));
   priv->reporter.passed (GST_ELEMENT (base), buffer);
   return GST_FLOW_OK;
@@ -136,6 +150,11 @@ gst_range_web_sink_event (GstBaseSink *base, GstEvent *event)
 {
   GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (base)->priv;
   const bool ended = GST_EVENT_TYPE (event) == GST_EVENT_EOS;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
+    priv->last_pts = GST_CLOCK_TIME_NONE;
+    if (const auto server = current_server (priv))
+      server->flush ();
+  }
   /* waits until the last frame set was rendered */
   const gboolean handled =
       GST_BASE_SINK_CLASS (gst_range_web_sink_parent_class)->event (base, event);
@@ -147,13 +166,20 @@ gst_range_web_sink_event (GstBaseSink *base, GstEvent *event)
   return handled;
 }
 
-/* On the server's thread. */
-static void
-request_key (GstObject *element)
+/* On the server's thread, which does not wait for what upstream does with the event. */
+static bool
+request_key (GstObject *object)
 {
-  GST_DEBUG_OBJECT (element, "requesting a key frame set");
-  gst_pad_push_event (GST_BASE_SINK_PAD (element),
-      gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE, TRUE, 0));
+  auto self = GST_RANGE_WEB_SINK (object);
+  if (self->priv->requesting_key.exchange (true))
+    return false;
+  const GstElementCallAsyncFunc push = [] (GstElement *element, gpointer) {
+    gst_pad_push_event (GST_BASE_SINK_PAD (element),
+        gst_video_event_new_upstream_force_key_unit (GST_CLOCK_TIME_NONE, TRUE, 0));
+    GST_RANGE_WEB_SINK (element)->priv->requesting_key = false;
+  };
+  gst_element_call_async (GST_ELEMENT (self), push, nullptr, nullptr);
+  return true;
 }
 
 /* ---- life ---- */
@@ -188,6 +214,8 @@ gst_range_web_sink_start (GstElement *element)
   if (settings.root.empty ())
     settings.root = default_root (element);
   priv->caps_errors.reset ();
+  priv->last_pts = GST_CLOCK_TIME_NONE;
+  std::erase_if (priv->stopped, [] (const auto &server) { return server->has_stopped (); });
   auto server = std::make_shared<web::Server> (GST_OBJECT (element), settings, request_key);
   if (const Status status = server->start ();
       gst_range_flow_return (element, status) != GST_FLOW_OK)
@@ -204,13 +232,20 @@ gst_range_web_sink_start (GstElement *element)
   return true;
 }
 
+/* The server's thread says goodbye to its clients after that. */
 static void
 gst_range_web_sink_stop (GstRangeWebSinkPrivate *priv)
 {
-  std::shared_ptr<web::Server> server; /* stops at the end, without the lock */
-  std::lock_guard guard (priv->lock);
-  server.swap (priv->server);
-  priv->settings.url.clear ();
+  std::shared_ptr<web::Server> server;
+  {
+    std::lock_guard guard (priv->lock);
+    server.swap (priv->server);
+    priv->settings.url.clear ();
+  }
+  if (!server)
+    return;
+  server->stop ();
+  priv->stopped.push_back (std::move (server));
 }
 
 static std::vector<StatsRow>
@@ -247,7 +282,7 @@ static GstStructure *
 make_stats (GstRangeWebSinkPrivate *priv)
 {
   const auto counters = priv->server ? priv->server->counters () : web::Server::Counters{};
-  GstStructure *stats = gst_structure_new ("stats", "clients", G_TYPE_UINT, counters.clients,
+  GstStructure *stats = gst_structure_new ("server-stats", "clients", G_TYPE_UINT, counters.clients,
       "connections", G_TYPE_UINT64, counters.connections, "refused", G_TYPE_UINT64,
       counters.refused, "frame-sets", G_TYPE_UINT64, counters.frame_sets, "key-requests",
       G_TYPE_UINT64, counters.key_requests, "bytes", G_TYPE_UINT64, counters.bytes, nullptr);
@@ -280,7 +315,8 @@ web_properties ()
       P::text<&Settings::private_key> ("private-key", "Private key",
           "PEM file of the certificate's private key; null: it is in the certificate's file",
           kMutableReady),
-      P::text<&Settings::token> ("token", "Token", "Shared secret that clients must send; null: none",
+      P::text<&Settings::token> ("token", "Token",
+          "Shared secret that clients must send; null: none",
           GParamFlags (G_PARAM_WRITABLE | G_PARAM_STATIC_STRINGS | GST_PARAM_MUTABLE_READY)),
       P::text<&Settings::token_file> ("token-file", "Token file",
           "File of lines `name token`, one for each user; read whenever a client enters",
@@ -322,6 +358,14 @@ web_properties ()
   return table;
 }
 
+/* Waits until all connections are closed: the servers use the element in their log. */
+static void
+gst_range_web_sink_dispose (GObject *object)
+{
+  GST_RANGE_WEB_SINK (object)->priv->stopped.clear ();
+  G_OBJECT_CLASS (gst_range_web_sink_parent_class)->dispose (object);
+}
+
 static void
 gst_range_web_sink_finalize (GObject *object)
 {
@@ -342,11 +386,20 @@ gst_range_web_sink_class_init (GstRangeWebSinkClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto base_class = GST_BASE_SINK_CLASS (klass);
 
+  object_class->dispose = GST_DEBUG_FUNCPTR (gst_range_web_sink_dispose);
   object_class->finalize = GST_DEBUG_FUNCPTR (gst_range_web_sink_finalize);
-  install_properties<GstRangeWebSink, web_properties, make_stats> (object_class,
-      "clients (uint), connections, refused, frame-sets, key-requests, bytes (guint64), client "
-      "(array of structures: address, user, transport (string), frame-sets, dropped, bytes "
-      "(guint64), unacknowledged (uint); at most a second old)");
+  /* As install_properties() does; but the base class has a property `stats`. */
+  object_class->set_property = properties::set_property<GstRangeWebSink, web_properties>;
+  object_class->get_property =
+      properties::get_property<GstRangeWebSink, web_properties, make_stats>;
+  g_object_class_install_property (object_class, properties::kStatsId,
+      g_param_spec_boxed ("server-stats", "Server statistics",
+          "clients (uint), connections, refused, frame-sets, key-requests, bytes (guint64), client "
+          "(array of structures: address, user, transport (string), frame-sets, dropped, bytes "
+          "(guint64), unacknowledged (uint); at most a second old)",
+          GST_TYPE_STRUCTURE, kReadOnly));
+  StatsReporter::install (object_class, properties::kStatsIntervalId);
+  web_properties ().install (object_class, properties::kFirstSettingId);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_set_static_metadata (element_class, "Range web sink", "Sink/Network",

@@ -3,10 +3,12 @@
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <future>
 #include <string_view>
 
 #include "category.hpp"
@@ -63,6 +65,51 @@ ice_servers (const Settings &settings)
   return "[" + json + "]";
 }
 
+/* GIO does not compare the certificate with its key; clients would find out. So one connects here,
+ * over a pair of sockets.
+ * @param context  default of this thread
+ * @return what is wrong; else empty */
+std::string
+try_handshake (GMainContext *context, GTlsCertificate *certificate)
+{
+  struct Outcome {
+    GCancellable *failed;
+    guint sides; /* that are done */
+    std::string error;
+  };
+  g_autoptr (GCancellable) failed = g_cancellable_new ();
+  Outcome outcome{failed, 0, {}};
+  const GAsyncReadyCallback done = [] (GObject *side, GAsyncResult *result, gpointer data) {
+    auto outcome = static_cast<Outcome *> (data);
+    g_autoptr (GError) error = nullptr;
+    outcome->sides++;
+    if (g_tls_connection_handshake_finish (G_TLS_CONNECTION (side), result, &error))
+      return;
+    if (outcome->error.empty ())
+      outcome->error = error->message;
+    g_cancellable_cancel (outcome->failed);
+  };
+  int descriptors[2];
+  if (socketpair (AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, descriptors) != 0)
+    return g_strerror (errno);
+  for (const bool is_server : {true, false}) {
+    g_autoptr (GSocket) socket = g_socket_new_from_fd (descriptors[is_server], nullptr);
+    g_autoptr (GSocketConnection) stream = g_socket_connection_factory_create_connection (socket);
+    g_autoptr (GIOStream) side =
+        is_server ? g_tls_server_connection_new (G_IO_STREAM (stream), certificate, nullptr)
+                  : g_tls_client_connection_new (G_IO_STREAM (stream), nullptr, nullptr);
+    /* Whoever signed it: clients decide whom they trust. */
+    const auto accept = [] (GTlsConnection *, GTlsCertificate *, GTlsCertificateFlags,
+                            gpointer) -> gboolean { return TRUE; };
+    g_signal_connect (side, "accept-certificate", GCallback (+accept), nullptr);
+    g_tls_connection_handshake_async (
+        G_TLS_CONNECTION (side), G_PRIORITY_DEFAULT, outcome.failed, done, &outcome);
+  }
+  while (outcome.sides < 2)
+    g_main_context_iteration (context, TRUE);
+  return outcome.error;
+}
+
 GSource *
 add_timer (GMainContext *context, guint interval_ms, GSourceFunc call, gpointer data)
 {
@@ -83,19 +130,11 @@ Server::Server (GstObject *element, Settings settings, RequestKey request_key)
 
 Server::~Server ()
 {
-  if (thread_.joinable ()) {
-    const auto quit = [] (gpointer self) -> gboolean {
-      static_cast<Server *> (self)->close_all ();
-      return G_SOURCE_REMOVE;
-    };
-    g_main_context_invoke (context_, quit, this);
+  stop ();
+  if (thread_.joinable ())
     thread_.join ();
-  }
-  for (GSource *timer : timers_) {
-    g_source_destroy (timer);
-    g_source_unref (timer);
-  }
   g_main_context_push_thread_default (context_);
+  stop_listening (); /* if start() failed */
   clients_.clear ();
   g_clear_object (&soup_);
   g_clear_object (&stats_socket_);
@@ -122,6 +161,10 @@ Server::load_certificate ()
     return {StatusCode::kNotFound, "certificate and private-key: expected PEM files; '" +
                                        settings_.certificate + "' and '" + key +
                                        "': " + error->message};
+  if (const std::string wrong = try_handshake (context_, certificate); !wrong.empty ())
+    return {StatusCode::kBadValue, "private-key: expected the key of the certificate '" +
+                                       settings_.certificate + "', got '" + key +
+                                       "': TLS does not work with them: " + wrong};
   soup_server_set_tls_certificate (soup_, certificate);
   return {};
 }
@@ -240,6 +283,7 @@ Server::run ()
   g_main_context_push_thread_default (context_);
   g_main_loop_run (loop_);
   g_main_context_pop_thread_default (context_);
+  stopped_ = true;
 }
 
 /* Until something has happened, but no longer. */
@@ -256,10 +300,53 @@ Server::run_for (gint64 time_us, const std::function<bool ()> &happened)
   g_source_unref (timer);
 }
 
+/* ---- stopping ---- */
+
+/* Waits for what the server's thread does at the moment, and for no client. */
+void
+Server::stop ()
+{
+  struct Stop {
+    Server *server;
+    std::promise<void> listening_ended;
+  };
+  if (!thread_.joinable () || std::exchange (stopping_, true))
+    return;
+  const auto call = [] (gpointer data) -> gboolean {
+    auto stop = static_cast<Stop *> (data);
+    stop->server->stop_listening ();
+    stop->listening_ended.set_value ();
+    stop->server->close_all ();
+    return G_SOURCE_REMOVE;
+  };
+  const auto free = [] (gpointer data) { delete static_cast<Stop *> (data); };
+  auto stop = new Stop{this, {}};
+  const auto listening_ended = stop->listening_ended.get_future ();
+  GSource *source = g_idle_source_new ();
+  g_source_set_priority (source, G_PRIORITY_HIGH);
+  g_source_set_callback (source, call, stop, free);
+  g_source_attach (source, context_);
+  g_source_unref (source);
+  listening_ended.wait ();
+}
+
+void
+Server::stop_listening ()
+{
+  for (GSource *timer : timers_) {
+    g_source_destroy (timer);
+    g_source_unref (timer);
+  }
+  timers_.clear ();
+  if (soup_)
+    soup_server_disconnect (soup_); /* no new ones; open WebSockets stay */
+  if (stats_socket_)
+    g_socket_close (stats_socket_, nullptr);
+}
+
 void
 Server::close_all ()
 {
-  soup_server_disconnect (soup_); /* no new ones; open WebSockets stay */
   for (const auto &client : clients_)
     client->close (kCloseGoingAway, "the server stops");
   run_for (kFarewell_us, [this] { return clients_.empty (); });
@@ -497,9 +584,15 @@ Server::closed (Client &client)
   counters_.clients = guint (clients_.size ());
 }
 
-bool
-Server::admit (const std::string &token, std::string &name)
+Client::Host::Admission
+Server::admit (const std::string &address, const std::string &token, std::string &name)
 {
+  const gint64 now = g_get_monotonic_time ();
+  if (settings_.has_token () && !guesses_.allows (address, now)) {
+    std::lock_guard guard (lock_);
+    counters_.refused++;
+    return Admission::kTooManyWrongTokens;
+  }
   bool admitted = !settings_.has_token ();
   if (!settings_.token.empty ())
     admitted = equal_tokens (token, settings_.token);
@@ -511,11 +604,13 @@ Server::admit (const std::string &token, std::string &name)
     admitted = found.has_value ();
     name = found.value_or ("");
   }
-  if (!admitted) {
-    std::lock_guard guard (lock_);
-    counters_.refused++;
-  }
-  return admitted;
+  if (admitted)
+    return Admission::kAdmitted;
+  if (!token.empty ())
+    guesses_.add_failure (address, now);
+  std::lock_guard guard (lock_);
+  counters_.refused++;
+  return Admission::kWrongToken;
 }
 
 std::string
@@ -526,13 +621,6 @@ Server::welcome ()
                      ",\"rtc\":" + (rtc_ ? "true" : "false");
   if (rtc_)
     json += ",\"iceServers\":" + ice_servers (settings_);
-  std::string caps;
-  {
-    std::lock_guard guard (lock_);
-    caps = caps_;
-  }
-  if (!caps.empty ())
-    json += ",\"caps\":" + json_string (caps);
   return json + "}";
 }
 
@@ -554,15 +642,13 @@ void
 Server::request_key (Client &client)
 {
   const gint64 now = g_get_monotonic_time ();
-  if (now - key_requested_us_ < gint64 (settings_.key_unit_interval_ms) * 1000)
+  if (now - key_requested_us_ < gint64 (settings_.key_unit_interval_ms) * 1000 ||
+      !request_key_ (element_))
     return;
   key_requested_us_ = now;
   GST_DEBUG_OBJECT (element_, "requesting a key frame set for %s", client.label ().c_str ());
-  {
-    std::lock_guard guard (lock_);
-    counters_.key_requests++;
-  }
-  request_key_ (element_);
+  std::lock_guard guard (lock_);
+  counters_.key_requests++;
 }
 
 /* Frees what was published a second ago. */
@@ -590,24 +676,24 @@ Server::tick ()
 /* ---- the stream ---- */
 
 void
-Server::set_stream (std::string caps, std::string rig_units)
+Server::set_rig (std::string rig_units)
 {
   std::lock_guard guard (lock_);
-  caps_ = std::move (caps);
   rig_units_ = std::make_shared<const std::string> (std::move (rig_units));
 }
 
 void
-Server::push (BytesPtr units, bool key, gint64 captured_us)
+Server::push (BytesPtr units, bool key, bool discontinuity, gint64 captured_us)
 {
   std::lock_guard guard (lock_);
+  discontinuity |= std::exchange (flushed_, false);
   counters_.frame_sets++;
   const guint32 number = next_number_++;
   if (queue_.size () >= kMaxQueue) {
     GST_DEBUG_OBJECT (element_, "the server is busy; dropping frame set %u", number);
     return;
   }
-  queue_.push_back ({{std::move (units), rig_units_, key, number, captured_us}});
+  queue_.push_back ({{std::move (units), rig_units_, key, discontinuity, number, captured_us}});
   wake ();
 }
 
@@ -617,6 +703,14 @@ Server::end ()
   std::lock_guard guard (lock_);
   queue_.push_back ({{}, true});
   wake ();
+}
+
+void
+Server::flush ()
+{
+  std::lock_guard guard (lock_);
+  std::erase_if (queue_, [] (const Item &item) { return !item.is_end; });
+  flushed_ = true;
 }
 
 /* With the lock held. Not g_main_context_invoke(), which may call at once. */

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "client.hpp"
+#include "guesslimiter.hpp"
 #include "pagefiles.hpp"
 #include "settings.hpp"
 #include "statsboard.hpp"
@@ -29,26 +30,33 @@ namespace web {
  */
 class Server : private Client::Host {
 public:
-  /** Sends a key unit request upstream; called on the server's thread. */
-  using RequestKey = void (*) (GstObject *element);
+  /** Has a key unit request sent upstream, without waiting for it; called on the server's thread.
+   * @return false if the last one is still on its way */
+  using RequestKey = bool (*) (GstObject *element);
 
   /** @param element  for the log and `request_key`; outlives the server */
   Server (GstObject *element, Settings settings, RequestKey request_key);
-  /** Closes all connections. */
+  /** Waits until stop() is complete: clients have half a second to confirm that they are closed. */
   ~Server () override;
   Server (const Server &) = delete;
   Server &operator= (const Server &) = delete;
 
   /** Starts to listen. @return kBadValue, kNotFound or kInternal; the message names the property */
   rangecast::Status start ();
+  /** Frees the ports. Connections are closed on the server's thread afterwards. */
+  void stop ();
+  /** After stop(): whether all connections are closed, so that the destructor does not wait. */
+  [[nodiscard]] bool has_stopped () const { return stopped_; }
   /** Address of the page. After start(). */
   [[nodiscard]] const std::string &url () const { return url_; }
 
   /** @name From the streaming thread; they do not wait @{ */
-  void set_stream (std::string caps, std::string rig_units);
-  /** Takes the frame set; the server numbers it. @param captured_us  see FrameSet */
-  void push (BytesPtr units, bool key, gint64 captured_us);
+  void set_rig (std::string rig_units);
+  /** Takes the frame set; the server numbers it. @param captured_us, discontinuity  see FrameSet */
+  void push (BytesPtr units, bool key, bool discontinuity, gint64 captured_us);
   void end ();
+  /** Drops the frame sets that wait; the next one does not continue them. */
+  void flush ();
   /** @} */
 
   struct Counters {
@@ -69,7 +77,8 @@ private:
     bool is_end = false;
   };
 
-  bool admit (const std::string &token, std::string &name) override;
+  Admission admit (
+      const std::string &address, const std::string &token, std::string &name) override;
   void request_key (Client &client) override;
   std::string welcome () override;
   bool offers_rtc () override;
@@ -83,6 +92,7 @@ private:
   void add_handlers ();
   void run ();
   void run_for (gint64 time_us, const std::function<bool ()> &happened);
+  void stop_listening ();
   void close_all ();
   void wake ();
   void deliver ();
@@ -103,6 +113,8 @@ private:
   std::string url_;
 
   std::thread thread_;
+  bool stopping_ = false; /* stop() was called */
+  std::atomic<bool> stopped_ = false;
   GMainContext *context_;
   GMainLoop *loop_;
   std::vector<GSource *> timers_;
@@ -114,12 +126,13 @@ private:
   PageFiles page_;   /* server's thread */
   gint64 key_requested_us_;
   guint64 gone_bytes_ = 0; /* of clients that left */
+  GuessLimiter guesses_;
   StatsBoard board_;
 
   std::mutex lock_;
   std::deque<Item> queue_;
   bool woken_ = false;
-  std::string caps_;
+  bool flushed_ = false; /* since the last frame set */
   std::shared_ptr<const std::string> rig_units_;
   guint32 next_number_ = 0;
   Counters counters_;

@@ -22,7 +22,7 @@ struct Settings {
   guint64 max_queued_bytes = 4 << 20;
   guint hello_timeout_ms = 5000;
   guint key_unit_interval_ms = 1000;
-  bool webrtc = true;
+  bool webrtc = false;
   std::string stun_server, turn_server; ///< as webrtcbin's properties
   std::string stats_address;            ///< udp://HOST:PORT; empty: none
   std::string url;                      ///< read-only: of the page, while the server runs

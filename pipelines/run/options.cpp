@@ -27,6 +27,7 @@ RunOptions::parse (int *argc, char ***argv)
           "Turn the striprender named view by 360 degrees over the N frames", nullptr},
       {"timeout", 0, 0, G_OPTION_ARG_INT, &timeout_s,
           "Fail if the stream has not ended by then (default 0: no limit)", "SECONDS"},
+      {"loop", 0, 0, G_OPTION_ARG_NONE, &loop, "Play a file again and again", nullptr},
       {"progress", 0, 0, G_OPTION_ARG_NONE, &progress, "Print a line every 2 s", nullptr},
       {"stats", 0, 0, G_OPTION_ARG_STRING, &stats,
           "Send the elements' statistics to udp://HOST:PORT or a file, for top.sh (default: "

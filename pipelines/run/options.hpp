@@ -10,6 +10,7 @@ struct RunOptions {
   gint views = 1;
   gboolean turn = FALSE;
   gint timeout_s = 0;
+  gboolean loop = FALSE;
   gboolean progress = FALSE;
   gchar *stats = nullptr, *trace = nullptr;
   gchar *report = nullptr;

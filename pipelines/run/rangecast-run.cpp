@@ -31,6 +31,7 @@ struct Runner {
   std::unique_ptr<LatencyTrace> trace;
   bool failed = false;
   bool ending = false;
+  bool looping = false;
 };
 
 gboolean
@@ -67,6 +68,20 @@ report_address (GstMessage *message)
 {
   if (gst_message_has_name (message, "rangewebsink-address"))
     g_print ("serving %s\n", gst_structure_get_string (gst_message_get_structure (message), "url"));
+}
+
+/* From the beginning, as a segment, so that another one follows without an end of stream. */
+void
+play_again (Runner &runner)
+{
+  const auto flags = GstSeekFlags (
+      GST_SEEK_FLAG_SEGMENT | (runner.looping ? GST_SEEK_FLAG_NONE : GST_SEEK_FLAG_FLUSH));
+  runner.looping = true;
+  if (gst_element_seek_simple (runner.pipeline, GST_FORMAT_TIME, flags, 0))
+    return;
+  g_printerr ("ERROR: --loop: expected a stream that can be played from the beginning again\n");
+  runner.failed = true;
+  g_main_loop_quit (runner.loop);
 }
 
 gboolean
@@ -107,6 +122,16 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
       report_address (message);
       if (runner->stats)
         runner->stats->take (message);
+      break;
+    case GST_MESSAGE_ASYNC_DONE: /* the pipeline can be asked to seek */
+      if (runner->options.loop && !runner->looping)
+        play_again (*runner);
+      break;
+    case GST_MESSAGE_SEGMENT_DONE:
+      if (runner->ending)
+        g_main_loop_quit (runner->loop);
+      else
+        play_again (*runner);
       break;
     case GST_MESSAGE_EOS:
       g_main_loop_quit (runner->loop);

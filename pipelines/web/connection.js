@@ -5,21 +5,21 @@ import { FrameAssembler, MAX_FRAME_SET, ServerClock, VERSION } from './protocol.
 
 const SILENCE = 3000, CLOCK_INTERVAL = 2000, FIRST_WAIT = 500, LONGEST_WAIT = 10000;
 
-// Of the codes of the protocol: what is said, and whether to try again.
+// By close code of the protocol: the message, and after how many ms to connect again.
 const CLOSED = {
-  1003: { text: 'The server refused a message' },
-  1009: { text: 'The server refused a message' },
-  4400: { text: 'The server refused a message' },
-  4401: { text: 'The server asks for a token', token: true },
-  4406: { text: 'The server speaks another version of the protocol; reload this page' },
-  4429: { text: 'The server has too many viewers', again: LONGEST_WAIT },
+  1003: { text: 'The server rejected a message' },
+  1009: { text: 'The server rejected a message' },
+  4400: { text: 'The server rejected a message' },
+  4401: { text: 'This server requires a token', token: true },
+  4406: { text: 'The server uses another version of the protocol; reload this page' },
+  4429: { text: 'The server refused the connection', again: LONGEST_WAIT },
 };
 
 export class Connection {
   // want: ['stream', 'stats']; on: functions for events, each may be missing:
   //   frameSet (frameSet): see FrameAssembler; it must acknowledge (frameSet) it
-  //   say (text, kind): a sentence about the connection; '' when all is well
-  //   state (name): connecting, waiting, receiving, ended, closed, token
+  //   say (text, kind): a sentence about the connection; '' removes it
+  //   state (name): connecting, waiting (for frame sets), receiving, ended, closed, token
   //   welcome (message), stats (rows), signal (message): from the server
   constructor ({ url, token, want = ['stream'], on }) {
     Object.assign (this, { url, token, want, on });
@@ -30,18 +30,18 @@ export class Connection {
     this.open ();
   }
 
-  tell (event, ...args) { this.on[event]?.(...args); }
+  emit (event, ...args) { this.on[event]?.(...args); }
   say (text, kind = 'note') {
     if (text !== this.said)
-      this.tell ('say', text, kind);
+      this.emit ('say', text, kind);
     this.said = text;
   }
-  state (name) {
+  setState (name) {
     if (name !== this.stateName)
-      this.tell ('state', name);
+      this.emit ('state', name);
     this.stateName = name;
   }
-  later (action, delay) {
+  schedule (action, delay) {
     const timer = setTimeout (() => {
       this.timers.delete (timer);
       action ();
@@ -49,7 +49,7 @@ export class Connection {
     this.timers.add (timer);
     return timer;
   }
-  forgetTimers () {
+  clearTimers () {
     for (const timer of this.timers)
       clearTimeout (timer);
     this.timers.clear ();
@@ -58,7 +58,7 @@ export class Connection {
   // ---- the WebSocket ----
 
   open () {
-    this.forgetTimers ();
+    this.clearTimers ();
     this.clock = new ServerClock ();
     this.welcomed = false;
     this.transport = 'WebSocket';
@@ -66,19 +66,19 @@ export class Connection {
       this.assemblers[name] = new FrameAssembler ((frameSet) => this.deliver (frameSet, name));
     this.newest = null;
     this.counted = { received: 0, dropped: 0, slow: '' };
-    this.state ('connecting');
-    this.later (() => this.welcomed || this.say ('Connecting to the server ...'), 1000);
+    this.setState ('connecting');
+    this.schedule (() => this.welcomed || this.say ('Connecting to the server ...'), 1000);
     let socket;
     try {
       socket = new WebSocket (this.url, `rangecast.v${VERSION}`);
     } catch (error) {
-      this.say (`${this.url} is no address of a server: ${error.message}`, 'error');
-      return this.state ('closed');
+      this.say (`${this.url} is not a valid server address: ${error.message}`, 'error');
+      return this.setState ('closed');
     }
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => this.send ({ type: 'hello', version: VERSION, token: this.token ?? undefined, want: this.want });
     socket.onmessage = ({ data }) => typeof data === 'string' ? this.receiveText (data) : this.receive (data, 'WebSocket');
-    socket.onclose = (event) => socket === this.socket && this.lost (event);
+    socket.onclose = (event) => socket === this.socket && this.handleClose (event);
     this.socket = socket;
   }
 
@@ -95,7 +95,7 @@ export class Connection {
       message = null;
     }
     if (typeof message?.type !== 'string')
-      return this.giveUp ('The server sent what is no message of the protocol.');
+      return this.giveUp ('The server sent text that is not a message of the protocol.');
     const { type } = message;
     if (type === 'welcome')
       this.enter (message);
@@ -106,9 +106,9 @@ export class Connection {
     else if (type === 'end')
       this.end ();
     else if (type === 'stats' && Array.isArray (message.rows))
-      this.tell ('stats', message.rows);
+      this.emit ('stats', message.rows);
     else if (['offer', 'answer', 'candidate'].includes (type))
-      this.tell ('signal', message);
+      this.emit ('signal', message);
   }
 
   enter (message) {
@@ -116,48 +116,49 @@ export class Connection {
       return this.giveUp (CLOSED[4406].text + '.');
     this.welcomed = true;
     this.wait = FIRST_WAIT;
-    this.state ('waiting');
+    this.setState ('waiting');
     this.said = null; // hides whatever was said before
     this.say ('');
-    this.tell ('welcome', message);
+    this.emit ('welcome', message);
     this.measureClock ();
     this.watchSilence ();
   }
   end () {
-    this.state ('ended');
-    this.say ('The stream has ended; this page waits for the next.');
+    this.setState ('ended');
+    this.say ('The stream has ended. Waiting for the next one.');
   }
 
   now () { return performance.timeOrigin + performance.now (); }
   measureClock () {
     this.send ({ type: 'ping', time: this.now () });
-    this.later (() => this.measureClock (), this.clock.exchanges.length < 4 ? CLOCK_INTERVAL / 10 : CLOCK_INTERVAL);
+    this.schedule (() => this.measureClock (), this.clock.exchanges.length < 4 ? CLOCK_INTERVAL / 10 : CLOCK_INTERVAL);
   }
   watchSilence () {
     clearTimeout (this.silence);
     this.timers.delete (this.silence);
     if (this.want.includes ('stream'))
-      this.silence = this.later (() => {
-        if (this.stateName !== 'ended')
-          this.say (this.stateName === 'receiving' ? 'No frame sets have come for some seconds.'
-            : 'The server has no stream at the moment; this page waits for it.');
+      this.silence = this.schedule (() => {
+        if (this.stateName === 'ended')
+          return;
+        this.say (this.newest === null ? 'The server has no stream yet. Waiting for it.' : 'No frame sets have arrived for some seconds.');
+        this.setState ('waiting');
       }, SILENCE);
   }
 
-  lost ({ code, reason }) {
+  handleClose ({ code, reason }) {
     const meaning = CLOSED[code] ?? { text: this.welcomed ? 'The connection was lost' : 'The server cannot be reached', again: this.wait };
     const wait = meaning.again;
-    this.forgetTimers ();
+    this.clearTimers ();
     this.socket = null;
     if (this.closed)
       return;
     const detail = reason && !(code === 4401 && !this.token) && reason !== meaning.text ? `: ${reason.replace (/\.$/, '')}` : '';
     if (wait === undefined) {
       this.say (`${meaning.text}${detail}.`, 'error');
-      return this.state (meaning.token ? 'token' : 'closed');
+      return this.setState (meaning.token ? 'token' : 'closed');
     }
     this.say (`${meaning.text}${detail}; trying again.`, 'error');
-    this.state ('connecting');
+    this.setState ('connecting');
     this.wait = Math.min (2 * this.wait, LONGEST_WAIT);
     this.timers.add (setTimeout (() => this.open (), wait));
   }
@@ -165,12 +166,12 @@ export class Connection {
   giveUp (text) {
     this.close ();
     this.say (text, 'error');
-    this.state ('closed');
+    this.setState ('closed');
   }
   // For good.
   close () {
     this.closed = true;
-    this.forgetTimers ();
+    this.clearTimers ();
     this.socket?.close ();
   }
   // Anew: the decoder has forgotten the stream.
@@ -178,10 +179,10 @@ export class Connection {
     const { socket } = this;
     this.socket = null;
     socket?.close ();
-    this.forgetTimers ();
-    this.state ('connecting');
+    this.clearTimers ();
+    this.setState ('connecting');
     if (!this.closed)
-      this.later (() => this.open (), FIRST_WAIT);
+      this.schedule (() => this.open (), FIRST_WAIT);
   }
 
   // ---- frame sets ----
@@ -192,7 +193,7 @@ export class Connection {
       return this.giveUp ("The server sent a frame set before 'welcome'.");
     if (!this.assemblers[transport].add (buffer))
       this.giveUp (buffer.byteLength > MAX_FRAME_SET ? `The server sent ${buffer.byteLength} bytes in one message, more than a frame set may have.`
-        : 'The server sent what is no frame set.');
+        : 'The server sent a message that is not a frame set.');
   }
 
   deliver (frameSet, transport) {
@@ -201,18 +202,18 @@ export class Connection {
     this.newest = frameSet.frameSet;
     this.transport = transport;
     const local = this.clock.toLocal (frameSet.sent);
-    this.state ('receiving');
-    this.judge (frameSet);
+    this.setState ('receiving');
+    this.checkDropped (frameSet);
     this.watchSilence ();
-    this.tell ('frameSet', { ...frameSet, captured: local === undefined ? this.now () : local - frameSet.delay,
+    this.emit ('frameSet', { ...frameSet, captured: local === undefined ? this.now () : local - frameSet.delay,
       transport, lost: this.assemblers[transport].lost });
   }
 
-  // Each hundred frame sets of the stream: are most of them left out for this client?
-  judge ({ dropped }) {
+  // After each hundred frame sets of the stream: did the server drop most of them for this client?
+  checkDropped ({ dropped }) {
     const { counted } = this, missed = dropped - counted.dropped, sum = ++counted.received + missed;
     if (sum >= 100)
-      this.counted = { received: 0, dropped, slow: missed > sum / 2 ? `The connection or this device is too slow: ${missed} of ${sum} frame sets were left out.` : '' };
+      this.counted = { received: 0, dropped, slow: missed > sum / 2 ? `The connection or this device is too slow: ${missed} of ${sum} frame sets were dropped.` : '' };
     this.say (this.counted.slow);
   }
 

@@ -56,7 +56,7 @@ export class Core {
       this.renewals++;
       this.renew ();
       throw new CoreFailure (error instanceof WebAssembly.RuntimeError || error instanceof RangeError
-        ? 'The decoder ran out of memory, or found what it did not expect; it has been started again.' : String (error), { cause: error });
+        ? 'The decoder ran out of memory or failed, and was restarted.' : String (error), { cause: error });
     }
   }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The WebRTC data channel that rangewebsink offers: its messages and signals. Frame sets come over the WebSocket until it is open, and
 // again when it is closed or does not open in time.
-const PATIENCE = 8000; // ms
+const OPEN_TIMEOUT = 8000; // ms
 
 export class DataChannel {
   // send (message): to the server; receive (ArrayBuffer): a message of the channel; failed (): there is no channel, or no longer
@@ -10,7 +10,7 @@ export class DataChannel {
     this.failed = failed;
     this.receive = receive;
     this.candidates = []; // that came before the offer was applied
-    this.timer = setTimeout (() => this.fail (), PATIENCE);
+    this.timer = setTimeout (() => this.fail (), OPEN_TIMEOUT);
     try {
       this.peer = new RTCPeerConnection ({ iceServers: iceServers ?? [] });
     } catch {

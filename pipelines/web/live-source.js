@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Shows what a server sends, as it comes. A source of decoder.js.
 import { Connection } from './connection.js';
-import { DONE, FAILED } from './core.js';
+import { DONE, FAILED, NOTHING } from './core.js';
 
 export class LiveSource {
   // live: { url, token } of the server
@@ -15,19 +15,18 @@ export class LiveSource {
     this.connection = new Connection ({ ...this.live, on: {
       frameSet: (frameSet) => this.decode (frameSet),
       say: (text, kind) => stage.say (text, kind),
-      state: (name) => this.changed (name),
+      state: (name) => this.handleState (name),
       welcome: (message) => stage.post ({ type: 'welcome', rtc: message.rtc === true, iceServers: message.iceServers }),
       signal: (message) => stage.post ({ type: 'signal', message }),
     } });
   }
   close () { this.connection.close (); }
 
-  changed (name) {
+  handleState (name) {
     if (name === 'connecting')
-      this.forget ();
+      this.stage.core.call ('rc_forget_stream');
     this.stage.post ({ type: 'live', state: name });
   }
-  forget () { this.stage.core.call ('rc_forget_stream'); }
 
   decode (frameSet) {
     const { core } = this.stage;
@@ -46,8 +45,10 @@ export class LiveSource {
       return;
     }
     this.connection.acknowledge (frameSet);
-    if (outcome === FAILED)
-      this.stage.say (core.message ());
+    if (outcome === FAILED) // until the next frame set
+      this.connection.say (core.message (), 'error');
+    if (outcome === NOTHING && core.call ('rc_rig_views') === 0)
+      this.connection.say ('The stream has not described its cameras (rig) yet.');
     if (outcome !== DONE)
       return;
     if (core.frame ().unknownPixels > 0)

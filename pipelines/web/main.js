@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The page's main thread: it owns the picture and the camera; decoder.js, a worker, owns stream, decoder and geometry. Parameters of the
 // address: src=URL of a recording; server=URL of a stream (default: this page's server, if that has one); mode=blend or strips;
-// transport=websocket: no WebRTC; stats; fit=0: the first camera's view; azimuth, elevation (degrees); time (ms) and paused.
+// transport=webrtc: frame sets over a data channel; stats; fit=0: the first camera's view; azimuth, elevation (degrees); time (ms) and paused.
 // A token comes in the fragment (#token=...), which stays in this browser.
 import { BLEND, Core, STRIPS } from './core.js';
 import { DataChannel } from './data-channel.js';
 import { followPointers } from './pointers.js';
 import { Renderer } from './renderer.js';
-import { findServer, keepToken, takeToken } from './server.js';
+import { findServer, storeToken, readToken } from './server.js';
 import { Stats } from './stats.js';
 import { Headset } from './xr.js';
 
@@ -75,7 +75,7 @@ class Page {
   }
   // The camera's default position, or what surrounds the scene, has changed.
   scene ({ state }) {
-    this.takeScene (state);
+    this.setScene (state);
     this.draw ();
   }
   position ({ time, duration, playing }) {
@@ -102,9 +102,8 @@ class Page {
       this.closeChannel ();
   }
   welcome ({ rtc, iceServers }) {
-    if (!rtc || parameters.get ('transport') === 'websocket')
-      return;
-    this.openChannel (iceServers, 3);
+    if (rtc && parameters.get ('transport') === 'webrtc')
+      this.openChannel (iceServers, 3);
   }
   // tries: the server allows four in a connection
   openChannel (iceServers, tries) {
@@ -136,7 +135,7 @@ class Page {
 
   // ---- drawing ----
 
-  takeScene (state) {
+  setScene (state) {
     if (this.camera.input (new Uint8Array (state)))
       this.camera.call ('rc_camera_scene', state.byteLength);
   }
@@ -157,7 +156,7 @@ class Page {
     this.pending = null;
     try {
       if (frame) {
-        this.takeScene (frame.state);
+        this.setScene (frame.state);
         this.renderer.upload (frame.mode, frame.layers);
       }
       show ();
@@ -169,23 +168,23 @@ class Page {
       this.stats.shown (frame, performance.now () - begin);
       document.body.dataset.frameSets = Number (document.body.dataset.frameSets ?? 0) + 1;
     }
-    this.tellWorker ();
+    this.postView ();
   }
 
   picture (name, ...args) {
     const at = this.camera.call (name, ...args);
     if (!at)
-      throw new Error ('The picture has no place in its framebuffer.');
+      throw new Error ('The viewport does not fit its framebuffer.');
     return this.camera.floats (at, 21 + 48 * this.renderer.layers.length);
   }
 
   // The camera decides which views are reduced, and the shape of the picture what fits.
-  tellWorker () {
+  postView () {
     const view = { ...this.camera.record ('rc_orbit'), aspect: canvas.width / canvas.height, ...settings };
     const text = JSON.stringify (view);
-    if (text !== this.told)
+    if (text !== this.postedView)
       this.worker.postMessage ({ type: 'view', view });
-    this.told = text;
+    this.postedView = text;
   }
 
   // ---- from the user ----
@@ -240,12 +239,12 @@ class Page {
     addEventListener ('keydown', (event) => this.key (event));
     canvas.addEventListener ('webglcontextlost', (event) => {
       event.preventDefault ();
-      say ('The browser took the graphics memory away; the picture returns when it gives it back.');
+      say ('The browser has reset WebGL; the picture returns when WebGL does.');
     });
     canvas.addEventListener ('webglcontextrestored', () => {
       this.renderer.start ();
       say ('');
-      this.told = '';
+      this.postedView = '';
       this.worker.postMessage ({ type: 'again' });
     });
     element ('play').onclick = () => this.worker.postMessage ({ type: 'toggle' });
@@ -259,7 +258,7 @@ class Page {
       event.preventDefault ();
       say ('');
       element ('token').hidden = true;
-      keepToken (this.server.url, element ('token-text').value);
+      storeToken (this.server.url, element ('token-text').value);
       this.openLive (this.server.url, element ('token-text').value);
     };
     element ('file').onchange = ({ target }) => target.files[0] && this.open (target.files[0]);
@@ -293,12 +292,12 @@ try {
     page.open (new URL (parameters.get ('src'), location).href);
   else if (parameters.has ('server')) {
     const url = new URL (parameters.get ('server'), location).href.replace (/^http/, 'ws');
-    page.openLive (url, takeToken (url));
+    page.openLive (url, readToken (url));
   } else {
     const server = await findServer ();
     if (server) {
       document.title = server.title || document.title;
-      page.openLive (server.url, takeToken (server.url));
+      page.openLive (server.url, readToken (server.url));
     } else
       element ('welcome').hidden = false;
   }

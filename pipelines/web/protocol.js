@@ -31,9 +31,9 @@ export class FrameAssembler {
     this.last = null; // number of the last frame set that was delivered
     this.next = 0; // number of the message that should come next
     this.received = 0;
-    this.forgetPart ();
+    this.resetPart ();
   }
-  forgetPart () {
+  resetPart () {
     this.part = null;
     this.size = 0;
   }
@@ -57,7 +57,7 @@ export class FrameAssembler {
     this.part ??= { ...message, units: [] };
     this.size += message.units.length;
     if (this.size > MAX_FRAME_SET) {
-      this.forgetPart ();
+      this.resetPart ();
       return false;
     }
     this.part.discontinuity ||= message.discontinuity;
@@ -68,7 +68,7 @@ export class FrameAssembler {
   }
   finish () {
     const { part } = this;
-    this.forgetPart ();
+    this.resetPart ();
     this.last = part.frameSet;
     this.deliver (part);
   }

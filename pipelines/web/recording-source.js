@@ -67,7 +67,7 @@ export class RecordingSource {
       const { pts } = core.frame ();
       this.time = pts >= 0 ? pts : this.time + (this.frameDuration () || 40);
       this.stage.decoded (performance.timeOrigin + (this.playing ? this.dueOf (this.time) : performance.now ()));
-      this.tell ();
+      this.reportPosition ();
       return true;
     }
     this.atEnd = outcome === END;
@@ -80,14 +80,14 @@ export class RecordingSource {
   stop () {
     this.playing = false;
     clearTimeout (this.timer);
-    this.tell ();
+    this.reportPosition ();
     return false;
   }
 
   frameDuration () { return this.stage.core.record ('rc_recording')?.frameDuration ?? 0; }
   dueOf (time) { return this.origin + time; }
 
-  tell () {
+  reportPosition () {
     const duration = this.stage.core.record ('rc_recording')?.duration ?? -1;
     this.stage.position (this.time, duration, this.playing);
   }
@@ -102,7 +102,7 @@ export class RecordingSource {
     }
     this.playing = true;
     this.origin = performance.now () - this.time;
-    this.tell ();
+    this.reportPosition ();
     this.schedule ();
   }
 

@@ -38,7 +38,7 @@ export class RigPicture {
   }
 
   // decoded: Core.views () of a frame set. Keeps about that many points of all.
-  takePoints (decoded, most = 4000) {
+  samplePoints (decoded, most = 4000) {
     const all = decoded.reduce ((sum, view) => sum + view.width * view.height, 0), step = Math.max (1, Math.ceil (Math.sqrt (all / most)));
     this.points = [];
     for (const view of decoded) {
@@ -69,7 +69,7 @@ export class RigPicture {
     canvas.height = Math.max (1, canvas.clientHeight * ratio);
     if (this.views.length === 0)
       return;
-    const { middle, radius } = this.bounds (), away = 2.6 * radius * orbit.distance;
+    const { middle, radius } = this.bounds (), away = 2 * radius * orbit.distance;
     const from = [Math.sin (orbit.azimuth) * Math.cos (orbit.elevation), Math.sin (orbit.elevation), Math.cos (orbit.azimuth) * Math.cos (orbit.elevation)];
     const eye = middle.map ((value, i) => value + away * from[i]);
     const ahead = unit (minus (middle, eye)), right = unit (cross (ahead, [0, 1, 0])), up = cross (right, ahead);
@@ -86,11 +86,12 @@ export class RigPicture {
       drawn.forEach ((place) => context.lineTo (...place));
       context.stroke ();
     };
-    for (const [x, y, z, colour] of this.points) {
+    const distance = ([x, y, z]) => dot (minus ([x, y, z], eye), ahead);
+    for (const [x, y, z, colour] of [...this.points].sort ((a, b) => distance (b) - distance (a))) {
       const place = project ([x, y, z]);
       context.fillStyle = colour;
       if (place)
-        context.fillRect (place[0], place[1], 2 * ratio, 2 * ratio);
+        context.fillRect (place[0], place[1], 3 * ratio, 3 * ratio);
     }
     context.lineWidth = 1.5 * ratio;
     context.font = `${12 * ratio}px system-ui, sans-serif`;
@@ -100,9 +101,9 @@ export class RigPicture {
       line (...corners, corners[0]);
       for (const corner of corners)
         line (view.translation, corner);
-      const label = project (view.translation);
+      const label = project (view.translation), text = `${view.id}  ${view.label}`;
       if (label)
-        context.fillText (`${view.id}  ${view.label}`, label[0] + 6 * ratio, label[1] - 6 * ratio);
+        context.fillText (text, Math.max (0, Math.min (canvas.width - context.measureText (text).width, label[0] + 6 * ratio)), label[1] - 6 * ratio);
     }
   }
 }

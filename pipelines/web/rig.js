@@ -3,16 +3,16 @@
 import { Connection } from './connection.js';
 import { Core, DONE } from './core.js';
 import { RigPicture } from './rig-picture.js';
-import { findServer, keepToken, takeToken } from './server.js';
+import { findServer, storeToken, readToken } from './server.js';
 
 const INTERVAL = 500; // ms between two pictures of this page
 const WINDOW = 5000; // ms over which rates are counted
 const LATE = 500, GONE = 2000; // ms without a view
-const STALE = 3, FORGOTTEN = 60; // seconds without a report
+const STALE = 3, EXPIRY = 60; // seconds without a report
 const MAX_WARNINGS = 20;
 
 const element = (id) => document.getElementById (id);
-const text = (value, digits = 0) => Number.isFinite (value) ? value.toFixed (digits) : '';
+const text = (value, digits = 0) => Number.isFinite (value) ? value.toFixed (digits).replace (/^-(?=[0.]*$)/, '') : ''; // no -0
 const milliseconds = (ns) => text (ns / 1e6, 1);
 
 const say = (sentence, kind = 'error') => {
@@ -52,14 +52,20 @@ class ViewTimes {
       } else
         this.missing.set (id, (this.missing.get (id) ?? 0) + 1);
     }
-    this.forget (now);
+    this.expire (now);
   }
-  forget (now) {
+  expire (now) {
     for (const list of [this.sets, ...[...this.times.values ()].map ((view) => view.arrivals)])
       while (list.length > 0 && list[0] < now - WINDOW)
         list.shift ();
   }
-  rate (list) { return list.length > 1 ? 1000 * (list.length - 1) / (list.at (-1) - list[0]) : 0; }
+  // A second. It falls when nothing has arrived for twice the mean interval.
+  rate (list, now) {
+    if (list.length < 2)
+      return 0;
+    const intervals = list.length - 1, span = list.at (-1) - list[0];
+    return 1000 * intervals / (now - list.at (-1) > 2 * span / intervals ? now - list[0] : span);
+  }
 }
 
 class Dashboard {
@@ -71,7 +77,7 @@ class Dashboard {
     this.warnings = [];
     element ('token').onsubmit = (event) => {
       event.preventDefault ();
-      keepToken (this.url, element ('token-text').value);
+      storeToken (this.url, element ('token-text').value);
       this.connect (element ('token-text').value);
     };
     this.connect (token);
@@ -81,18 +87,18 @@ class Dashboard {
   connect (token) {
     element ('token').hidden = true;
     this.core = new Core (this.module);
-    this.forget ();
+    this.reset ();
     this.connection = new Connection ({ url: this.url, token, want: ['stream', 'stats'], on: {
-      frameSet: (frameSet) => this.decode (frameSet), say, stats: (rows) => this.report (rows),
+      frameSet: (frameSet) => this.decode (frameSet), say, stats: (rows) => this.recordReports (rows),
       state: (name) => {
         document.body.dataset.state = name;
         element ('token').hidden = name !== 'token';
         if (name === 'connecting')
-          this.forget ();
+          this.reset ();
       },
     } });
   }
-  forget () {
+  reset () {
     this.core.call ('rc_forget_stream');
     this.generation = 0;
     this.times = new ViewTimes ();
@@ -103,6 +109,8 @@ class Dashboard {
   decode (frameSet) {
     const { core } = this;
     try {
+      if (frameSet.discontinuity)
+        core.call ('rc_forget_references');
       for (const units of frameSet.units)
         core.addUnits (units);
       const outcome = core.decode ();
@@ -127,24 +135,24 @@ class Dashboard {
     }
     this.times.add (now, frameSet.captured, this.rig.map ((view) => view.id), new Set (this.decoded.map ((view) => view.id)));
     this.network = frameSet;
-    this.picture.takePoints (this.decoded);
+    this.picture.samplePoints (this.decoded);
     document.body.dataset.frameSets = Number (document.body.dataset.frameSets ?? 0) + 1;
   }
 
-  report (rows) {
+  recordReports (rows) {
     const now = performance.now () / 1000;
     for (const row of rows) {
       if (typeof row?.host !== 'string' || typeof row.name !== 'string')
         continue;
       if (typeof row.warning === 'string')
-        this.warn (row);
+        this.recordWarning (row);
       else {
         const key = `${row.host} ${row.name} ${row.pad ?? ''}`, before = this.rows.get (key);
         this.rows.set (key, { ...row, seen: now - (Number (row.age) || 0), loses: row.lost > (before?.lost ?? Infinity) });
       }
     }
   }
-  warn ({ host, name, warning, time }) {
+  recordWarning ({ host, name, warning, time }) {
     if (this.warnings.some ((one) => one.time === time && one.warning === warning && one.host === host))
       return;
     this.warnings = [{ host, name, warning, time }, ...this.warnings].slice (0, MAX_WARNINGS);
@@ -154,12 +162,12 @@ class Dashboard {
 
   show () {
     const now = performance.timeOrigin + performance.now ();
-    this.times.forget (now);
+    this.times.expire (now);
     fill (element ('views'), this.picture.views.map ((view) => this.viewRow (view, now)));
     this.picture.draw ();
     const { network } = this;
-    element ('summary').textContent = network ? `${this.picture.views.length} views, ${text (this.times.rate (this.times.sets), 1)} frame sets/s; `
-      + `${network.dropped} left out for this page; latency ${text (this.latency (now))} ms` : '';
+    element ('summary').textContent = network ? `${this.picture.views.length} views, ${text (this.times.rate (this.times.sets, now), 1)} frame sets/s; `
+      + `${network.dropped} dropped for this page; latency ${text (this.latency (now))} ms` : '';
     fill (element ('elements'), this.elementRows ());
     element ('warnings').replaceChildren (...this.warnings.map (({ host, name, warning, time }) => {
       const item = document.createElement ('li');
@@ -174,35 +182,37 @@ class Dashboard {
 
   viewRow (view, now) {
     const times = this.times.times.get (view.id), last = times?.arrivals.at (-1) ?? -Infinity;
-    const decoded = this.decoded?.find ((one) => one.id === view.id), age = now - (times?.captured || -Infinity);
+    const age = now - (times?.captured || -Infinity);
     view.state = now - last > GONE ? 'gone' : now - last > LATE ? 'late' : 'good';
+    const decoded = view.state !== 'gone' && this.decoded?.find ((one) => one.id === view.id);
     view.label = `${view.width}x${view.height}, ${view.state === 'gone' ? 'no picture' : `${text (age)} ms`}`;
     return { kind: view.state === 'good' ? '' : view.state, cells: [view.id, view.name, `${view.width}x${view.height}`,
-      decoded ? `${decoded.width}x${decoded.height}` : '', decoded ? decoded.points : '', text (this.times.rate (times?.arrivals ?? []), 1),
+      decoded ? `${decoded.width}x${decoded.height}` : '', decoded ? decoded.points : '', text (this.times.rate (times?.arrivals ?? [], now), 1),
       this.times.missing.get (view.id) ?? 0, text (age)] };
   }
 
   elementRows () {
     const now = performance.now () / 1000;
     for (const [key, row] of this.rows)
-      if (now - row.seen > FORGOTTEN)
+      if (now - row.seen > EXPIRY)
         this.rows.delete (key);
     const rows = [...this.rows.values ()].sort ((a, b) => `${a.host} ${a.name} ${a.pad ?? ''}`.localeCompare (`${b.host} ${b.name} ${b.pad ?? ''}`));
-    return rows.map ((row) => ({
-      kind: now - row.seen > STALE ? 'gone' : row.fps === 0 || row.loses ? 'late' : '',
-      cells: [row.host, row.pad ? `${row.name}.${row.pad}` : row.name, row['view-ids']?.join?.(' ') ?? '', text (row.fps, 1), text (row['points-per-frame']),
-        text (row.bitrate / 1e6, 2), row.lost ?? '', row.late ?? '', milliseconds (row['latency-p50']), milliseconds (row['latency-p99']),
-        text (1000 * row.clock), text (now - row.seen)],
-    }));
+    return rows.map ((row) => {
+      const stale = now - row.seen > STALE, current = (value) => stale ? '' : value;
+      return { kind: stale ? 'gone' : row.fps === 0 || row.loses ? 'late' : '',
+        cells: [row.host, row.pad ? `${row.name}.${row.pad}` : row.name, row['view-ids']?.join?.(' ') ?? '', current (text (row.fps, 1)),
+          current (text (row['points-per-frame'])), current (text (row.bitrate / 1e6, 2)), row.lost ?? '', row.late ?? '',
+          current (milliseconds (row['latency-p50'])), current (milliseconds (row['latency-p99'])), text (1000 * row.clock), text (now - row.seen)] };
+    });
   }
 }
 
 try {
   const server = await findServer ();
   if (!server)
-    throw new Error ('This page was not served by rangewebsink, which knows the rig.');
+    throw new Error ('This page works only when rangewebsink serves it.');
   const module = await WebAssembly.compile (await (await fetch ('rangecast.wasm')).arrayBuffer ());
-  window.rangecastDashboard = new Dashboard (module, server.url, takeToken (server.url));
+  window.rangecastDashboard = new Dashboard (module, server.url, readToken (server.url));
 } catch (error) {
   say (error.message);
 }

@@ -14,15 +14,15 @@ export const findServer = async () => {
 
 // Each server has its own.
 const place = (url) => `rangecast-token ${url}`;
-export const keepToken = (url, token) => sessionStorage.setItem (place (url), token);
+export const storeToken = (url, token) => sessionStorage.setItem (place (url), token);
 
 // The token of the address's fragment. It is removed from there, so that it is not shown and not passed on with a copied link, and
 // kept for when this tab loads the page anew. url: of the server. @return undefined if there is none
-export const takeToken = (url) => {
+export const readToken = (url) => {
   const token = new URLSearchParams (location.hash.slice (1)).get ('token');
   if (token !== null) {
     history.replaceState (null, '', location.pathname + location.search);
-    keepToken (url, token);
+    storeToken (url, token);
   }
   return token ?? sessionStorage.getItem (place (url)) ?? undefined;
 };

@@ -39,7 +39,7 @@ export class Stats {
       `missing ${frame.missingPixels}, unknown ${frame.unknownPixels} pixels; ${frame.badSlices} damaged slices`,
       `decode ${mean (this.decode)}, geometry ${mean (this.build)}, draw ${mean (this.draw)}`,
       `latency ${(this.latencies.at (-1) ?? 0).toFixed (0)} ms from ${frame.network ? 'capture' : 'due'} to drawn`,
-      ...frame.network ? [`${frame.network.transport}: ${frame.network.dropped} frame sets left out by the server, ${frame.network.lost} messages lost`] : [],
+      ...frame.network ? [`${frame.network.transport}: ${frame.network.dropped} frame sets dropped by the server, ${frame.network.lost} messages lost`] : [],
     ].join ('\n');
     this.reset ();
   }

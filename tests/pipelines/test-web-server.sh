@@ -139,6 +139,9 @@ test_errors_name_the_option () {
   expect_error "no file 'missing.rcnc'" "$script" --file missing.rcnc
   expect_error "--private-key: expected with --certificate" "$script" --private-key users.txt
   expect_error "--: expected a launch string" "$script" --
+  expect_error "--window: expected a whole number from 1 to 1000" "$script" --window 0
+  expect_error "--loop: expected with --file" "$script" --loop
+  expect_error "--stun and --turn: expected with --webrtc" "$script" --stun stun.example:3478
 }
 
 test_errors_of_the_server_name_the_property () {
@@ -146,6 +149,7 @@ test_errors_of_the_server_name_the_property () {
   local script=$pipelines/web-server.sh
   echo rubbish >rubbish.pem
   expect_error "certificate and private-key: expected PEM files" "$script" --port 0 --certificate rubbish.pem
+  expect_error "turn-server: expected turn://USER:PASSWORD@HOST:PORT" "$script" --port 0 --webrtc --turn turn.example
   expect_error "address: expected an IP address" "$script" --port 0 --address localhost.localdomain --anonymous
   expect_error "no element \"nosuchelement\"" "$script" --port 0 -- nosuchelement
   serve
@@ -230,6 +234,35 @@ test_recording_is_shown_once () {
   wait "$server" || fail "web-server.sh failed: $(cat server.log)"
 }
 
+test_recording_is_shown_again_and_again () {
+  need_server
+  gst-launch-1.0 -q avatartestsrc num-buffers=6 views=1 ! video/x-range,width=64,height=48,framerate=10/1 ! neighbourcodeenc ! filesink location=short.rcnc
+  serve --file short.rcnc --loop
+  watch "${links[0]}" "" 25 >watched.txt || fail "$(cat watched.txt)"
+  grep -qx "frame sets 25" watched.txt || fail "$(cat watched.txt)"
+  ! grep -qF '"end"' watched.txt || fail "it ended: $(cat watched.txt)"
+  stop_server
+}
+
+test_webrtc_is_offered_where_it_is_asked_for () {
+  need_server
+  local offered
+  serve
+  [[ "${links[0]}" != *transport* ]] || fail "${links[0]}"
+  offered=$(watch "${links[0]}" "" 1)
+  grep -qF '"rtc":false' <<<"$offered" || fail "$offered"
+  stop_server
+  for element in webrtcbin nicesink dtlssrtpenc sctpenc; do
+    gst-inspect-1.0 --exists --atleast-version=0.0.0 $element || skip "$element is missing"
+  done
+  serve --webrtc --window 9 --stun 127.0.0.1:9 --turn user:secret@127.0.0.1:9
+  [[ "${links[0]}" == */\?transport=webrtc ]] || fail "${links[0]}"
+  offered=$(watch "${links[0]}" "" 1)
+  grep -qF '"window":9,"rtc":true,"iceServers":[{"urls":"stun:127.0.0.1:9"},{"urls":"turn:127.0.0.1:9","username":"user","credential":"secret"}]' <<<"$offered" ||
+    fail "$offered"
+  stop_server
+}
+
 test_launch_string_and_rtp_are_served () {
   need_server
   local scene=(avatartestsrc is-live=true views=2 ! "video/x-range,width=64,height=48,framerate=15/1" ! neighbourcodeenc) sender
@@ -280,12 +313,31 @@ test_certificate_is_for_its_names () {
   ! openssl verify -CAfile certs/authority.pem -verify_hostname other.example certs/server.pem || fail "it is good for other names"
   openssl x509 -in certs/server.pem -noout -checkend $((396 * 86400))
   ! openssl x509 -in certs/server.pem -noout -checkend $((398 * 86400)) || fail "browsers refuse more than 398 days"
-  # The authority that phones trust stays.
+  # The authority that phones trust stays, and vouches for private addresses and its own names only.
   cp certs/authority.pem before.pem
+  "$pipelines/web-certificate.sh" certs a.rig.example studio.local 10.1.2.3 fd00::5
+  openssl verify -x509_strict -CAfile certs/authority.pem -verify_ip 10.1.2.3 certs/server.pem
+  cp certs/server.pem server-before.pem
+  local name
+  for name in bank.example 198.51.100.9 2001:db8::9; do
+    expect_error "was made for other names than $name" "$pipelines/web-certificate.sh" certs "$name"
+  done
+  cmp server-before.pem certs/server.pem
+  openssl pkey -in certs/server-key.pem -pubout | cmp - <(openssl x509 -in certs/server.pem -pubkey -noout)
+  [ "$(find certs -type f | wc -l)" = 4 ] || fail "$(ls certs)"
+  # Also if whoever has the key writes other names into a certificate.
+  openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj "/CN=bank.example" -keyout other-key.pem -out other.csr
+  openssl x509 -req -in other.csr -CA certs/authority.pem -CAkey certs/authority-key.pem -days 9 -extfile <(echo subjectAltName=DNS:bank.example) -out other.pem
+  ! openssl verify -CAfile certs/authority.pem other.pem || fail "the authority vouches for any name"
   "$pipelines/web-certificate.sh" certs >said.txt
   cmp before.pem certs/authority.pem
   openssl verify -CAfile certs/authority.pem -verify_hostname localhost certs/server.pem
   openssl verify -CAfile certs/authority.pem -verify_hostname "$(hostname)" certs/server.pem
+  openssl verify -CAfile certs/authority.pem -verify_hostname "$(hostname -s).local" certs/server.pem
+  # Without its key there is no second authority that phones do not trust.
+  mv certs/authority-key.pem elsewhere.pem
+  expect_error "certs/authority-key.pem is missing, and devices trust certs/authority.pem" "$pipelines/web-certificate.sh" certs
+  cmp before.pem certs/authority.pem
 }
 
 test_certificate_errors () {
@@ -300,6 +352,7 @@ test_certificate_errors () {
   mkdir -p damaged
   echo rubbish | tee damaged/authority.pem >damaged/authority-key.pem
   expect_error "openssl failed" "$pipelines/web-certificate.sh" damaged
+  [ "$(find damaged | wc -l)" = 3 ] || fail "left: $(find damaged)"
 }
 
 test_stream_is_served_with_tls () {
@@ -324,7 +377,8 @@ test_stream_is_served_with_tls () {
   stop_server
 }
 
-# A tree whose setup.sh has nothing to do.
+# A tree whose setup.sh has nothing to do. demo.sh is started with signals as a terminal has them: a shell that was started with
+# one ignored cannot take it.
 make_tree () {
   mkdir tree
   ln -s "$pipelines" tree/pipelines
@@ -338,7 +392,7 @@ test_demo_is_shown_in_browsers () {
   make_tree
   local demo port
   set -m
-  tree/pipelines/demo.sh --input range --views 2 --size 64x48 --fps 8 --port $((ports + 10)) --out demo --web 0 >demo.log 2>&1 &
+  env --default-signal=INT,TERM tree/pipelines/demo.sh --input range --views 2 --size 64x48 --fps 8 --port $((ports + 10)) --out demo --web 0 >demo.log 2>&1 &
   demo=$!
   set +m
   trap 'kill -KILL -- -$demo 2>/dev/null || true' EXIT
@@ -352,10 +406,43 @@ test_demo_is_shown_in_browsers () {
   watch "http://127.0.0.1:$port/" "" 0 stats >watched.txt || fail "$(cat watched.txt)"
   grep -q '"type":"stats"' watched.txt || fail "$(cat watched.txt)"
   kill -INT -- "-$demo" # as Ctrl+C does
+  local status=0
+  wait "$demo" || status=$?
+  [ "$status" = 130 ] || fail "status $status"
+  no_program_is_left "$demo"
   until_true 20 is_gone "$demo"
-  wait "$demo" || true
   grep -q Traceback demo.log && fail "$(cat demo.log)"
   trap - EXIT
+}
+
+# The hosts of a demo, that is; shells that copy their messages end a moment after them.
+no_program_is_left () {
+  local left
+  left=$(ps -eo pgid=,stat=,comm= | awk -v group="$1" '$1 == group && $2 !~ /^Z/ && $3 ~ /^(rangecast-run|gst-launch)/')
+  [ -z "$left" ] || fail "demo.sh returned before: $left"
+}
+
+test_demo_can_be_interrupted_while_it_starts () {
+  need_server
+  make_tree
+  local demo status wait_for
+  for wait_for in setup.txt demo/rig.yaml demo/log/parent.log; do
+    rm -rf setup.txt demo
+    set -m
+    env --default-signal=INT,TERM tree/pipelines/demo.sh --input range --views 2 --size 64x48 --fps 8 --port $((ports + 50)) --out demo --web 0 >demo.log 2>&1 &
+    demo=$!
+    set +m
+    trap 'kill -KILL -- -$demo 2>/dev/null || true' EXIT
+    until_true 40 test -e $wait_for
+    kill -INT -- "-$demo"
+    status=0
+    wait "$demo" || status=$?
+    [ "$status" = 130 ] || fail "after $wait_for: status $status: $(cat demo.log)"
+    no_program_is_left "$demo"
+    [ $wait_for = demo/log/parent.log ] || ! grep -q '^http' demo.log || fail "it went on: $(cat demo.log)"
+    until_true 20 is_gone "$demo"
+    trap - EXIT
+  done
 }
 
 test_demo_ends_with_term_and_says_when_the_server_failed () {
@@ -366,7 +453,7 @@ test_demo_ends_with_term_and_says_when_the_server_failed () {
   expect_error "--web: expected a whole number from 0 to 65535" tree/pipelines/demo.sh --web 65536
   [ ! -e setup.txt ] || fail "setup.sh was run"
   set -m
-  tree/pipelines/demo.sh --input range --views 1 --size 64x48 --fps 8 --port $((ports + 20)) --out demo --web 0 >demo.log 2>&1 &
+  env --default-signal=INT,TERM tree/pipelines/demo.sh --input range --views 1 --size 64x48 --fps 8 --port $((ports + 20)) --out demo --web 0 >demo.log 2>&1 &
   demo=$!
   set +m
   trap 'kill -KILL -- -$demo 2>/dev/null || true' EXIT
@@ -376,6 +463,10 @@ test_demo_ends_with_term_and_says_when_the_server_failed () {
   expect_error "the server for browsers failed" tree/pipelines/demo.sh --input range --views 1 --size 64x48 --fps 8 \
     --port $((ports + 30)) --out other --web "$taken"
   kill -TERM "$demo"
+  local status=0
+  wait "$demo" || status=$?
+  [ "$status" = 143 ] || fail "status $status"
+  no_program_is_left "$demo"
   until_true 20 is_gone "$demo"
   trap - EXIT
 }

@@ -10,7 +10,7 @@ before (async () => { browser = await launch (); });
 after (() => browser?.close ());
 
 test (`with ${100 * loss} % of packets lost, pictures come over a data channel and lack slices only where messages were lost`, async () => {
-  const page = await openPage (browser, `${ADDRESS}/?stats`, undefined, (one) => one.evaluateOnNewDocument (() => {
+  const page = await openPage (browser, `${ADDRESS}/?stats&transport=webrtc`, undefined, (one) => one.evaluateOnNewDocument (() => {
     window.seen = []; // of each frame set that is shown
   }));
   await page.waitForFunction (() => /WebRTC: /.test (document.getElementById ('stats').textContent));

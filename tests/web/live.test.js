@@ -25,7 +25,7 @@ test ('the page shows a live stream, and reports its latency', async () => {
   assert.equal (await message (page), '');
   assert.equal (await page.title (), 'A person');
   assert.equal (await page.$eval ('#bar', (bar) => bar.className), 'live');
-  await page.waitForFunction (() => /Web(Socket|RTC): \d+ frame sets left out/.test (document.getElementById ('stats').textContent));
+  await page.waitForFunction (() => /WebSocket: \d+ frame sets dropped/.test (document.getElementById ('stats').textContent));
   const latencies = await page.evaluate (() => window.rangecastPage.stats.latencies);
   assert.ok (latencies.length > 10 && latencies.every ((ms) => ms > 0 && ms < 10000), JSON.stringify (latencies));
   fs.writeFileSync (path.join (work, 'page-live.png'), await page.screenshot ());
@@ -65,7 +65,7 @@ test ('the token of the link lets in, and leaves the address', async () => {
   await page.evaluate (() => sessionStorage.clear ());
   await page.goto (`${server.address}/`);
   await page.waitForSelector ('#token:not([hidden])');
-  assert.match (await message (page), /^The server asks for a token\.$/);
+  assert.match (await message (page), /^This server requires a token\.$/);
   assert.ok (!server.log ().includes ('correct'));
   await page.close ();
   await server.stop ();
@@ -146,6 +146,9 @@ test ('a client gets nothing before its hello, and is closed if none comes', asy
   await server.stop ();
 });
 
+// With the log of what clients do wrong.
+process.env.GST_DEBUG = 'rangewebsink:4';
+
 const rubbish = [
   ['text that is not JSON', 'rubbish', 4400],
   ['JSON without a type', '{"a":1}', 4400],
@@ -185,6 +188,8 @@ test ('what breaks the protocol closes that connection only', async () => {
   const fast = client (server.address, { hello: entered });
   fast.socket.on ('open', () => { for (let i = 0; i < 300; i++) fast.socket.send ('{"type":"x"}'); });
   await closes (fast, 4429, /at most 200 messages a second/);
+  for (const sentence of ['wrong or missing token', 'expected text messages', 'a message of more than 16384 bytes', 'expected version 1', 'at most 200 messages a second'])
+    assert.match (server.log (), new RegExp (`closing the connection of 127\\.0\\.0\\.1: ${sentence}`));
   const count = good.frames.length;
   await good.until (({ frames }) => frames.length > count + 5, 'frame sets go on');
   good.socket.close ();

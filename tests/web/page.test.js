@@ -139,6 +139,48 @@ test ('a file that is opened by hand is played', async () => {
   await page.close ();
 });
 
+test ('a file that is dropped onto the page is played, and the button and the space bar pause it', async () => {
+  const page = await open ('');
+  await page.waitForSelector ('#welcome:not([hidden])');
+  await page.evaluate (async () => {
+    const dropped = new DataTransfer ();
+    dropped.items.add (new File ([await (await fetch ('moving.rcnc')).blob ()], 'moving.rcnc'));
+    document.dispatchEvent (new DragEvent ('drop', { dataTransfer: dropped, bubbles: true, cancelable: true }));
+  });
+  await framesShown (page, 3);
+  const stateIs = (state) => page.waitForFunction ((wanted) => document.body.dataset.state === wanted, {}, state);
+  await stateIs ('playing');
+  await page.click ('#play');
+  await stateIs ('paused');
+  await page.focus ('#picture');
+  await page.keyboard.press ('Space');
+  await stateIs ('playing');
+  await page.close ();
+});
+
+test ('the picture and the point cloud are saved as files', async () => {
+  const page = await open ('src=scene.rcnc&paused');
+  await framesShown (page, 1);
+  await page.evaluate (() => {
+    window.saved = [];
+    HTMLAnchorElement.prototype.click = function () {
+      const { download, href } = this;
+      fetch (href).then ((answer) => answer.arrayBuffer ()).then ((file) => window.saved.push ({ download, bytes: [...new Uint8Array (file.slice (0, 300))], size: file.byteLength }));
+    };
+  });
+  await page.click ('#save-picture');
+  await page.waitForFunction (() => window.saved.length === 1);
+  await page.click ('#save-points');
+  await page.waitForFunction (() => window.saved.length === 2);
+  const [picture, points] = await page.evaluate (() => window.saved);
+  assert.equal (picture.download, 'rangecast.png');
+  assert.deepEqual (picture.bytes.slice (0, 8), [0x89, 0x50, 0x4e, 0x47, 13, 10, 26, 10]);
+  assert.equal (points.download, 'rangecast.ply');
+  const [header] = Buffer.from (points.bytes).toString ('latin1').split ('end_header'), count = Number (/element vertex (\d+)/.exec (header)[1]);
+  assert.ok (header.startsWith ('ply\n') && count > 10000 && points.size > 15 * count, header);
+  await page.close ();
+});
+
 test ('seeking shows the frame set at that time, paused or not', async () => {
   const page = await open ('src=moving.rcnc&paused&time=1000');
   await framesShown (page, 1);

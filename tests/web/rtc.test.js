@@ -19,8 +19,8 @@ const channelOpened = (server) => server.log ().includes ('frame sets go over a 
 // With the log of what clients do.
 process.env.GST_DEBUG = 'rangewebsink:4';
 
-test ('the page goes over to a data channel by itself, and shows whole pictures', async () => {
-  const server = await serve (['port=0']), page = await openPage (browser, `${server.address}/?stats`);
+test ('a page that wants a data channel goes over to it, and shows whole pictures', async () => {
+  const server = await serve (['port=0', 'webrtc=true']), page = await openPage (browser, `${server.address}/?stats&transport=webrtc`);
   await transportIs (page, 'WebRTC');
   await more (page, 30);
   assert.equal (await message (page), '');
@@ -30,8 +30,8 @@ test ('the page goes over to a data channel by itself, and shows whole pictures'
 });
 
 test ('with temporal prediction, the data channel begins with a key frame set', async () => {
-  const server = await serve (['port=0'], ['profile=entropy', 'temporal=true', 'refresh-period=0', 'key-interval=0']);
-  const page = await openPage (browser, `${server.address}/?stats`);
+  const server = await serve (['port=0', 'webrtc=true'], ['profile=entropy', 'temporal=true', 'refresh-period=0', 'key-interval=0']);
+  const page = await openPage (browser, `${server.address}/?stats&transport=webrtc`);
   await transportIs (page, 'WebRTC');
   await more (page, 20);
   await isWhole (page);
@@ -40,9 +40,9 @@ test ('with temporal prediction, the data channel begins with a key frame set', 
 });
 
 test ('slices that are longer than a message of the channel come over the WebSocket', async () => {
-  const server = await serve (['port=0'], ['max-slice-size=65535', 'profile=plain', 'colour-threshold=0', 'depth-threshold=0'],
+  const server = await serve (['port=0', 'webrtc=true'], ['max-slice-size=65535', 'profile=plain', 'colour-threshold=0', 'depth-threshold=0'],
     ['avatartestsrc', 'is-live=true', 'views=1', '!', 'video/x-range,width=320,height=240,framerate=15/1']);
-  const page = await openPage (browser, `${server.address}/?stats`);
+  const page = await openPage (browser, `${server.address}/?stats&transport=webrtc`);
   await more (page, 40);
   assert.ok (channelOpened (server));
   await transportIs (page, 'WebSocket');
@@ -50,8 +50,8 @@ test ('slices that are longer than a message of the channel come over the WebSoc
   assert.equal (await server.stop (), 0);
 });
 
-test ('a page that wants none, and a server that offers none, stay with the WebSocket', async () => {
-  for (const [setting, parameter] of [['webrtc=true', '&transport=websocket'], ['webrtc=false', '']]) {
+test ('a page that does not ask for a channel, and a server that offers none, stay with the WebSocket', async () => {
+  for (const [setting, parameter] of [['webrtc=true', ''], ['webrtc=false', '&transport=webrtc']]) {
     const server = await serve (['port=0', setting]), page = await openPage (browser, `${server.address}/?stats${parameter}`);
     await more (page, 40);
     await transportIs (page, 'WebSocket');
@@ -62,8 +62,8 @@ test ('a page that wants none, and a server that offers none, stay with the WebS
 });
 
 test ('frame sets go on over the WebSocket when the channel does not open, and when it dies', async () => {
-  const server = await serve (['port=0']);
-  const deaf = await openPage (browser, `${server.address}/?stats`, undefined, (page) => page.evaluateOnNewDocument (() => {
+  const server = await serve (['port=0', 'webrtc=true']);
+  const deaf = await openPage (browser, `${server.address}/?stats&transport=webrtc`, undefined, (page) => page.evaluateOnNewDocument (() => {
     RTCPeerConnection.prototype.addIceCandidate = async () => {};
     const { setRemoteDescription } = RTCPeerConnection.prototype;
     RTCPeerConnection.prototype.setRemoteDescription = function ({ type, sdp }) {
@@ -75,7 +75,7 @@ test ('frame sets go on over the WebSocket when the channel does not open, and w
   await transportIs (deaf, 'WebSocket');
   await deaf.close ();
 
-  const page = await openPage (browser, `${server.address}/?stats`, undefined, (one) => one.evaluateOnNewDocument (() => {
+  const page = await openPage (browser, `${server.address}/?stats&transport=webrtc`, undefined, (one) => one.evaluateOnNewDocument (() => {
     window.RTCPeerConnection = class extends RTCPeerConnection {
       constructor (...args) {
         super (...args);
@@ -94,10 +94,10 @@ test ('frame sets go on over the WebSocket when the channel does not open, and w
 });
 
 test ('a server with open channels stops, and the page finds the next one', async () => {
-  const first = await serve (['port=0']), page = await openPage (browser, `${first.address}/?stats`);
+  const first = await serve (['port=0', 'webrtc=true']), page = await openPage (browser, `${first.address}/?stats&transport=webrtc`);
   await transportIs (page, 'WebRTC');
   assert.equal (await first.stop (), 0);
-  const second = await serve ([`port=${first.port}`]);
+  const second = await serve ([`port=${first.port}`, 'webrtc=true']);
   await more (page, 5);
   await transportIs (page, 'WebRTC');
   await page.close ();
@@ -105,7 +105,7 @@ test ('a server with open channels stops, and the page finds the next one', asyn
 });
 
 test ('signals that break the protocol end their own connection only', async () => {
-  const server = await serve (['port=0']), page = await openPage (browser, `${server.address}/?stats`);
+  const server = await serve (['port=0', 'webrtc=true']), page = await openPage (browser, `${server.address}/?stats&transport=webrtc`);
   await transportIs (page, 'WebRTC');
   const asks = async () => {
     const one = client (server.address);
@@ -148,7 +148,7 @@ test ('signals that break the protocol end their own connection only', async () 
 });
 
 test ('clients that ask for a channel and vanish cost no memory', async () => {
-  const server = await serve (['port=0']);
+  const server = await serve (['port=0', 'webrtc=true']);
   const round = async () => {
     for (let i = 0; i < 10; i++) {
       const one = client (server.address);

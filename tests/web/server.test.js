@@ -21,17 +21,48 @@ const forever = async (client, units = scene) => {
   }
 };
 
+test ('a stream that stops is not live any more, and is again when it goes on', () => {
+  let goOn;
+  const stopped = new Promise ((resolve) => { goOn = resolve; });
+  return withServer (browser, async (client) => {
+    await client.welcome ();
+    await client.frameSet (first);
+    await stopped;
+    await forever (client);
+  }, async (page) => {
+    await page.waitForSelector ('#live:not([hidden])');
+    await messageMatches (page, '^No frame sets have arrived for some seconds\\.$');
+    await page.waitForSelector ('#live[hidden]');
+    goOn ();
+    await page.waitForSelector ('#live:not([hidden])');
+    assert.equal (await message (page), '');
+  });
+});
+
+test ('frame sets without a rig give their sentence, until the rig comes', () => withServer (browser, async (client) => {
+  await client.welcome ();
+  for (let i = 0; i < 40; i++) {
+    await client.frameSet (joined (scene[0].filter ((unit) => !isRigView (unit))));
+    await sleep (50);
+  }
+  await forever (client);
+}, async (page) => {
+  await messageMatches (page, '^The stream has not described its cameras \\(rig\\) yet\\.$');
+  await framesShown (page, 3);
+  assert.equal (await message (page), '');
+}));
+
 const refused = [
-  ['text that is no message', (client) => client.send ('rubbish'), '^The server sent what is no message of the protocol\\.$'],
+  ['text that is no message', (client) => client.send ('rubbish'), '^The server sent text that is not a message of the protocol\\.$'],
   ['a frame set before its welcome', (client) => client.frameSet (first), "^The server sent a frame set before 'welcome'\\.$"],
-  ['another version', (client) => client.send ({ type: 'welcome', version: 2 }), '^The server speaks another version of the protocol; reload this page\\.$'],
+  ['another version', (client) => client.send ({ type: 'welcome', version: 2 }), '^The server uses another version of the protocol; reload this page\\.$'],
   ['a binary message that is no frame set', async (client) => { await client.welcome (); client.send (new Uint8Array (31)); },
-    '^The server sent what is no frame set\\.$'],
+    '^The server sent a message that is not a frame set\\.$'],
   ['40 MB in one message', async (client) => { await client.welcome (); client.send (Buffer.concat ([Buffer.from ([1, 1, 1, 0]), Buffer.alloc (40e6)])); },
     '^The server sent 40000004 bytes in one message, more than a frame set may have\\.$'],
-  ['4429', async (client) => { await client.next (); client.socket.close (4429, 'at most 2 clients'); }, '^The server has too many viewers: at most 2 clients; trying again\\.$'],
+  ['4429', async (client) => { await client.next (); client.socket.close (4429, 'at most 2 clients'); }, '^The server refused the connection: at most 2 clients; trying again\\.$'],
   ['4406', async (client) => { await client.next (); client.socket.close (4406, 'expected version 9'); },
-    '^The server speaks another version of the protocol; reload this page: expected version 9\\.$'],
+    '^The server uses another version of the protocol; reload this page: expected version 9\\.$'],
 ];
 for (const [what, script, sentence] of refused)
   test (`${what} gives its sentence`, () => withServer (browser, async (client) => script (client), async (page) => {
@@ -43,7 +74,7 @@ test ('a server without a stream gives its sentence, and the picture when it has
   await sleep (4000);
   await forever (client);
 }, async (page) => {
-  await messageMatches (page, '^The server has no stream at the moment');
+  await messageMatches (page, '^The server has no stream yet\\. Waiting for it\\.$');
   await framesShown (page, 3);
   assert.equal (await message (page), '');
 }));
@@ -116,13 +147,13 @@ test ('units of the fuzz corpus do no harm, and the stream after them is shown',
   await page.waitForFunction (() => document.body.dataset.state === 'receiving');
 }));
 
-test ('frame sets that the server leaves out are counted, and most of them left out gives its sentence', () => withServer (browser, async (client) => {
+test ('frame sets that the server drops are counted, and a sentence says when it drops most', () => withServer (browser, async (client) => {
   await client.welcome ();
   for (let i = 0; i < 40; i++)
     await client.frameSet (joined (scene[i % scene.length]), 4 * i, { dropped: 3 * i });
   await sleep (60000);
 }, async (page) => {
-  await messageMatches (page, '^The connection or this device is too slow: 7\\d of 10\\d frame sets were left out\\.$');
+  await messageMatches (page, '^The connection or this device is too slow: 7\\d of 10\\d frame sets were dropped\\.$');
 }));
 
 test ('memory stays the same over 10000 frame sets that come faster than they can be drawn', () => {
@@ -176,3 +207,32 @@ test ('the dashboard shows views, elements and warnings, and takes rows of any s
   await sleep (1000);
   fs.writeFileSync (path.join (work, 'page-rig.png'), await page.screenshot ());
 }, 'rig.html'));
+
+test ('the dashboard shows no rate of a stream or a host that has stopped', () => withServer (browser, async (client) => {
+  await client.next ();
+  client.send ({ type: 'welcome', version: 1, window: 3, rtc: false });
+  client.send ({ type: 'stats', rows: [{ host: 'camera0', element: 'stereodepth', name: 'depth', fps: 14.9, bitrate: 2e6, age: 0 }] });
+  for (let i = 0; i < 20; i++) {
+    await client.frameSet (joined (scene[i % scene.length]));
+    await sleep (50);
+  }
+  await sleep (60000);
+}, async (page) => {
+  const cells = (table) => page.$eval (`#${table} tbody tr`, (row) => [...row.cells].map ((cell) => cell.textContent));
+  await page.waitForFunction (() => Number (document.querySelector ('#views tbody tr')?.cells[5].textContent) > 1);
+  assert.equal ((await cells ('elements'))[3], '14.9');
+  await page.waitForFunction (() => document.querySelector ('#views tbody tr').cells[5].textContent === '0.0');
+  await page.waitForFunction (() => document.querySelector ('#elements tbody tr').className === 'gone');
+  assert.deepEqual ((await cells ('elements')).slice (3, 6), ['', '', '']);
+  assert.match (await page.$eval ('#summary', (summary) => summary.textContent), / 0\.0 frame sets\/s/);
+}, 'rig.html'));
+
+test ('statistics fit a screen of 360 pixels', () => withServer (browser, async (client) => {
+  await client.welcome ();
+  await forever (client);
+}, async (page) => {
+  await page.setViewport ({ width: 360, height: 640 });
+  await page.waitForFunction (() => document.getElementById ('stats').textContent !== '');
+  const { right, scrolls } = await page.$eval ('#stats', (stats) => ({ right: stats.getBoundingClientRect ().right, scrolls: stats.scrollWidth > stats.clientWidth }));
+  assert.ok (right <= 360 && !scrolls, `${right} ${scrolls}`);
+}, '?stats'));

@@ -111,7 +111,7 @@ GST_START_TEST (test_stats_have_all_fields_in_any_state)
   WebSink sink;
   for (int round = 0; round < 2; round++) {
     GstStructure *stats = sink.stats ();
-    fail_unless (gst_structure_has_name (stats, "stats"));
+    fail_unless (gst_structure_has_name (stats, "server-stats"));
     fail_unless (gst_structure_has_field_typed (stats, "clients", G_TYPE_UINT));
     for (const char *name : {"connections", "refused", "frame-sets", "key-requests", "bytes"})
       fail_unless (gst_structure_has_field_typed (stats, name, G_TYPE_UINT64), "%s", name);
@@ -121,6 +121,19 @@ GST_START_TEST (test_stats_have_all_fields_in_any_state)
     gst_structure_free (stats);
     sink.stop ();
   }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_stats_of_the_base_class_are_kept)
+{
+  WebSink sink;
+  sink.push ("one");
+  GstStructure *stats = nullptr;
+  guint64 rendered = 0;
+  g_object_get (sink.h->element, "stats", &stats, nullptr);
+  fail_unless (gst_structure_get_uint64 (stats, "rendered", &rendered));
+  fail_unless_equals_int (rendered, 1);
+  gst_structure_free (stats);
 }
 GST_END_TEST;
 
@@ -219,6 +232,49 @@ GST_START_TEST (test_certificate_must_be_a_readable_pem_file)
   expect_error ("token-file=/nonexistent", "token-file: expected a file");
   for (const char *turn : {"turn://x", "turnip://a:b@c", "stun://c"})
     expect_error (std::string ("turn-server=") + turn, "turn-server: expected turn://");
+}
+GST_END_TEST;
+
+/* A certificate for "a test" until 2126, its key, and another key; EC, made by openssl. */
+static constexpr const char *kCertificate = R"(-----BEGIN CERTIFICATE-----
+MIIBeDCCAR+gAwIBAgIUOL/XhkHp+5SbET2DvUj9xDuxFP0wCgYIKoZIzj0EAwIw
+ETEPMA0GA1UEAwwGYSB0ZXN0MCAXDTI2MTEyNTIyMDE1NFoYDzIxMjYxMTAxMjIw
+MTU0WjARMQ8wDQYDVQQDDAZhIHRlc3QwWTATBgcqhkjOPQIBBggqhkjOPQMBBwNC
+AARJSnTW0re7ohzboAEdmEo1VcIMgWqlNUfUe7ktfn1LjwKvCvGHUTJVT4f2dDy0
+XLGoKJ6R5RKCavOJYq4aOpVJo1MwUTAdBgNVHQ4EFgQUereJrcdPuIUqZ9a3n1Zy
+1eFzbugwHwYDVR0jBBgwFoAUereJrcdPuIUqZ9a3n1Zy1eFzbugwDwYDVR0TAQH/
+BAUwAwEB/zAKBggqhkjOPQQDAgNHADBEAiAIghjvpD3CC5TFIs4LZq6FTVbGae8p
+SAzlr/9B6rcq0gIgDrQtaSIW82YTuzFh+SWVdV7ax2prGO9QQ35gX3nAKFo=
+-----END CERTIFICATE-----
+)";
+static constexpr const char *kKey = R"(-----BEGIN PRIVATE KEY-----
+MIGHAgEAMBMGByqGSM49AgEGCCqGSM49AwEHBG0wawIBAQQghqIHBleLRTMZS87+
+uMepo/zQzchXUKhFfzRTcOAExNOhRANCAARJSnTW0re7ohzboAEdmEo1VcIMgWql
+NUfUe7ktfn1LjwKvCvGHUTJVT4f2dDy0XLGoKJ6R5RKCavOJYq4aOpVJ
+-----END PRIVATE KEY-----
+)";
+static constexpr const char *kOtherKey = R"(-----BEGIN PRIVATE KEY-----
+MIGHAgEAMBMGByqGSM49AgEGCCqGSM49AwEHBG0wawIBAQQg/sbi7dOYCNUaosQU
+Bl+1G0fpJcv3V+WUUuH/i8wSBrChRANCAAQCHenjWVyo43pnBoUOH5nFDkC1XrFv
+okpTPVFG0G4n5HbGjP9FlNte3zRXCBSFf3UIKuNYZ4a23b20W7BUq+qd
+-----END PRIVATE KEY-----
+)";
+
+GST_START_TEST (test_private_key_must_be_that_of_the_certificate)
+{
+  if (!g_tls_backend_supports_tls (g_tls_backend_get_default ()))
+    RANGECAST_SKIP ("GLib has no TLS: glib-networking is missing");
+  Folder folder;
+  const std::string certificate = folder.write ("certificate.pem", kCertificate);
+  const std::string key = folder.write ("key.pem", kKey),
+                    other = folder.write ("other.pem", kOtherKey);
+  expect_error ("certificate=" + certificate + " private-key=" + other,
+      "private-key: expected the key of the certificate '" + certificate + "', got '" + other +
+          "'");
+  const std::string both = folder.write ("both.pem", std::string (kCertificate) + kOtherKey);
+  expect_error ("certificate=" + both, "private-key: expected the key of the certificate");
+  WebSink sink ("certificate=" + certificate + " private-key=" + key);
+  fail_unless (sink.url.starts_with ("https://"));
 }
 GST_END_TEST;
 
@@ -459,11 +515,13 @@ rangewebsink_suite ()
   tcase_add_test (tc, test_message_and_property_have_the_address);
   tcase_add_test (tc, test_two_sinks_have_ports_of_their_own);
   tcase_add_test (tc, test_stats_have_all_fields_in_any_state);
+  tcase_add_test (tc, test_stats_of_the_base_class_are_kept);
   tcase_add_test (tc, test_client_stats_have_all_fields);
   tcase_add_test (tc, test_address_that_others_can_reach_needs_a_token);
   tcase_add_test (tc, test_address_must_be_one_of_this_machine);
   tcase_add_test (tc, test_port_in_use_is_an_error);
   tcase_add_test (tc, test_certificate_must_be_a_readable_pem_file);
+  tcase_add_test (tc, test_private_key_must_be_that_of_the_certificate);
   tcase_add_test (tc, test_root_must_have_a_page);
   tcase_add_test (tc, test_stats_address_must_be_a_free_udp_port);
   tcase_add_test (tc, test_element_starts_after_its_error_was_mended);

@@ -110,7 +110,8 @@ struct WebSink {
   {
     root.write ("index.html", "<title>page</title>");
     GstElement *element = gst_parse_launch (
-        ("rangewebsink port=0 sync=false stats-interval=0 root=" + root.path + " " + properties)
+        ("rangewebsink port=0 sync=false webrtc=true stats-interval=0 root=" + root.path + " " +
+            properties)
             .c_str (),
         nullptr);
     fail_unless (element != nullptr);
@@ -165,10 +166,10 @@ struct WebSink {
   GstStructure *stats () const
   {
     GstStructure *stats = nullptr;
-    g_object_get (h->element, "stats", &stats, nullptr);
+    g_object_get (h->element, "server-stats", &stats, nullptr);
     return stats;
   }
-  /** A counter of the stats property. */
+  /** A counter of the server-stats property. */
   guint64 stat (const char *name) const
   {
     GstStructure *all = stats ();
@@ -181,7 +182,7 @@ struct WebSink {
     gst_structure_free (all);
     return number;
   }
-  /** A field of the first client of that user in the stats property; empty if there is no such
+  /** A field of the first client of that user in server-stats; empty if there is no such
    *  client. */
   std::string client_stat (const char *name, const std::string &user = "") const
   {
@@ -201,16 +202,23 @@ struct WebSink {
     gst_structure_free (all);
     return text;
   }
-  /** Force key unit events that have come upstream since the last call. */
+  /** Force key unit events that the server has sent upstream since the last call; waits for them.
+   */
   int key_requests ()
   {
-    int n = 0;
-    while (GstEvent *event = gst_harness_try_pull_upstream_event (h)) {
-      n += gst_video_event_is_force_key_unit (event);
-      gst_event_unref (event);
-    }
-    return n;
+    const guint64 before = key_requests_;
+    fail_unless_happens ([&] {
+      while (GstEvent *event = gst_harness_try_pull_upstream_event (h)) {
+        key_requests_ += gst_video_event_is_force_key_unit (event);
+        gst_event_unref (event);
+      }
+      return key_requests_ == stat ("key-requests");
+    }());
+    return int (key_requests_ - before);
   }
+
+private:
+  guint64 key_requests_ = 0;
 };
 
 /** A message of a frame set. */

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "../rangecast-check.hpp"
+#include "web/guesslimiter.hpp"
 #include "web/limitedinput.h"
 #include "web/statsboard.hpp"
 
@@ -296,6 +297,62 @@ owner (const std::string &path, std::string_view token)
   return name.value_or ("-");
 }
 
+GST_START_TEST (test_guesses_are_allowed_in_a_burst_and_then_at_a_rate)
+{
+  GuessLimiter limiter;
+  gint64 now = 5 * G_USEC_PER_SEC;
+  const auto use_burst = [&] {
+    for (int i = 0; i < GuessLimiter::kBurst; i++) {
+      fail_unless (limiter.allows ("192.0.2.1", now), "%d", i);
+      limiter.add_failure ("192.0.2.1", now);
+    }
+    fail_if (limiter.allows ("192.0.2.1", now));
+  };
+  use_burst ();
+  for (int i = 0; i < 3; i++) {
+    now += GuessLimiter::kInterval_us - 1;
+    fail_if (limiter.allows ("192.0.2.1", now));
+    now++;
+    fail_unless (limiter.allows ("192.0.2.1", now));
+    limiter.add_failure ("192.0.2.1", now);
+  }
+  now += GuessLimiter::kBurst * GuessLimiter::kInterval_us;
+  use_burst ();
+}
+GST_END_TEST;
+
+GST_START_TEST (test_guesses_are_counted_by_network)
+{
+  GuessLimiter limiter;
+  const auto exhaust = [&] (const char *address) {
+    for (int i = 0; i < GuessLimiter::kBurst; i++)
+      limiter.add_failure (address, 0);
+  };
+  exhaust ("192.0.2.1");
+  fail_if (limiter.allows ("::ffff:192.0.2.1", 0)); /* a socket for IPv6 sees IPv4 like that */
+  fail_unless (limiter.allows ("192.0.2.2", 0) && limiter.allows ("::ffff:192.0.2.2", 0));
+  exhaust ("2001:db8:0:1::1");
+  fail_if (limiter.allows ("2001:db8:0:1:ffff::2", 0));
+  fail_unless (limiter.allows ("2001:db8:0:2::1", 0));
+  exhaust ("no address");
+  fail_if (limiter.allows ("no address", 0));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_guesses_of_many_addresses_take_limited_memory)
+{
+  GuessLimiter limiter;
+  for (int i = 0; i < GuessLimiter::kBurst; i++)
+    limiter.add_failure ("192.0.2.1", 0);
+  for (guint i = 0; i < GuessLimiter::kMaxAddresses + 500; i++)
+    limiter.add_failure ("10.0." + std::to_string (i / 256) + "." + std::to_string (i % 256), 0);
+  fail_unless_equals_int (limiter.addresses (), GuessLimiter::kMaxAddresses);
+  fail_if (limiter.allows ("192.0.2.1", 0)); /* who tried most is remembered */
+  limiter.add_failure ("192.0.2.9", gint64 (3600) * G_USEC_PER_SEC);
+  fail_unless_equals_int (limiter.addresses (), 1); /* all others are free again */
+}
+GST_END_TEST;
+
 GST_START_TEST (test_token_file_names_the_owner_of_a_token)
 {
   with_file ("# users\n\nanna one\n  bert\t two \r\n#carl three\ndora\nemil four # his\nlast five",
@@ -573,6 +630,9 @@ webprotocol_suite ()
   tcase_add_test (tc, test_header_is_written_as_the_protocol_says);
   tcase_add_test (tc, test_header_flags);
   tcase_add_test (tc, test_tokens_are_equal_only_as_a_whole);
+  tcase_add_test (tc, test_guesses_are_allowed_in_a_burst_and_then_at_a_rate);
+  tcase_add_test (tc, test_guesses_are_counted_by_network);
+  tcase_add_test (tc, test_guesses_of_many_addresses_take_limited_memory);
   tcase_add_test (tc, test_token_file_names_the_owner_of_a_token);
   tcase_add_test (tc, test_token_file_that_is_empty_or_binary_admits_nobody);
   tcase_add_test (tc, test_token_file_that_cannot_be_read_admits_nobody_and_says_why);
