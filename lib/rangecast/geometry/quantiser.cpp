@@ -55,6 +55,7 @@ DepthQuantiser::set (std::uint16_t near, std::uint16_t far, int bits, DepthScale
   near_ = near;
   far_ = far;
   step_ = double (range) / last * (inverse ? double (far) / near : 1);
+  is_offset_ = !inverse && last == range;
   codes_.assign (65536, 0);
   depths_.resize (last + 1);
   if (inverse)

@@ -48,6 +48,18 @@ TEST (Quantiser, whole_16_bit_range_is_exact)
   EXPECT_EQ (q.depth (q.code (65535)), 65535);
 }
 
+TEST (Quantiser, says_whether_codes_are_depths_less_a_constant)
+{
+  for (int bits = 6; bits <= 16; bits++)
+    for (const auto scale : {DepthScale::kLinear, DepthScale::kInverse}) {
+      DepthQuantiser q;
+      ASSERT_TRUE (q.set (1000, 3000, bits, scale).ok ());
+      EXPECT_EQ (q.is_offset (), bits >= 11 && scale == DepthScale::kLinear);
+      for (int d = 1000; q.is_offset () && d <= 3000; d++)
+        ASSERT_EQ (q.code (static_cast<std::uint16_t> (d)), d - q.depth (0));
+    }
+}
+
 /* Ranges with fewer units than codes, with more, and with the least and greatest depths there are.
  */
 constexpr struct {

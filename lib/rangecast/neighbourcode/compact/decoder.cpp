@@ -51,9 +51,13 @@ show (const PixelCode *codes, std::size_t begin, std::size_t end, std::size_t co
     const CompactQuantisers &quantisers, const PixelLimits &limits, std::uint16_t *depth,
     Rgbx *colour)
 {
-  const std::uint16_t *const depths = quantisers.depth.depths ();
-  for (std::size_t x = begin; x < end; x++)
-    depth[x] = depths[codes[x] & 0xffff];
+  const std::uint16_t *const depths = quantisers.depth.depths (), near = depths[0];
+  if (quantisers.depth.is_offset ())
+    for (std::size_t x = begin; x < end; x++)
+      depth[x] = static_cast<std::uint16_t> (near + codes[x]);
+  else
+    for (std::size_t x = begin; x < end; x++)
+      depth[x] = depths[codes[x] & 0xffff];
   std::size_t x = begin;
   if (std::endian::native == std::endian::little && quantisers.colour.bits () == 8) {
     /* Four pixels at once, see to_rgb(). */

@@ -83,7 +83,7 @@ CompactEncoder::load_wave (const CompactPicture &picture, int y, int end)
     auto &row = row_of (at);
     if (at >= waves_.loaded) {
       const PlainQuantising how = {picture.codes.near, picture.codes.far,
-          picture.codes.codes.data (), picture.codes.colour, at};
+          picture.codes.codes.data (), picture.codes.is_offset, picture.codes.colour, at};
       PlainPixel *const pixels = row.pixels.data () + kPixelsBefore;
       row.span = functions.make_pixels (how, picture.image.depth.row (at) + header_.first_column,
           picture.image.colour.row (at) + header_.first_column, columns_, pixels);

@@ -32,20 +32,46 @@ quantise (__m128i value, int colour_bits)
   return _mm_srli_epi16 (_mm_add_epi16 (more, _mm_srli_epi16 (n, 8)), 8);
 }
 
+/* How a row is quantised: colours to fewer bits, depths by a table, or neither. */
+enum class Codes { kAll, kAllColours, kOffsets };
+
 /* Quantises two pixels of valid depth. */
-template <bool kAllColourBits>
+template <Codes kCodes>
 AVX2 inline __m128i
 make_two (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *colour)
 {
   __m128i pixels = _mm_cvtepu8_epi16 (_mm_loadl_epi64 (reinterpret_cast<const __m128i *> (colour)));
-  if (!kAllColourBits)
+  if (kCodes == Codes::kAll)
     pixels = quantise (pixels, how.colour.bits ());
   pixels = _mm_insert_epi16 (pixels, how.codes[depth[0]], 3);
   return _mm_insert_epi16 (pixels, how.codes[depth[1]], 7);
 }
 
+/* Quantises four pixels; those of other depths become anything.
+ * @param offsets  depths less near, four in the lower half */
+template <Codes kCodes>
+AVX2 inline __m256i
+make_four (
+    const PlainQuantising &how, const std::uint16_t *depth, __m128i offsets, const Rgbx *colour)
+{
+  if constexpr (kCodes == Codes::kOffsets) {
+    const __m256i colours =
+        _mm256_cvtepu8_epi16 (_mm_loadu_si128 (reinterpret_cast<const __m128i *> (colour)));
+    return _mm256_blend_epi16 (
+        colours, _mm256_slli_epi64 (_mm256_cvtepu16_epi64 (offsets), 48), 0x88);
+  }
+  return _mm256_inserti128_si256 (_mm256_castsi128_si256 (make_two<kCodes> (how, depth, colour)),
+      make_two<kCodes> (how, depth + 2, colour + 2), 1);
+}
+
+AVX2 inline __m128i
+four_of (__m128i eight, int first)
+{
+  return first % 8 ? _mm_srli_si128 (eight, 8) : eight;
+}
+
 /* Quantises 16 pixels. @return two bits for each pixel, set if it is valid */
-template <bool kAllColourBits>
+template <Codes kCodes>
 AVX2 inline unsigned
 make_block (
     const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *colour, PlainPixel *to)
@@ -57,16 +83,16 @@ make_block (
   const auto mask = static_cast<unsigned> (_mm256_movemask_epi8 (valid));
   const long long even = kInvalidPixelBit + ((how.row & 1) << 13);
   const __m256i invalid = _mm256_set_epi64x (even + 0x1000, even, even + 0x1000, even);
+  const __m256i offset = _mm256_sub_epi16 (d, near);
   const __m128i valids[] = {_mm256_castsi256_si128 (valid), _mm256_extracti128_si256 (valid, 1)};
+  const __m128i offsets[] = {_mm256_castsi256_si128 (offset), _mm256_extracti128_si256 (offset, 1)};
   for (int i = 0; i < kBlock; i += 4) {
     __m256i pixels = invalid;
     if (mask != 0) {
-      pixels = _mm256_inserti128_si256 (
-          _mm256_castsi128_si256 (make_two<kAllColourBits> (how, depth + i, colour + i)),
-          make_two<kAllColourBits> (how, depth + i + 2, colour + i + 2), 1);
-      const __m128i half = valids[i / 8];
-      const __m256i is_valid = _mm256_cvtepi16_epi64 (i % 8 ? _mm_srli_si128 (half, 8) : half);
-      pixels = _mm256_blendv_epi8 (invalid, pixels, is_valid);
+      const __m256i four =
+          make_four<kCodes> (how, depth + i, four_of (offsets[i / 8], i), colour + i);
+      pixels =
+          _mm256_blendv_epi8 (invalid, four, _mm256_cvtepi16_epi64 (four_of (valids[i / 8], i)));
     }
     _mm256_storeu_si256 (reinterpret_cast<__m256i *> (to + i), pixels);
   }
@@ -84,7 +110,7 @@ widen (PlainSpan &span, int x, unsigned mask)
   span.valid += static_cast<int> (_mm_popcnt_u32 (mask)) / 2;
 }
 
-template <bool kAllColourBits>
+template <Codes kCodes>
 AVX2 PlainSpan
 make_row (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *colour, int columns,
     PlainPixel *to)
@@ -92,14 +118,14 @@ make_row (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *co
   PlainSpan span;
   int x = 0;
   for (; x + kBlock <= columns; x += kBlock)
-    widen (span, x, make_block<kAllColourBits> (how, depth + x, colour + x, to + x));
+    widen (span, x, make_block<kCodes> (how, depth + x, colour + x, to + x));
   if (x < columns) { /* memory after the row must not be read */
     std::uint16_t depths[kBlock] = {};
     Rgbx colours[kBlock];
     const auto rest = static_cast<std::size_t> (columns - x);
     __builtin_memcpy (depths, depth + x, rest * sizeof *depths);
     __builtin_memcpy (colours, colour + x, rest * sizeof *colours);
-    widen (span, x, make_block<kAllColourBits> (how, depths, colours, to + x));
+    widen (span, x, make_block<kCodes> (how, depths, colours, to + x));
   }
   return span;
 }
@@ -108,8 +134,10 @@ AVX2 PlainSpan
 make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *colour,
     int columns, PlainPixel *to)
 {
-  return how.colour.bits () == 8 ? make_row<true> (how, depth, colour, columns, to)
-                                 : make_row<false> (how, depth, colour, columns, to);
+  if (how.colour.bits () < 8)
+    return make_row<Codes::kAll> (how, depth, colour, columns, to);
+  return how.is_offset ? make_row<Codes::kOffsets> (how, depth, colour, columns, to)
+                       : make_row<Codes::kAllColours> (how, depth, colour, columns, to);
 }
 
 /* ---- coding ---- */

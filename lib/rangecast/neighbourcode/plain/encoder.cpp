@@ -35,6 +35,7 @@ PlainCodes::set (const DepthQuantiser &depth, const ColourQuantiser &colours)
     near--;
   while (far < 65535 && depth.valid (static_cast<std::uint16_t> (far + 1)))
     far++;
+  is_offset = depth.is_offset ();
   codes.assign (65536, 0);
   for (std::size_t d = near; d <= far; d++)
     codes[d] = depth.code (static_cast<std::uint16_t> (d));
@@ -184,7 +185,7 @@ PlainEncoder::code_partition (const ConstRangeImage &image, const PlainCodes &co
       const int y = done + waiting;
       Row &row = rows_[static_cast<std::size_t> (waiting)];
       row.span = functions_->make_pixels (
-          {codes_->near, codes_->far, codes_->codes.data (), codes_->colour, y},
+          {codes_->near, codes_->far, codes_->codes.data (), codes_->is_offset, codes_->colour, y},
           image.depth.row (y) + header_.first_column, image.colour.row (y) + header_.first_column,
           header_.columns, row.pixels.data () + kPixelsBefore);
       result_.points += static_cast<std::uint64_t> (row.span.valid);

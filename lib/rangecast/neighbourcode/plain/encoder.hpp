@@ -26,6 +26,7 @@ struct PlainCodes {
 
   std::uint16_t near = 1, far = 0;  ///< of valid depths
   std::vector<std::uint16_t> codes; ///< of all depths
+  bool is_offset = false;           ///< see PlainQuantising
   ColourQuantiser colour;
 };
 

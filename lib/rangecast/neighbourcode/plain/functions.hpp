@@ -40,6 +40,7 @@ inline constexpr int kPixelsBefore = 16, kPixelsBehind = 48;
 struct PlainQuantising {
   std::uint16_t near, far;    ///< of valid depths
   const std::uint16_t *codes; ///< of all 65536 depths; of those that are not valid, anything
+  bool is_offset;             ///< the code of a depth is the depth less near
   const ColourQuantiser &colour;
   int row; ///< of the partition: its last bit matters
 };
