@@ -12,7 +12,7 @@ gst_neighbour_code_profile_get_type (void)
     static const GEnumValue values[] = {
         {int (Profile::kPlain), "Fixed-length codes, no entropy coding", "plain"},
         {int (Profile::kPacked), "Run lengths and fixed prefix codes", "packed"},
-        {int (Profile::kEntropy), "Context model and range coder", "entropy"}, {}};
+        {int (Profile::kEntropy), "Adaptive context model, rANS", "entropy"}, {}};
     return g_enum_register_static ("GstNeighbourCodeProfile", values);
   }();
   return type;

@@ -105,7 +105,7 @@ static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
 static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
         GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-            ", version = (int) 2, alignment = (string) { access-unit, slice, byte-stream "
+            ", version = (int) 3, alignment = (string) { access-unit, slice, byte-stream "
             "}, " GST_RANGE_SIZE_CAPS_));
 
 G_DEFINE_TYPE (GstNeighbourCodeEnc, gst_neighbour_code_enc, GST_TYPE_BASE_TRANSFORM)

@@ -106,7 +106,7 @@ struct _GstNeighbourCodeParse {
 #define STREAM_CAPS GST_NEIGHBOUR_CODE_STREAM_CAPS
 #define ACCESS_UNIT_CAPS                                                                           \
   GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                                    \
-  ", version = (int) 2, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_
+  ", version = (int) 3, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (STREAM_CAPS "; " ACCESS_UNIT_CAPS));
@@ -202,7 +202,7 @@ missing_data_text (const GstNeighbourCodeParsePrivate *priv)
 {
   switch (priv->seen) {
     case Seen::kNothing:
-      return "No access unit found: expected a neighbour code byte stream of version 2, which "
+      return "No access unit found: expected a neighbour code byte stream of version 3, which "
              "begins with the start code 00 52 43 55";
     case Seen::kAccessUnit:
       if (!priv->stream.too_large.empty ())

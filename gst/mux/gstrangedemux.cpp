@@ -88,7 +88,7 @@ struct _GstRangeDemux {
 
 #define DEMUX_CAPS                                                                                 \
   GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                \
-                 ", version = (int) 2, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_
+                 ", version = (int) 3, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_
 
 static GstStaticPadTemplate sink_template =
     GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (DEMUX_CAPS));

@@ -132,7 +132,7 @@ struct _GstRangeMux {
 
 #define MUX_CAPS                                                                                   \
   GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                \
-                 ", version = (int) 2, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_
+                 ", version = (int) 3, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_
 
 static GstStaticPadTemplate sink_template =
     GST_STATIC_PAD_TEMPLATE ("sink_%u", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS (MUX_CAPS));

@@ -88,7 +88,7 @@ static GstStaticPadTemplate sink_template =
 static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
         GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-            ", version = (int) 2, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
+            ", version = (int) 3, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
 
 G_DEFINE_TYPE (GstRtpNeighbourCodeDepay, gst_rtp_neighbour_code_depay, GST_TYPE_RTP_BASE_DEPAYLOAD)
 GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodedepay, "rtpneighbourcodedepay", GST_RANK_SECONDARY,
@@ -150,9 +150,9 @@ gst_rtp_neighbour_code_depay_set_caps (GstRTPBaseDepayload *base, GstCaps *caps)
   const gchar *version = gst_structure_get_string (structure, "version");
   base->clock_rate = 90000;
   reset_access_unit (priv);
-  if (version && g_strcmp0 (version, "2") != 0) {
+  if (version && g_strcmp0 (version, "3") != 0) {
     gst_range_flow_return (GST_ELEMENT (base),
-        {StatusCode::kUnsupported, std::string ("RTP caps: version ") + version + ", expected 2"});
+        {StatusCode::kUnsupported, std::string ("RTP caps: version ") + version + ", expected 3"});
     return FALSE;
   }
   if (!gst_structure_has_field_typed (structure, "rig", G_TYPE_STRING))

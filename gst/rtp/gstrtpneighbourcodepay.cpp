@@ -97,7 +97,7 @@ set_output_caps (GstRTPBasePayload *base, const gstrange::RangeInfo &info)
   gchar *rig = g_base64_encode (blob.data (), blob.size ());
   const std::string rate = std::to_string (info.fps_n) + "/" + std::to_string (info.fps_d);
   gst_rtp_base_payload_set_options (base, "video", TRUE, "X-NEIGHBOUR-CODE", 90000);
-  const gboolean set = gst_rtp_base_payload_set_outcaps (base, "version", G_TYPE_STRING, "2",
+  const gboolean set = gst_rtp_base_payload_set_outcaps (base, "version", G_TYPE_STRING, "3",
       "views", G_TYPE_STRING, std::to_string (info.views ()).c_str (), "width", G_TYPE_STRING,
       std::to_string (info.width).c_str (), "height", G_TYPE_STRING,
       std::to_string (info.height).c_str (), "framerate", G_TYPE_STRING, rate.c_str (), "rig",

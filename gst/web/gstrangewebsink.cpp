@@ -71,7 +71,7 @@ struct _GstRangeWebSink {
 static GstStaticPadTemplate sink_template =
     GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
         GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-            ", version = (int) 2, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
+            ", version = (int) 3, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
 
 G_DEFINE_TYPE_WITH_CODE (GstRangeWebSink, gst_range_web_sink, GST_TYPE_BASE_SINK,
     GST_DEBUG_CATEGORY_INIT (gst_range_web_sink_debug, "rangewebsink", 0, "Range web sink"))

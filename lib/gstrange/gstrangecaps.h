@@ -27,7 +27,7 @@ G_BEGIN_DECLS
  */
 #define GST_NEIGHBOUR_CODE_CAPS                                                                    \
   GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                                    \
-  ", version = (int) 2, "                                                                          \
+  ", version = (int) 3, "                                                                          \
   "alignment = (string) { access-unit, slice }, " GST_RANGE_SIZE_CAPS_
 
 /**
@@ -36,7 +36,7 @@ G_BEGIN_DECLS
  * Coded frame sets in files: an unframed byte stream that contains the rig.
  */
 #define GST_NEIGHBOUR_CODE_STREAM_CAPS                                                             \
-  GST_NEIGHBOUR_CODE_MEDIA_TYPE ", version = (int) 2, alignment = (string) byte-stream"
+  GST_NEIGHBOUR_CODE_MEDIA_TYPE ", version = (int) 3, alignment = (string) byte-stream"
 
 /**
  * GstRangeCamera:

@@ -123,7 +123,7 @@ GstCaps *
 make_neighbour_code_caps (const RangeInfo &info, const char *alignment)
 {
   return with_common_fields (gst_caps_new_simple (GST_NEIGHBOUR_CODE_MEDIA_TYPE, "version",
-                                 G_TYPE_INT, 2, "alignment", G_TYPE_STRING, alignment, nullptr),
+                                 G_TYPE_INT, 3, "alignment", G_TYPE_STRING, alignment, nullptr),
       info);
 }
 
@@ -133,7 +133,7 @@ recode_caps (const GstCaps *caps, bool coded, GstCaps *filter)
   static GstStaticCaps media[] = {
       GST_STATIC_CAPS (GST_RANGE_MEDIA_TYPE ", format = (string) Z16_RGBx"),
       GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-          ", version = (int) 2, alignment = (string) { access-unit, slice }")};
+          ", version = (int) 3, alignment = (string) { access-unit, slice }")};
   GstCaps *form = gst_static_caps_get (&media[coded]);
   GstCaps *other = gst_caps_new_empty ();
   for (guint i = 0; i < gst_caps_get_size (caps); i++) {

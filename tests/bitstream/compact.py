@@ -13,7 +13,7 @@ from typing import Callable, NamedTuple, Optional, Union
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "formats" / "bitstream.md"
 PACKED, ENTROPY = 1, 2
-MAX_OVERRUN = 16
+EARLIER = 6
 BLOCK = 16  # rows and columns that share motion
 Numbers = tuple[int, ...]  # Z, Y, Co, Cg
 Motion = tuple[int, ...]  # dx, dy, dz, sx, sy
@@ -54,22 +54,25 @@ def prefix_code(lengths: list[int]) -> dict[tuple[int, int], int]:
     return symbols
 
 
-INITIAL = [int(word, 16) for word in table("initial probabilities")]
-INITIAL_WITHOUT_KEY = [int(word, 16) for word in table("initial probabilities without key")]
+def models(name: str) -> list[list[int]]:
+    """The starts of each model's symbols, and the end of the last."""
+    return [[0, *(8 * int(word[i : i + 3], 16) for i in range(0, len(word), 3)), 1 << 15] for word in table(name)]
+
+
+# Choice models and number models at the beginning of a slice.
+INITIAL = {name: (models(f"choices, {name}"), models(f"numbers, {name}")) for name in ("exact", "fine", "coarse", "without key")}
 CHOICES = [prefix_code([int(digit) for digit in word]) for word in table("choice lengths")]
 PATTERN_LENGTHS = [int(word) for word in table("pattern lengths")]
 PATTERNS = [prefix_code(PATTERN_LENGTHS[i : i + 16]) for i in (0, 16, 32)]
 
 
 class Pixel(NamedTuple):
-    """A valid pixel: its numbers (if not known, some others), where they came from, and the size of its residual."""
+    """A valid pixel: its numbers (if not known, some others), its choice (6: it is earlier), and the size of its residual."""
 
     numbers: Numbers
-    origin: int
     known: bool
-    choice: Optional[int] = None
+    choice: int
     activity: tuple[int, ...] = (0, 0, 0, 0)
-    is_earlier: bool = False
 
 
 Place = Optional[Pixel]
@@ -84,19 +87,22 @@ class Earlier(NamedTuple):
 
 
 def is_earlier(pixel: Place) -> bool:
-    return pixel is not None and pixel.is_earlier
+    return pixel is not None and pixel.choice == EARLIER
 
 
-def is_choice(pixel: Place, choice: int) -> bool:
-    return pixel is not None and pixel.choice == choice
-
-
-def origin(pixel: Place) -> int:
-    return pixel.origin if pixel else 0
+def pixel_class(pixel: Place) -> int:
+    return 0 if pixel is None else pixel.choice + 1
 
 
 def kind(pixel: Place) -> int:
-    return min(origin(pixel), 3)
+    return (0, 1, 2, 2, 2, 3, 3, 1)[pixel_class(pixel)]
+
+
+class Coded(NamedTuple):
+    """What is written of a pixel; 6 for earlier ones, None for invalid ones."""
+
+    choice: Optional[int]
+    residual: Numbers
 
 
 class Neighbours(NamedTuple):
@@ -180,128 +186,119 @@ class PackedData:
             raise Damage("something is left over")
 
 
+def set_of_models(key: bool, steps: tuple[int, ...]) -> str:
+    """Which a slice begins with."""
+    if not key:
+        return "without key"
+    return "exact" if steps == (1, 1, 1, 1) else "fine" if steps[1] <= 5 else "coarse"
+
+
 class EntropyData:
-    """Decisions, and what entropy makes of them."""
+    """States and models, and what entropy makes of them."""
 
-    def __init__(self, data: bytes, key: bool) -> None:
+    def __init__(self, data: bytes, key: bool, steps: tuple[int, ...]) -> None:
+        if len(data) < 16:
+            raise Damage("no states")
         self.key = key
-        self.p = list(INITIAL if key else INITIAL_WITHOUT_KEY)
+        self.choices, self.numbers = ([list(model) for model in kind] for kind in INITIAL[set_of_models(key, steps)])
+        self.x = [int.from_bytes(data[4 * k : 4 * k + 4], "little") for k in range(4)]
         self.data = data
-        self.position = 0
-        self.range = (1 << 32) - 1
-        self.code = 0
-        for _ in range(4):
-            self.code = self.code << 8 | self.next_byte()
+        self.position = 16
+        for k in range(4):
+            self.refill(k)
 
-    def next_byte(self) -> int:
-        self.position += 1
-        if self.position > len(self.data) + MAX_OVERRUN:
-            raise Damage("read beyond the end")
-        return self.data[self.position - 1] if self.position <= len(self.data) else 0
+    def refill(self, k: int) -> None:
+        if self.x[k] < 1 << 20:
+            if self.position + 2 > len(self.data):
+                raise Damage("too few words")
+            self.x[k] = self.x[k] << 16 | self.data[self.position] | self.data[self.position + 1] << 8
+            self.position += 2
 
-    def refill(self) -> None:
-        while self.range < 1 << 24:
-            self.range <<= 8
-            self.code = self.code << 8 | self.next_byte()
+    def decode(self, k: int, s: list[int]) -> int:
+        x, last = self.x[k], len(s) - 1
+        v = x % 32768
+        symbol = next(i for i in range(last) if v < s[i + 1])
+        self.x[k] = (s[symbol + 1] - s[symbol]) * (x // 32768) + v - s[symbol]
+        self.refill(k)
+        for j in range(1, last):
+            s[j] += ((4 * j if j <= symbol else 32768 - 4 * (last - j)) - s[j]) // 32
+        return symbol
 
-    def decide(self, i: int) -> bool:
-        part = (self.range >> 12) * (self.p[i] >> 4)
-        yes = self.code < part
-        if yes:
-            self.range = part
-            self.p[i] += (65536 - self.p[i]) // 32
+    def raw(self, k: int, bits: int) -> int:
+        x, rest = self.x[k], 1 << 15 - bits
+        self.x[k] = x // 32768 * rest + x % rest
+        self.refill(k)
+        return x % 32768 // rest
+
+    def number_of(self, k: int, symbol: int) -> int:
+        if symbol < 9:
+            return (symbol + 1) // 2 if symbol % 2 else -symbol // 2
+        n = symbol - 8
+        if symbol < 14:
+            r = self.raw(k, n + 1)
+            size = 3 + (1 << n) + r // 2
         else:
-            self.code -= part
-            self.range -= part
-            self.p[i] -= self.p[i] // 32
-        self.refill()
-        return yes
+            r = self.raw(k, 5)
+            n = 6 + r // 2
+            if n > 17:
+                raise Damage("too large")
+            size = 3 + (1 << n) + self.raw(k, 6)
+            if n > 6:
+                size += 64 * self.raw(k, n - 6)
+        return -size if r % 2 else size
 
-    def bit(self) -> int:
-        self.range >>= 1
-        one = self.code < self.range
-        if not one:
-            self.code -= self.range
-        self.refill()
-        return int(one)
-
-    def number(self, i: int, j: int) -> int:
-        if not self.decide(i):
-            return 0
-        negative = self.decide(j)
-        size = 1
-        while size <= 4 and self.decide(j + size):
-            size += 1
-        if size == 5:
-            n = 0
-            while self.decide(j + 5 + min(n, 10)):
-                n += 1
-                if n > 17:
-                    raise Damage("too large")
-            rest = 0
-            for _ in range(n):
-                rest = rest << 1 | self.bit()
-            size = 4 + (1 << n) + rest
-        return -size if negative else size
+    def number(self, model: int) -> int:
+        return self.number_of(0, self.decode(0, self.numbers[model]))
 
     def later(self, valid: bool) -> int:
-        return self.number(int(valid), 2 + 16 * valid)
+        return self.number(40 + valid)
 
     def motion(self, expected: Motion) -> Motion:
-        if self.decide(383):
-            return expected
-        return tuple(v + self.number(384 + 17 * i, 385 + 17 * i) for i, v in enumerate(expected))
+        change = self.number(42)
+        if change not in (0, 1):
+            raise Damage("motion")
+        return tuple(v + self.number(43 + i) for i, v in enumerate(expected)) if change else expected
 
-    def earlier(self, near: Neighbours) -> bool:
-        """Whether a valid pixel of a slice without key is earlier."""
-        left, upper = (2 if is_earlier(pixel) else int(pixel is not None) for pixel in (near.left, near.upper))
-        others = 9 * is_earlier(near.upper_right) + 18 * is_earlier(near.upper_left)
-        return self.decide(347 + left + 3 * upper + others)
-
-    def candidates(self, near: Neighbours) -> list[bool]:
-        """Which of the upper-left, the upper and the upper-right neighbour a choice may name."""
-        left, upper_left, upper, upper_right = near
-        if not self.key:
-            return [
-                upper_left is not None and not is_choice(left, 2),
-                upper is not None and not is_choice(upper, 0) and not is_choice(left, 3),
-                upper_right is not None and not is_choice(upper_right, 0),
-            ]
-        seen = {left.numbers} if left else set()
-        candidates = []
-        for pixel in near[1:]:
-            candidates.append(pixel is not None and pixel.numbers not in seen)
-            if pixel:
-                seen.add(pixel.numbers)
-        return candidates
-
-    def choice(self, near: Neighbours) -> int:
-        if near.left and self.decide(34 + near.kinds()):
-            return 0
-        candidates = self.candidates(near)
-        full = 2 * (kind(near.left) == 3) + (kind(near.upper) == 3)
-        others = (candidates[1] + 2 * candidates[2], int(candidates[2]), 0)
-        for i in range(3):
-            if candidates[i] and self.decide(98 + 16 * i + 4 * full + others[i]):
-                return i + 1
-        return 4 if self.decide(146 + origin(near.left) + 5 * origin(near.upper)) else 5
-
-    def residual(self, near: Neighbours) -> tuple[int, ...]:
-        r: list[int] = []
-        for i in range(4):
-            if not any(near):
-                a = 5
-            elif not near.left or not near.upper:
-                a = 4
+    def row(self, valid: list[bool], above: list[Place]) -> list[Coded]:
+        """Choices and residuals of a row's columns."""
+        columns = len(valid)
+        group = (0, 1, 2, 2, 2, 3, 3, 4)
+        upper = [0, *(pixel_class(pixel) for pixel in above), 0]
+        choices: list[Optional[int]] = [None] * columns
+        count = left = 0
+        for x in range(columns):
+            if not valid[x]:
+                left = 0
+                continue
+            if not self.key or left or any(upper[x : x + 3]):
+                context = left + 8 * group[upper[x + 1]] + 40 * group[upper[x + 2]]
+                choices[x] = self.decode(count % 4, self.choices[context])
+                count += 1
             else:
-                total = sum(pixel.activity[i] for pixel in (near.left, near.upper, near.upper_right) if pixel)
-                a = (0, 1, 2, 2, 3, 3, 3)[total] if total < 7 else 4
-            q = i > 0 and r[-1] != 0
-            r.append(self.number(171 + 12 * i + 6 * q + a, 219 + 32 * i + 16 * (a >= 3)))
-        return tuple(r)
+                choices[x] = 5
+            left = choices[x] + 1
+        activities = [pixel.activity if pixel else None for pixel in above] + [None]
+        row: list[Coded] = []
+        before: Optional[Numbers] = None  # activity to the left
+        for x, choice in enumerate(choices):
+            residual = self.residual(before, *activities[x : x + 2]) if choice == 5 else (0, 0, 0, 0)
+            before = None if choice is None else tuple(min(abs(r), 21) for r in residual)
+            row.append(Coded(choice, residual))
+        return row
+
+    def residual(self, left: Optional[Numbers], upper: Optional[Numbers], upper_right: Optional[Numbers]) -> Numbers:
+        symbols = []
+        for i in range(4):
+            if left is None or upper is None:
+                a = 9 if left is upper else 8
+            else:
+                total = left[i] + upper[i] + (upper_right[i] if upper_right else 0)
+                a = sum(total >= least for least in (1, 2, 3, 5, 8, 13, 21))
+            symbols.append(self.decode(i, self.numbers[10 * i + a]))
+        return tuple(self.number_of(i, symbol) for i, symbol in enumerate(symbols))
 
     def finish(self) -> None:
-        if self.position < len(self.data):
+        if self.position < len(self.data) or any(x != 1 << 20 for x in self.x):
             raise Damage("something is left over")
 
 
@@ -346,12 +343,12 @@ class CompactSlice:
         if 0 in self.steps:
             raise Damage("a step of 0")
         key = earlier is None
-        self.data: Data = PackedData(body[4:], self.steps == (1, 1, 1, 1)) if profile == PACKED else EntropyData(body[4:], key)
+        self.data: Data = PackedData(body[4:], self.steps == (1, 1, 1, 1)) if profile == PACKED else EntropyData(body[4:], key, self.steps)
         self.unit = max(1, depth // 8)  # of dz, and eight times that of sx and sy
         self.gap = min(4 * depth, 1023)
         self.columns = columns
         self.limits = ((0, last), (0, maximum), (-maximum, maximum), (-maximum, maximum))
-        self.latest = Pixel((last // 2, maximum // 2, 0, 0), 0, True)
+        self.latest = Pixel((last // 2, maximum // 2, 0, 0), True, 5)
         self.earlier = earlier
         self.motions: dict[int, Motion] = {}  # by number of the block in its row
 
@@ -362,6 +359,7 @@ class CompactSlice:
         row: list[Place] = [None] * self.columns
         valid = read_runs(0, self.columns, [pixel is not None for pixel in above], self.data.later)
         copied = [False] * self.columns  # packed only
+        coded_row = self.data.row(valid, above) if isinstance(self.data, EntropyData) else []
         for x in range(self.columns):
             if not valid[x]:
                 continue
@@ -374,10 +372,19 @@ class CompactSlice:
                 above[x],
                 above[x + 1] if x + 1 < self.columns else None,
             )
-            if self.earlier and (copied[x] if isinstance(self.data, PackedData) else self.data.earlier(near)):
+            if isinstance(self.data, EntropyData):
+                coded = coded_row[x]
+            elif copied[x]:
+                coded = Coded(EARLIER, (0, 0, 0, 0))
+            else:
+                choice = self.data.choice(near) if any(near) else 5
+                coded = Coded(choice, self.data.residual(near) if choice == 5 else (0, 0, 0, 0))
+            if coded.choice == EARLIER:
+                if not self.earlier:
+                    raise Damage("earlier than a key slice")
                 pixel = self.earlier_pixel(self.earlier, x, number)
             else:
-                pixel = self.pixel(near)
+                pixel = self.pixel(near, *coded)
             self.latest = row[x] = pixel
         return row
 
@@ -401,9 +408,9 @@ class CompactSlice:
         ys = [y + dy // 4, y + dy // 4 + min(b, 1)]
         numbers = self.interpolated([earlier.pixel(u, v) for v in ys for u in xs], a, b)
         if numbers is None:
-            return Pixel((0, 0, 0, 0), 1, False, is_earlier=True)
+            return Pixel((0, 0, 0, 0), False, EARLIER)
         plane = (8 * dz + sx * (x % BLOCK - 7) + sy * (y % BLOCK - 7)) * self.unit
-        return Pixel((cut(numbers[0] + (plane + 4) // 8, *self.limits[0]), *numbers[1:]), 1, True, is_earlier=True)
+        return Pixel((cut(numbers[0] + (plane + 4) // 8, *self.limits[0]), *numbers[1:]), True, EARLIER)
 
     def interpolated(self, four: list[Union[Numbers, Unknown, None]], a: int, b: int) -> Optional[Numbers]:
         """Between four pixels, in quarters of their distance; None: not known."""
@@ -422,19 +429,15 @@ class CompactSlice:
         nearest = four[(a >= 2) + 2 * (b >= 2)]
         return nearest if isinstance(nearest, tuple) else None
 
-    def pixel(self, near: Neighbours) -> Pixel:
-        choice = self.data.choice(near) if any(near) else 5
+    def pixel(self, near: Neighbours, choice: int, r: Numbers) -> Pixel:
         if choice < 4:
             same = near[choice]
             if not same:
                 raise Damage("equals an invalid pixel")
-            return Pixel(same.numbers, 1 if choice == 0 else 2, same.known, choice)
+            return Pixel(same.numbers, same.known, choice)
         numbers, known = self.predicted(near)
-        if choice == 4:
-            return Pixel(numbers, 3, known, choice)
-        r = self.data.residual(near)
         made = (cut(n + d * s, *limit) for n, d, s, limit in zip(numbers, r, self.steps, self.limits))
-        return Pixel(tuple(made), 4, known, choice, tuple(min(abs(d), 9) for d in r))
+        return Pixel(tuple(made), known, choice, tuple(min(abs(d), 21) for d in r))
 
     def predicted(self, near: Neighbours) -> tuple[Numbers, bool]:
         """The numbers, and whether they are known."""

@@ -23,7 +23,7 @@ from typing import BinaryIO, Callable, Iterable, Iterator, NamedTuple, Union
 import compact
 from compact import UNKNOWN, Unknown
 
-VERSION = 2
+VERSION = 3
 PLAIN, PACKED, ENTROPY = 0, 1, 2
 SLICE, RIG_VIEW, ACCESS_UNIT = 1, 2, 3
 START_CODE = b"\x00RCU"
@@ -105,7 +105,7 @@ class Slice(NamedTuple):
         """It is shorter than any that gives its pixels."""
         if not self.rows:
             return False
-        bits = {PLAIN: 3 * self.rows * self.columns, PACKED: 48 + 2 * self.rows, ENTROPY: 32}[self.profile]
+        bits = {PLAIN: 3 * self.rows * self.columns, PACKED: 48 + 2 * self.rows, ENTROPY: 160}[self.profile]
         return 8 * len(self.body) < bits
 
     def pixel_bits(self) -> int:

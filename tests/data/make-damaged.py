@@ -13,7 +13,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "bitstream"))
 import compact  # its tables of prefix codes
 
 START_CODE = b"\x00RCU"
-SLICE, RIG_VIEW, ACCESS_UNIT = 0x21, 0x22, 0x23
+SLICE, RIG_VIEW, ACCESS_UNIT = 0x31, 0x32, 0x33
 
 
 def units_of(data: bytes) -> list[list[bytes]]:
@@ -152,7 +152,7 @@ PACKED_ROWS = [motion(*v) + ALL_VALID + ALL_VALID for v in MOTIONS] + [
     motion(1, 0, 0) + ALL_VALID + ALL_VALID + "1",  # a bit left over
     motion(1, 0, 0) + ALL_VALID,  # it ends too soon
 ]
-ENTROPY_ROWS = [b"", b"\xff", b"\0" * 3, b"\x80\x11\x22\x33", b"\x40\x99\x12", b"\xc0\x05\x77\x88", b"\0" * 40, b"\xff" * 40]
+ENTROPY_ROWS = [b"", b"\xff" * 15, bytes(16), *(bytes((i, 17, 34, 51)) * 8 for i in (0, 64, 128, 192)), bytes(40), b"\xff" * 40]
 
 
 def without_key(one: list[bytes]) -> list[list[bytes]]:
@@ -193,7 +193,7 @@ def main() -> None:
     head = coarse[1][0]
     one = [unit for unit in coarse[1] if unit[0] == SLICE]
     two = [unit for unit in coarse[2] if unit[0] == SLICE]
-    unknown = bytes((0x29, 0xFF, 8, 0, 1, 2, 3, 4))
+    unknown = bytes((0x39, 0xFF, 8, 0, 1, 2, 3, 4))
     damaged = [
         # Rubbish, a start code that means nothing, and access units before the rig is known.
         b"rubbish" + START_CODE + b"no access unit behind it, but as many bytes",
@@ -219,7 +219,7 @@ def main() -> None:
         access_unit(head, [patched(unit, 1, 0) for unit in one]),
         *(access_unit(patched(head, 1, 0), units) for units in without_key(one)),
         # What follows a unit of another version, or one that is too short, cannot be read.
-        access_unit(head, two[:3] + [patched(unknown, 0, 0x39)] + two[3:]),
+        access_unit(head, two[:3] + [patched(unknown, 0, 0x49)] + two[3:]),
         access_unit(head, two[:5] + [patched(unknown, 2, 3)] + two[5:]),
         # Nothing but rig views is no frame set; a unit of unknown type makes one without views.
         access_unit(head, rig),

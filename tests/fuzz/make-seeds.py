@@ -58,29 +58,30 @@ def slice_seeds(units: list[bytes]) -> list[bytes]:
     return seeds
 
 
-def entropy_data(initial: list[int], decisions: list[tuple[int, bool]]) -> bytes:
-    """Numbers of probabilities, each but once, and what is decided; all that follows is yes."""
-    low, size, taken = 0, (1 << 32) - 1, 4
-    for i, yes in decisions:
-        part = (size >> 12) * (initial[i] >> 4)
-        low += 0 if yes else part
-        size = part if yes else size - part
-        while size < 1 << 24:
-            low, size, taken = low << 8, size << 8, taken + 1
-    return low.to_bytes(taken, "big")
+def state_before(symbols: list[tuple[list[int], int]], state: int) -> int:
+    """The state from which a reader comes to `state` when it has read symbols, each under its model."""
+    for model, symbol in reversed(symbols):
+        frequency = model[symbol + 1] - model[symbol]
+        state = (state // frequency << 15) + state % frequency + model[symbol]
+    return state
 
 
 def too_large_numbers() -> list[bytes]:
-    """Of entropy slices: a motion, a run and a residual of one pixel that say that they have more than 17 bits."""
+    """Of entropy slices: a motion, a run and a residual of one pixel that say that they have 18 bits."""
     steps = bytes((1, 0, 1, 1))
-    tables = streams.compact
+    key, other = (streams.compact.INITIAL[name][1] for name in ("exact", "without key"))
+    first, large = 1 << 20, (1 << 20) + (24 << 10)
+    # The run of invalid pixels ends one before what is expected, that of valid ones one behind it.
+    one_pixel = state_before([(key[40], 2), (key[41], 1)], first)
     inputs = [
-        (OTHER_SLICE, 5, entropy_data(tables.INITIAL_WITHOUT_KEY, [(383, False)])),
-        (KEY_SLICE, 5, b""),
-        # The run of invalid pixels ends one before what is expected, that of valid ones one behind it.
-        (KEY_SLICE, 0, entropy_data(tables.INITIAL, [(0, True), (2, True), (3, False), (1, True), (18, False), (19, False)])),
+        (OTHER_SLICE, 5, state_before([(other[42], 1), (other[43], 14)], large), first),
+        (KEY_SLICE, 5, state_before([(key[40], 14)], large), first),
+        (KEY_SLICE, 0, one_pixel, state_before([(key[19], 14)], large)),
     ]
-    return [bytes((profile, 1, 8, 4, columns, 0, 0, 0, columns, 0, 0, 0, 1, 0)) + steps + data for profile, columns, data in inputs]
+    return [
+        bytes((profile, 1, 10, 4, columns, 0, 0, 0, columns, 0, 0, 0, 1, 0)) + steps + struct.pack("<4I", x0, x1, first, first)
+        for profile, columns, x0, x1 in inputs
+    ]
 
 
 def access_unit_seed(options: int, access_units: list[list[bytes]], how: int = 0) -> bytes:
@@ -264,7 +265,7 @@ def range_meta_seeds() -> list[bytes]:
 
 def caps_seeds(rigs: list[bytes]) -> list[bytes]:
     fields = "width=(int)80, height=(int)60, views=(int)%d, framerate=(fraction)30/1, rig=(buffer)%s"
-    media = ("video/x-range, format=(string)Z16_RGBx, ", "video/x-neighbour-code, version=(int)2, alignment=(string)slice, ")
+    media = ("video/x-range, format=(string)Z16_RGBx, ", "video/x-neighbour-code, version=(int)3, alignment=(string)slice, ")
     texts = [(media[i % 2] + fields % (1 + i // 2, rig.hex())).encode() for i, rig in enumerate(rigs)]
     texts += [b"ANY", b"video/x-range, width=[ 1, 80 ], alignment={ access-unit, slice }; video/x-neighbour-code(memory:GLMemory)"]
     numbers = struct.pack("<5i", 80, 60, 1, 30, 1)

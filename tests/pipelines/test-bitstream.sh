@@ -165,7 +165,7 @@ test_damaged_rigs_decode_the_same () {
 import random, sys
 random.seed(int(sys.argv[1]))
 data = bytearray(open("rigs.rcnc", "rb").read())
-rig_views = [i for i in range(len(data) - 18) if data[i] == 0x22 and data[i + 14 : i + 18] == b"RCRG"]
+rig_views = [i for i in range(len(data) - 18) if data[i] == 0x32 and data[i + 14 : i + 18] == b"RCRG"]
 for begin in rig_views[2:]:
     width = begin + 23 + data[begin + 22]
     end = begin + int.from_bytes(data[begin + 2 : begin + 4], "little")
@@ -198,7 +198,7 @@ import random, sys
 random.seed(int(sys.argv[1]))
 data = bytearray(open("good.rcnc", "rb").read())
 first = 28 + 2 * 200
-slices = [i for i in range(first, len(data) - 36) if data[i : i + 2] == b"\x21\x01" and data[i + 5] <= 2 and data[i + 4] < 2]
+slices = [i for i in range(first, len(data) - 36) if data[i : i + 2] == b"\x31\x01" and data[i + 5] <= 2 and data[i + 4] < 2]
 for i in range(20):
     at = random.choice((random.randrange(first, len(data)), random.choice(slices) + random.randrange(36)))
     data[at] ^= 1 << random.randrange(8)

@@ -64,14 +64,14 @@ test_a_stream_that_begins_in_a_flood_gets_through () {
   end_job
 }
 
-# RTP packets of somebody who has version 3 of the code; one packet is one unit of 40 bytes.
-send_version_3 () { # port packets
+# RTP packets of somebody who has version 4 of the code; one packet is one unit of 40 bytes.
+send_version_4 () { # port packets
   python3 - "$@" <<'END'
 import socket, struct, sys, time
 port, packets = map (int, sys.argv[1:])
 out = socket.socket (socket.AF_INET, socket.SOCK_DGRAM)
 for i in range (packets):
-    out.sendto (struct.pack (">BBHII", 0x80, 0xe0, i & 0xffff, i * 3000, 99) + bytes ([0x31, 1]) + struct.pack ("<H", 40) + bytes (36), ("127.0.0.1", port))
+    out.sendto (struct.pack (">BBHII", 0x80, 0xe0, i & 0xffff, i * 3000, 99) + bytes ([0x41, 1]) + struct.pack ("<H", 40) + bytes (36), ("127.0.0.1", port))
     time.sleep (0.005)
 END
 }
@@ -81,11 +81,11 @@ test_another_version_at_a_hosts_port_changes_nothing () {
   wait_for_sets '0 1 ' 10 60
   local begun
   begun=$(now_ms)
-  send_version_3 $((port + 1)) 400
+  send_version_4 $((port + 1)) 400
   wait_for_sets_after "$begun" '0 1 ' 20 40
   end_job
   # The kernel drops most of them, so that there are no four in order, which would be told. Where nobody else is: below.
-  [ "$(grep -c 'version 3' parent.log)" -le 1 ] || fail "told more than once: $(tail -n 20 parent.log)"
+  [ "$(grep -c 'version 4' parent.log)" -le 1 ] || fail "told more than once: $(tail -n 20 parent.log)"
   ! list | grep -q '!' || fail "slices are missing: $(stream-report all.rcnc)"
   others_went_on "$begun" 0 1
 }
@@ -93,10 +93,10 @@ test_another_version_at_a_hosts_port_changes_nothing () {
 test_another_version_alone_is_told_once () {
   start_job $((ports + 60)) 0
   wait_for_sets '0 ' 5 60 # the parent is there
-  send_version_3 $((port + 1)) 100
-  wait_for parent.log 'version 3 .*expected version 2' 20
+  send_version_4 $((port + 1)) 100
+  wait_for parent.log 'version 4 .*expected version 3' 20
   end_job
-  [ "$(grep -c 'version 3' parent.log)" = 1 ] || fail "told more than once: $(tail -n 20 parent.log)"
+  [ "$(grep -c 'version 4' parent.log)" = 1 ] || fail "told more than once: $(tail -n 20 parent.log)"
 }
 
 # At one port the first one stays; the parent says that there is a second.

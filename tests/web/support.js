@@ -68,7 +68,7 @@ export const changedRigView = (unit, { number, total, id, width, height }) => {
 // A byte stream of access units that are lists of units.
 export const byteStream = (units) => joined (units.flatMap ((list, i) => {
   const header = new Uint8Array (24), view = new DataView (header.buffer);
-  header.set ([0x23, 1, 24, 0]);
+  header.set ([0x33, 1, 24, 0]);
   view.setUint32 (4, list.reduce ((sum, unit) => sum + unit.length, 0), true);
   view.setBigUint64 (8, BigInt (i) * 40000000n, true);
   return [new Uint8Array (START_CODE), header, ...list];

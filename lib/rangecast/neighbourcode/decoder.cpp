@@ -109,7 +109,7 @@ SliceDecoder::smallest_size (const SliceHeader &header)
       return kPackedHeaderSize + !header.key +
              (2 * rows + 7) / 8; /* a row is one run at least: two bits */
     case Profile::kEntropy:
-      return kEntropyHeaderSize + !header.key; /* zeros at the end are left out */
+      return kEntropyHeaderSize + kRansHeaderSize + !header.key;
     default:
       return header_size_of (header) +
              symbol_bytes (rows * static_cast<std::size_t> (header.columns));

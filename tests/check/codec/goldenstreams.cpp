@@ -12,7 +12,7 @@ using namespace rangecast;
 using namespace rangecast::testing;
 
 static constexpr const char *kStreamCaps =
-    "video/x-neighbour-code,version=2,alignment=byte-stream";
+    "video/x-neighbour-code,version=3,alignment=byte-stream";
 
 static std::string
 read_data (const std::string &name)

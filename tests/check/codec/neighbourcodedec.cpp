@@ -714,9 +714,9 @@ GST_START_TEST (test_damage_in_memories_costs_what_it_costs_in_one)
     bytes.insert (bytes.end (), unit.begin (), unit.end ());
   const std::size_t end = units[0].size () + units[1].size ();
   const Decoded sound = decoded (rig, in_memories (bytes, {}));
-  for (const guint8 first_byte : {0x31, 0x21}) { /* another version; a size beyond the memory */
+  for (const guint8 first_byte : {0x21, 0x31}) { /* another version; a size beyond the memory */
     bytes[units[0].size ()] = first_byte;
-    bytes[units[0].size () + 3] = first_byte == 0x21 ? 0xff : bytes[units[0].size () + 3];
+    bytes[units[0].size () + 3] = first_byte == 0x31 ? 0xff : bytes[units[0].size () + 3];
     const Decoded whole = decoded (rig, in_memories (bytes, {}));
     ck_assert_int_lt (whole.slices, sound.slices);
     ck_assert_int_gt (whole.bad_slices, 0);

@@ -42,7 +42,7 @@ static std::vector<guint8>
 unknown_unit (const std::vector<guint8> &content)
 {
   const gsize size = content.size () + 4;
-  std::vector<guint8> unit = {0x29, 0, guint8 (size & 255), guint8 (size >> 8)};
+  std::vector<guint8> unit = {0x39, 0, guint8 (size & 255), guint8 (size >> 8)};
   unit.insert (unit.end (), content.begin (), content.end ());
   return unit;
 }
@@ -83,7 +83,7 @@ GST_END_TEST;
 GST_START_TEST (test_longest_access_unit_of_short_units_takes_linear_time)
 {
   const Recording recording (3, 16);
-  const std::vector<guint8> rig_view = {0x22, 0, 4, 0};
+  const std::vector<guint8> rig_view = {0x32, 0, 4, 0};
   const auto unknown = unknown_unit (std::vector<guint8> (24, 0));
   std::vector<guint8> padding, expected;
   while (padding.size () < (31 << 20)) {
@@ -114,7 +114,7 @@ GST_START_TEST (test_pieces_of_an_access_unit_keep_their_order_however_many_they
       const auto unit = unknown_unit ({i, guint8 (2 * i)});
       padding.insert (padding.end (), unit.begin (), unit.end ());
       expected.insert (expected.end (), unit.begin (), unit.end ());
-      padding.insert (padding.end (), {0x22, 0, 4, 0});
+      padding.insert (padding.end (), {0x32, 0, 4, 0});
     }
     const auto slices = bytes_of (recording.access_units[0]);
     expected.insert (expected.end (), slices.begin (), slices.end ());
@@ -377,7 +377,7 @@ GST_START_TEST (test_typefinder_leaves_what_it_does_not_know)
 {
   const Recording recording (1, 8);
   auto future = recording.bytes;
-  future[4] = 0x33;
+  future[4] = 0x43;
   for (const std::span<const guint8> bytes :
       {std::span (recording.bytes).first (27), std::span<const guint8> (future)}) {
     GstCaps *caps = gst_type_find_helper_for_data (nullptr, bytes.data (), bytes.size (), nullptr);

@@ -265,7 +265,7 @@ GST_START_TEST (test_future_version_is_one_error)
   auto bytes = recording.bytes;
   for (gsize offset : recording.offsets)
     bytes[offset + 4] = 0x33;
-  expect_one_error (bytes, "version 2");
+  expect_one_error (bytes, "version 3");
 }
 GST_END_TEST;
 

@@ -13,7 +13,7 @@ namespace rangecast::testing {
 
 inline constexpr GstClockTime kFrame = GST_SECOND / 25;
 inline constexpr const char *kStreamCaps =
-    "video/x-neighbour-code,version=2,alignment=byte-stream";
+    "video/x-neighbour-code,version=3,alignment=byte-stream";
 
 /** Coded frame sets as access units and as the byte stream that the parser makes of them. */
 struct Recording {

@@ -241,7 +241,7 @@ GST_START_TEST (test_caps_without_a_rig_are_an_error)
   GstHarness *h = gst_harness_new ("rtpneighbourcodepay");
   {
     ErrorCounter errors (h);
-    gst_harness_set_src_caps_str (h, "video/x-neighbour-code,version=2,alignment=access-unit,"
+    gst_harness_set_src_caps_str (h, "video/x-neighbour-code,version=3,alignment=access-unit,"
                                      "width=320,height=240,framerate=30/1,views=1");
     ck_assert_int_gt (
         errors.take (), 0); /* again with each event: GStreamer repeats refused caps */

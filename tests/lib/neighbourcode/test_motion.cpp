@@ -194,13 +194,7 @@ TEST (MotionLimits, greater_numbers_than_a_reader_accepts_are_not_sound)
     }
 }
 
-/* The decisions of a slice without key whose pixels are all invalid, of one row in one block. */
-class EntropyBytes : public EntropyCode<RangeEncoder> {
-public:
-  EntropyBytes (std::uint8_t *to, EntropyModel &model) : EntropyCode (RangeEncoder (to), model) {}
-  std::size_t finish () { return coder_.finish (); }
-};
-
+/* A slice without key whose pixels are all invalid, of one row in one block. */
 std::vector<std::uint8_t>
 body_with (Profile profile, int depth_step, const BlockMotion &m)
 {
@@ -209,19 +203,19 @@ body_with (Profile profile, int depth_step, const BlockMotion &m)
       static_cast<std::uint8_t> (depth_step), static_cast<std::uint8_t> (depth_step >> 8), 1, 1};
   body.resize (packed ? 6 : 4);
   std::vector<std::uint8_t> data (200);
-  EntropyModel model = kInitialDeltaModel;
-  BlockMotion motion = m;
-  std::int32_t later = 0;
   if (packed) {
-    PackedWriter writer (data.data (), model, model, {{}, false});
-    writer.motion ({}, motion);
-    writer.run (false, later);
+    PackedWriter writer (data.data (), {{}, false});
+    writer.motion ({}, m);
+    writer.run (false, 0);
     data.resize (writer.finish ());
   } else {
-    EntropyBytes writer (data.data (), model);
-    EXPECT_TRUE (writer.motion ({}, motion));
-    EXPECT_TRUE (writer.run (false, later));
-    data.resize (writer.finish ());
+    std::vector<std::uint32_t> entries (EntropyWriter::max_entries (8));
+    EntropyModel model;
+    EntropyWriter writer (
+        entries.data (), model, initial_model (false, Components{depth_step, 1, 1, 1}));
+    writer.motion ({}, m);
+    writer.run (false, 0);
+    data.resize (writer.finish (data.data ()));
   }
   body.insert (body.end (), data.begin (), data.end ());
   body.shrink_to_fit ();

@@ -304,7 +304,7 @@ TEST_P (Profiles, trailing_bytes_and_steps_of_0_are_damage)
   const auto good = units_of (small_stream ())[0];
   for (std::uint8_t byte : {0, 1}) {
     auto unit = good;
-    unit.insert (unit.end (), 5, byte); /* of fewer, a range coder may be in the midst of reading */
+    unit.insert (unit.end (), 5, byte);
     unit[2] = static_cast<std::uint8_t> (unit[2] + 5);
     EXPECT_EQ (decode_exact (decoder, unit).result.bad_slices, 1u) << int (byte);
   }
@@ -485,10 +485,90 @@ TEST (PackedTables, every_context_has_a_complete_prefix_code)
     EXPECT_EQ (kraft (lengths), 1 << 16);
 }
 
-TEST (EntropyModel, no_decision_is_certain_to_begin_with)
+/* All models of a slice, by kind. */
+template <class Work>
+void
+for_all_models (const EntropyModel &all, const Work &work)
 {
-  for (const Probability p : kInitialModel) {
-    EXPECT_GE (p, 64);
-    EXPECT_LE (p, 65536 - 64);
+  for (const ChoiceModel &model : all.choices)
+    work (model);
+  for (const auto &of_number : all.residuals)
+    for (const NumberModel &model : of_number)
+      work (model);
+  for (const NumberModel &model : all.runs)
+    work (model);
+  work (all.motion_change);
+  for (const NumberModel &model : all.motions)
+    work (model);
+}
+
+template <int kSymbols>
+void
+expect_frequencies (const SymbolModel<kSymbols> &model)
+{
+  EXPECT_EQ (model.starts[0], 0);
+  EXPECT_EQ (model.starts[kSymbols], kFrequencySum);
+  for (std::size_t symbol = 0; symbol < kSymbols; symbol++)
+    EXPECT_GE (model.starts[symbol + 1], model.starts[symbol] + kMinFrequency);
+}
+
+TEST (EntropyModels, every_symbol_can_be_coded_at_the_beginning_and_after_any_others)
+{
+  std::mt19937 random (1);
+  for (const auto &[key, step] : {std::pair{true, 1}, {true, 5}, {true, 7}, {false, 1}})
+    for_all_models (
+        initial_model (key, Components{step, step, step, step}), [&] (const auto &initial) {
+          auto model = initial;
+          expect_frequencies (model);
+          for (int i = 0; i < 500; i++)
+            model.learn (i < 400 ? 0 : random () % (std::size (model.starts) - 1));
+          expect_frequencies (model);
+          for (std::uint32_t number = 0; number < kFrequencySum; number += 61) {
+            const std::size_t symbol = model.find (number) / 2 - 1;
+            ASSERT_LE (model.starts[symbol], number);
+            ASSERT_GT (model.starts[symbol + 1], number);
+          }
+        });
+}
+
+TEST (Rans, symbols_and_raw_bits_come_back_in_at_most_the_bytes_that_were_foretold)
+{
+  std::mt19937 random (2);
+  for (int round = 0; round < 200; round++) {
+    const unsigned skew = random () % 300, count = random () % 5000;
+    const EntropyModel &initial = initial_model (true, Components{5, 5, 5, 5});
+    ChoiceModel choices = initial.choices[0];
+    NumberModel numbers = initial.runs[0];
+    struct Symbol {
+      unsigned state, kind, value;
+    };
+    std::vector<Symbol> symbols (count);
+    std::vector<std::uint32_t> entries (count);
+    RansEncoder encoder (entries.data ());
+    for (Symbol &s : symbols) {
+      s = {static_cast<unsigned> (random () % kRansStates), static_cast<unsigned> (random () % 3),
+          0};
+      const bool usual = random () % 300 < skew;
+      s.value = usual ? 0 : static_cast<unsigned> (random ()) % (s.kind == 0 ? 7 : 15);
+      if (s.kind == 0)
+        encoder.code (s.state, choices, s.value);
+      else if (s.kind == 1)
+        encoder.code (s.state, numbers, s.value);
+      else
+        encoder.raw (s.state, s.value, 4);
+    }
+    std::vector<std::uint8_t> bytes (encoder.bound ());
+    const std::size_t size = encoder.finish (bytes.data ());
+    ASSERT_LE (size, encoder.bound ());
+    EXPECT_LE (encoder.bound (), size + size / 16 + 16); /* it is not far off */
+    choices = initial.choices[0];
+    numbers = initial.runs[0];
+    RansDecoder decoder (bytes.data (), size);
+    for (const Symbol &s : symbols)
+      ASSERT_EQ (s.kind == 0   ? decoder.code (s.state, choices) / 2 - 1
+                 : s.kind == 1 ? decoder.code (s.state, numbers) / 2 - 1
+                               : decoder.raw (s.state, 4),
+          s.value);
+    EXPECT_TRUE (decoder.at_clean_end ());
   }
 }

@@ -527,7 +527,7 @@ TEST_F (PlainDamage, of_random_symbols_is_judged_as_the_rules_say)
     damaged.insert (damaged.end (), body.begin (), body.end ());
     const auto bits = full * std::size_t (header.depth_bits + 3 * header.colour_bits);
     damaged =
-        with_size (damaged, damaged.size () + (bits + 7) / 8, std::uint8_t (round % 3 ? 0 : 0x21));
+        with_size (damaged, damaged.size () + (bits + 7) / 8, std::uint8_t (round % 3 ? 0 : 0x31));
     ASSERT_NO_FATAL_FAILURE (decode (damaged, depth_)) << "round " << round;
     good += decode_straight (std::span (damaged).subspan (kSliceHeaderSize), header, depth_)
                 .has_value ();

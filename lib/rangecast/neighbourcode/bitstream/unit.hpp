@@ -14,7 +14,7 @@
 
 namespace rangecast {
 
-inline constexpr int kBitstreamVersion = 2;
+inline constexpr int kBitstreamVersion = 3;
 inline constexpr std::size_t kUnitHeaderSize = 4;
 inline constexpr std::size_t kSliceHeaderSize = 36; ///< of key slices, with the unit header
 inline constexpr std::size_t kMaxUnitSize = 65535;
@@ -36,7 +36,7 @@ struct UnitHeader {
 enum class Profile : std::uint8_t {
   kPlain = 0,   ///< codes of fixed length
   kPacked = 1,  ///< run lengths and fixed prefix codes
-  kEntropy = 2, ///< adaptive probabilities and a range coder
+  kEntropy = 2, ///< adaptive frequencies and rANS
 };
 
 /** The header of a slice. */

@@ -90,7 +90,7 @@ inline constexpr PixelCode kNoPixel = ReferencePlane::kNone;
  * reader knows that there is none. */
 inline constexpr PixelCode kEmptyPixel = kNoPixel ^ 1 << 16;
 
-/** Magnitudes of a residual's components, at most 9 each, one a byte from the least significant; 0
+/** Magnitudes of a residual's components, at most 21 each, one a byte from the least significant; 0
  *  for copies. */
 using Activity = std::uint32_t;
 
@@ -116,11 +116,11 @@ copy_state (std::uint64_t choice)
   return state_of (upper ? Origin::kUpper : Origin::kLeft) | (choice + 1) << 16;
 }
 
-/** Whether it is copy_state (choice). */
-constexpr bool
-is_copy (PixelState state, PixelChoice choice)
+/** The state of a pixel, with its choice. */
+constexpr PixelState
+with_choice (PixelState state, PixelChoice choice)
 {
-  return (state >> 16 & 0xff) == static_cast<PixelState> (choice + 1);
+  return state | static_cast<PixelState> (choice + 1) << 16;
 }
 
 /** All bits set if `v`, which is below 2^63, is 0; else none. */
@@ -276,7 +276,7 @@ inline Activity
 activity_of (Components residual)
 {
   const Components size = residual < 0 ? -residual : residual;
-  const Components max = {9, 9, 9, 9}, bounded = size > max ? max : size;
+  const Components max = {21, 21, 21, 21}, bounded = size > max ? max : size;
   const auto pairs = reinterpret_cast<ComponentPairs> (bounded << Components{0, 8, 0, 8});
   const auto low = pairs[0] | pairs[0] >> 32, high = pairs[1] | pairs[1] >> 32;
   return static_cast<Activity> ((low & 0xffff) | (high & 0xffff) << 16);

@@ -8,26 +8,6 @@
 namespace rangecast {
 namespace {
 
-/* An EntropyCode with the interface of PackedReader. */
-class EntropyReader : public EntropyCode<RangeDecoder> {
-public:
-  static constexpr bool kEarlierInRuns = false;
-
-  EntropyReader (
-      std::span<const std::uint8_t> bytes, EntropyModel &model, const EntropyModel &initial)
-      : EntropyCode (RangeDecoder (bytes.data (), bytes.size ()), model)
-  {
-    model = initial;
-  }
-  bool earlier (const Neighbours &n) { return EntropyCode::earlier (n, false); }
-  template <bool Delta> int choice (const Neighbours &n)
-  {
-    return EntropyCode::choice<Delta> (n, kNoSymbol);
-  }
-  [[nodiscard]] bool overrun () const { return coder_.overrun (); }
-  [[nodiscard]] bool at_clean_end () const { return coder_.at_end (); }
-};
-
 /* A pixel as it goes into the image: R, G, B in the lower half, depth in the upper. */
 inline std::uint64_t
 shown_as (PixelCode code, const CompactQuantisers &quantisers, const PixelLimits &limits)
@@ -95,17 +75,21 @@ show (const PixelCode *codes, std::size_t begin, std::size_t end, std::size_t co
   }
 }
 
+inline void
+write_pixel (std::uint64_t shown, std::uint16_t &depth, Rgbx &colour)
+{
+  depth = static_cast<std::uint16_t> (shown >> 32);
+  auto rgbx = static_cast<std::uint32_t> (shown);
+  if constexpr (std::endian::native == std::endian::big)
+    rgbx = __builtin_bswap32 (rgbx);
+  std::memcpy (&colour.r, &rgbx, sizeof rgbx);
+}
+
 void
 write_row (const std::uint64_t *row, std::size_t columns, std::uint16_t *depth, Rgbx *colour)
 {
   for (std::size_t x = 0; x < columns; x++)
-    depth[x] = static_cast<std::uint16_t> (row[x] >> 32);
-  for (std::size_t x = 0; x < columns; x++) {
-    auto rgbx = static_cast<std::uint32_t> (row[x]);
-    if constexpr (std::endian::native == std::endian::big)
-      rgbx = __builtin_bswap32 (rgbx);
-    std::memcpy (&colour[x].r, &rgbx, sizeof rgbx);
-  }
+    write_pixel (row[x], depth[x], colour[x]);
 }
 
 constexpr PixelState kLeftState = state_of (Origin::kLeft), kUpperState = state_of (Origin::kUpper);
@@ -151,12 +135,7 @@ CompactDecoder::decode_run (
   for (std::size_t x = begin; x < end; x++) {
     const Neighbours n = {left, upper_codes + x, upper_states + x};
     if constexpr (Delta) {
-      bool earlier;
-      if constexpr (Code::kEarlierInRuns)
-        earlier = row_.earlier ()[x];
-      else
-        earlier = code.earlier (n);
-      if (earlier) {
+      if (row_.earlier ()[x]) {
         codes[x] = left.code = earlier_codes_[x];
         states[x] = left.state = copy_state (kTakeEarlier);
         shown[x] = left_shown =
@@ -191,9 +170,20 @@ CompactDecoder::decode_run (
   return true;
 }
 
+/* predict() where all neighbours are valid, which is likely. */
+[[gnu::always_inline]] inline Components
+predict_between (PixelCode left, const PixelCode *upper, Components max)
+{
+  const Components l = components_of (left), u = components_of (upper[0]);
+  const Components mean = (2 * l + u + components_of (upper[1]) + 2) >> 2;
+  const Components plane = clamped (l + u - components_of (upper[-1]), Components{}, max);
+  const Components depth_only = {-1, 0, 0, 0};
+  return (mean & ~depth_only) | (plane & depth_only);
+}
+
 /* ---- packed, key slices ---- */
 
-/* predict() where all neighbours are valid, which is likely.
+/* predict() for waves' contexts.
  * @param above  context of the two pixels above and to the right */
 [[gnu::always_inline]] inline Components
 predict_packed (
@@ -202,11 +192,7 @@ predict_packed (
   if (left == kNoPixel || upper[-1] == kNoPixel || (above & PackedStep::context (0xc)) == 0 ||
       (above & PackedStep::context (0x30)) == 0) [[unlikely]]
     return predict (left, upper, last, max);
-  const Components l = components_of (left), u = components_of (upper[0]);
-  const Components mean = (2 * l + u + components_of (upper[1]) + 2) >> 2;
-  const Components plane = clamped (l + u - components_of (upper[-1]), Components{}, max);
-  const Components depth_only = {-1, 0, 0, 0};
-  return (mean & ~depth_only) | (plane & depth_only);
+  return predict_between (left, upper, max);
 }
 
 /* Decodes a run of valid pixels, which follows an invalid one: as decode_run(), but of the
@@ -291,10 +277,11 @@ CompactDecoder::decode_packed_row (PackedReader &code, const CompactQuantisers &
 }
 
 /* The same as decode_runs(), with bits for the pixels. */
+template <class Code>
 bool
-CompactDecoder::decode_run_ends (PackedReader &slice_code, int columns)
+CompactDecoder::decode_run_ends (Code &slice_code, int columns)
 {
-  PackedReader code = slice_code;
+  Code code = slice_code;
   std::ranges::fill (valid_, std::uint32_t{0});
   runs_.clear ();
   bool now = false;
@@ -314,6 +301,93 @@ CompactDecoder::decode_run_ends (PackedReader &slice_code, int columns)
   slice_code = code;
   return true;
 }
+
+/* ---- entropy ---- */
+
+/* Makes the pixels of a run of valid ones, which follows an invalid one, of their classes and
+ * residuals. */
+template <bool Delta>
+inline bool
+CompactDecoder::make_run (
+    const EntropyRow &row, std::size_t begin, std::size_t end, const Components *&residuals)
+{
+  PixelCode *const codes = row_.codes ();
+  const PixelCode *const upper = upper_.codes ();
+  const PixelClass *const classes = row.classes, *const upper_classes = row.upper_classes;
+  const Components steps = steps_;
+  const PixelLimits limits = limits_;
+  PixelCode left = kNoPixel;
+  PixelClass left_class = 0;
+  bool bad = classes[begin] == kTakeLeft + 1, unknown = false;
+  for (std::size_t x = begin; x < end; x++) {
+    const PixelClass now = classes[x];
+    if (now <= kTakeUpperRight + 1) [[likely]] {
+      const std::uint64_t take_left = zero_mask (now - kTakeLeft - 1u);
+      const auto from = static_cast<std::ptrdiff_t> (x + now) - 1 - kTakeUpper;
+      if constexpr (Delta) /* codes do not tell unknown pixels from invalid ones */
+        bad |= ((upper_classes[from] != 0) | (now == kTakeLeft + 1)) == 0;
+      left = select (take_left, left, upper[from]);
+    } else if (Delta && now == kEarlierClass) {
+      left = earlier_codes_[x];
+    } else {
+      bad |= now > kCorrectedClass;
+      const PixelClass *const around = upper_classes + x;
+      const bool all = (left_class != 0) & (around[-1] != 0) & (around[0] != 0) & (around[1] != 0);
+      const PixelState states[] = {around[-1], around[0], around[1]};
+      const Neighbours n = {{left, left_class}, upper + x, states + 1};
+      Components made =
+          all ? predict_between (left, upper + x, limits.max) : predict (n, last_, limits.max);
+      const bool known = !Delta || can_predict (n, last_);
+      if (now == kCorrectedClass)
+        made = correct (made, *residuals++, steps, limits);
+      left = known ? pack_components (made) : kNoPixel;
+    }
+    unknown |= left == kNoPixel;
+    codes[x] = left;
+    left_class = now;
+  }
+  last_ = left;
+  has_unknown_ |= unknown;
+  return !bad && (Delta || !unknown);
+}
+
+template <bool Delta>
+bool
+CompactDecoder::decode_entropy_row (EntropyReader &code, const CompactQuantisers &quantisers,
+    int columns, std::uint16_t *depth, Rgbx *colour, std::uint64_t &points)
+{
+  if (!decode_run_ends (code, columns))
+    return false;
+  const EntropyRow row = entropy_.row (runs_);
+  has_unknown_ = false;
+  return for_this_cpu ([&, width = static_cast<std::size_t> (columns)] {
+    std::fill_n (row_.codes (), width, kNoPixel);
+    std::fill_n (row.classes, width, PixelClass{0});
+    std::fill_n (row.activities, width, kNoActivity);
+    std::fill_n (depth, width, std::uint16_t{0});
+    std::fill_n (colour, width, Rgbx{});
+    if (!code.row<Delta> (row) || code.overrun ())
+      return false;
+    const Components *residuals = row.residuals;
+    bool sound = true;
+    for_valid_runs (row.runs, [&] (int first, int last) {
+      const auto begin = static_cast<std::size_t> (first), end = static_cast<std::size_t> (last);
+      sound = sound && make_run<Delta> (row, begin, end, residuals);
+      if (!sound)
+        return;
+      points += end - begin;
+      if (!Delta || !has_unknown_)
+        show (row_.codes (), begin, end, width, quantisers, limits_, depth, colour);
+      else
+        for (std::size_t x = begin; x < end; x++)
+          if (row_.codes ()[x] != kNoPixel)
+            write_pixel (shown_as (row_.codes ()[x], quantisers, limits_), depth[x], colour[x]);
+    });
+    return sound;
+  });
+}
+
+/* ---- packed, slices without key ---- */
 
 /* Reads which pixels of a row are valid, and the ends of its runs. */
 template <class Code>
@@ -370,7 +444,7 @@ CompactDecoder::decode_row (
   bool valid = false;
   for (int run : runs_) {
     const auto end = static_cast<std::size_t> (run);
-    if constexpr (Delta && Code::kEarlierInRuns)
+    if constexpr (Delta)
       if (valid && !decode_earlier_runs (code, begin, end))
         return false;
     if (!valid)
@@ -415,8 +489,11 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
     const CompactQuantisers &quantisers, const DecoderReference &reference, const RangeImage &image,
     DecodedPixels &decoded)
 {
+  constexpr bool kIsEntropy = std::is_same_v<Code, EntropyReader>;
   const auto columns = static_cast<std::size_t> (header.columns);
   const auto most = static_cast<std::size_t> (header.roi.width); /* columns of other slices */
+  if constexpr (kIsEntropy)
+    entropy_.reset (columns, most);
   row_.reserve (most);
   upper_.reserve (most);
   row_.reset (columns, 0);
@@ -447,7 +524,10 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
     const int image_row = header.first_row + y;
     std::uint16_t *const depth = image.depth.row (image_row) + header.first_column;
     Rgbx *const colour = image.colour.row (image_row) + header.first_column;
-    if constexpr (std::is_same_v<Code, PackedReader> && !Delta) {
+    if constexpr (kIsEntropy) {
+      if (!decode_entropy_row<Delta> (code, quantisers, header.columns, depth, colour, points))
+        return false;
+    } else if constexpr (!Delta) {
       if (!decode_packed_row (code, quantisers, header.columns, depth, colour, points))
         return false;
     } else {
@@ -455,9 +535,12 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
         return false;
       write_row (row_.shown (), columns, depth, colour);
     }
+    const auto is_valid = [&] (std::size_t x) {
+      return kIsEntropy ? entropy_.now.classes[x + 1] != 0 : row_.states ()[x] != 0;
+    };
     if constexpr (Delta)
       for (int x = 0; x < header.columns; x++)
-        if (row_.states ()[x] != 0 && row_.codes ()[x] == kNoPixel) {
+        if (is_valid (static_cast<std::size_t> (x)) && row_.codes ()[x] == kNoPixel) {
           show_older (reference, image, header.first_column + x, image_row);
           unknown++;
         }
@@ -465,8 +548,10 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
     decoded.unknown += unknown;
     if (reference.now)
       reference.now->keep (header.roi.x + header.first_column, header.roi.y + image_row,
-          Delta ? row_.as_reference (columns) : row_.as_key_reference (columns));
+          Delta ? row_.as_reference (columns, is_valid) : row_.as_key_reference (columns));
     std::swap (row_, upper_);
+    if constexpr (kIsEntropy)
+      std::swap (entropy_.now, entropy_.upper);
   }
   return code.at_clean_end ();
 }
@@ -492,8 +577,8 @@ CompactDecoder::decode (std::span<const std::uint8_t> body, const SliceHeader &h
                : decode_rows<Code, true> (code, header, quantisers, reference, image, decoded);
   };
   if (!packed)
-    return decode_with (
-        EntropyReader (data, model_, header.key ? kInitialModel : kInitialDeltaModel));
+    return data.size () >= kRansHeaderSize &&
+           decode_with (EntropyReader (data, model_, initial_model (header.key, steps_)));
   const auto order = [&] (std::size_t i) {
     return static_cast<std::uint8_t> (body[kStepsSize + i / 2] >> 4 * (i % 2) & 15);
   };

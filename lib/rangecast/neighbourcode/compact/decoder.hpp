@@ -41,8 +41,14 @@ private:
       Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
   [[gnu::always_inline]] bool decode_packed_run (
       PackedReader &slice_code, std::size_t begin, std::size_t end);
-  bool decode_run_ends (PackedReader &code, int columns);
+  template <class Code> bool decode_run_ends (Code &code, int columns);
   bool decode_packed_row (PackedReader &code, const CompactQuantisers &quantisers, int columns,
+      std::uint16_t *depth, Rgbx *colour, std::uint64_t &points);
+  template <bool Delta>
+  [[gnu::always_inline]] bool make_run (
+      const EntropyRow &row, std::size_t begin, std::size_t end, const Components *&residuals);
+  template <bool Delta>
+  bool decode_entropy_row (EntropyReader &code, const CompactQuantisers &quantisers, int columns,
       std::uint16_t *depth, Rgbx *colour, std::uint64_t &points);
   template <class Code, bool Delta>
   [[gnu::always_inline]] bool decode_full (
@@ -58,6 +64,8 @@ private:
   std::vector<BlockMotion> motions_;     /* of the blocks that the row touches */
   std::vector<std::uint8_t> bytes_;      /* of the slice, and padding */
   EntropyModel model_{};
+  EntropyRowMemory entropy_;
+  bool has_unknown_ = false; /* the row, pixels that depend on data that was not received */
   Components steps_{};
   PixelLimits limits_;
   PixelCode last_ = kNoPixel;

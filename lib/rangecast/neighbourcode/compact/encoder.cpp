@@ -8,35 +8,13 @@
 namespace rangecast {
 namespace {
 
-/* Upper bounds of what a pixel and a run add to a slice, in either code. */
+/* Upper bounds of what a pixel and a run add to a slice of profile packed. */
 constexpr std::size_t kMaxBytesOfPixel = 512, kMaxBytesOfRun = 64;
 
 /* Price of a bit for choice=best; errors are squared, in units of the threshold. Found by
  * experiment.
  */
 constexpr float kPriceOfBit = 0.2f;
-
-/* An EntropyCode with the interface of PackedWriter. */
-class EntropyWriter : public EntropyCode<RangeEncoder> {
-public:
-  static constexpr bool kEarlierInRuns = false;
-
-  EntropyWriter (
-      std::uint8_t *to, EntropyModel &model, const EntropyModel &initial, const ResidualCodes &)
-      : EntropyCode (RangeEncoder (to), model)
-  {
-    model = initial;
-  }
-  void run (bool valid, std::int32_t later) { (void)EntropyCode::run (valid, later); }
-  template <bool Delta> void full (const Neighbours &n, bool has_neighbour, Components r)
-  {
-    if (has_neighbour && choice<Delta> (n, is_zero (r) ? kPredict : kCorrect) == kPredict)
-      return;
-    (void)residual (n, has_neighbour, r);
-  }
-  [[nodiscard]] std::size_t bound () const { return coder_.bound (); }
-  std::size_t finish () { return coder_.finish (); }
-};
 
 /* Differences divided by steps, to the nearest. Steps are odd, so no quotient lies in the middle,
  * and differences are below 2^17, so float's 24 bits find the nearest for every step. Adding 1.5 x
@@ -298,8 +276,9 @@ CompactEncoder::code_full (Code &code, const Neighbours &n, Components residual)
   const Components size = residual < 0 ? -residual : residual;
   size_sums_ += size + (size > 0);
   size_counts_ -= size > 0;
-  return select (zero_mask (!predicted), state_of (Origin::kPredicted),
+  const PixelState state = select (zero_mask (!predicted), state_of (Origin::kPredicted),
       state_of (Origin::kCorrected, Code::kUsesActivity ? activity_of (residual) : 0));
+  return Code::kByRow ? with_choice (state, predicted ? kPredict : kCorrect) : state;
 }
 
 /* Codes a run of valid pixels, which follows an invalid one.
@@ -333,8 +312,6 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
         best = best_choice<Code, Delta> (code, x, n, Delta && earlier[x], full);
     if constexpr (Delta) {
       const bool is_earlier = Best && !Code::kEarlierInRuns ? best == kTakeEarlier : earlier[x];
-      if constexpr (!Code::kEarlierInRuns)
-        (void)code.earlier (n, is_earlier);
       if (is_earlier) {
         codes[x] = left.code = earlier_codes_[x];
         states[x] = left.state = copy_state (kTakeEarlier);
@@ -358,7 +335,8 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
       const auto from = static_cast<std::ptrdiff_t> (x + other) - kTakeUpper;
       left_key = select (take_left, left_key, upper_keys[from]);
       left = {select (take_left, left.code, upper_codes[from]),
-          Delta ? copy_state (chosen) : select (take_left, kLeftState, kUpperState)};
+          Delta || Code::kByRow ? copy_state (chosen)
+                                : select (take_left, kLeftState, kUpperState)};
     } else {
       if constexpr (!Best)
         full = make_full (own[x], n);
@@ -420,6 +398,8 @@ CompactEncoder::code_row (Code &slice_code, [[maybe_unused]] bool begins_block)
       }
     }
   code_runs (slice_code);
+  if constexpr (Code::kByRow)
+    slice_code.begin_row (entropy_.row (runs_));
   std::size_t begin = 0;
   bool valid = false;
   for (int run : runs_) {
@@ -435,6 +415,17 @@ CompactEncoder::code_row (Code &slice_code, [[maybe_unused]] bool begins_block)
       for_this_cpu ([&] { code_run<Code, false, Delta> (slice_code, begin, end); });
     begin = end;
     valid = !valid;
+  }
+  if constexpr (Code::kByRow) {
+    const EntropyRow row = entropy_.row (runs_);
+    for_this_cpu ([&] {
+      const PixelState *const states = row_.states ();
+      for (int x = 0, n = columns_; x < n; x++) {
+        row.classes[x] = class_of (states[x]);
+        row.activities[x] = row.classes[x] != 0 ? 0 : kNoActivity;
+      }
+      slice_code.template row<Delta> (row);
+    });
   }
   return slice_code.bound () + header_size () <=
          static_cast<std::size_t> (settings_.max_slice_size);
@@ -464,15 +455,34 @@ CompactEncoder::begin_slice (int first_row)
   header_.first_row = first_row;
   header_.rows = 0;
   last_ = first_expected (limits_);
-  return Code (bytes_.data (), model_, Delta ? kInitialDeltaModel : kInitialModel,
-      {orders_, is_zero (steps_ - 1)});
+  if constexpr (Code::kByRow)
+    return Code (entries_.data (), model_, initial_model (!Delta, steps_));
+  else
+    return Code (bytes_.data (), {orders_, is_zero (steps_ - 1)});
+}
+
+/* Makes room for a row's symbols. */
+void
+CompactEncoder::reserve_entries (EntropyWriter &code)
+{
+  const std::size_t most =
+      code.coder ().entries () + EntropyWriter::max_entries (static_cast<std::size_t> (columns_));
+  if (entries_.size () < most) {
+    entries_.resize (2 * most);
+    code.coder ().move_to (entries_.data ());
+  }
 }
 
 template <class Code>
 void
 CompactEncoder::close_slice (Code &code, std::vector<std::uint8_t> &to)
 {
-  const std::size_t begin = to.size (), header_bytes = header_size (), size = code.finish ();
+  const std::size_t begin = to.size (), header_bytes = header_size ();
+  std::size_t size;
+  if constexpr (Code::kByRow)
+    size = code.finish (bytes_.data ());
+  else
+    size = code.finish ();
   to.resize (begin + header_bytes + size);
   std::uint8_t *p = to.data () + begin;
   write_slice_header (header_, header_bytes + size, p);
@@ -521,6 +531,8 @@ CompactEncoder::reserve_bytes ()
 
 template PackedWriter CompactEncoder::begin_slice<PackedWriter, false> (int);
 template void CompactEncoder::close_slice (PackedWriter &, std::vector<std::uint8_t> &);
+template EntropyWriter CompactEncoder::begin_slice<EntropyWriter, false> (int);
+template void CompactEncoder::close_slice (EntropyWriter &, std::vector<std::uint8_t> &);
 
 /* Codes all rows of a band in the header's columns.
  * @return false if one row is longer than a slice may be */
@@ -532,6 +544,9 @@ CompactEncoder::code_rows (
   resize (header_.columns);
   motions_.assign (
       motion_blocks (header_.roi.x + header_.first_column, header_.columns), BlockMotion{});
+  if constexpr (Code::kByRow)
+    entropy_.reset (
+        static_cast<std::size_t> (columns_), static_cast<std::size_t> (header_.roi.width));
   Code code = begin_slice<Code, Delta> (band.first_row);
   for (int y = band.first_row; y < band.first_row + band.rows; y++) {
     for_this_cpu ([&] { load_row (image, y); });
@@ -540,6 +555,8 @@ CompactEncoder::code_rows (
         find_motions (image, y, band);
       load_earlier (y);
     }
+    if constexpr (Code::kByRow)
+      reserve_entries (code);
     const EncoderResult result = result_;
     const Components sums = size_sums_, counts = size_counts_;
     Code before = code;
@@ -553,14 +570,19 @@ CompactEncoder::code_rows (
       close_slice (before, to);
       code = begin_slice<Code, Delta> (y);
       upper_.reset (static_cast<std::size_t> (columns_), kInvalidKey);
+      if constexpr (Code::kByRow)
+        entropy_.upper.reset (static_cast<std::size_t> (columns_));
       if (!code_row<Code, Delta> (code, true))
         return false;
     }
     if (reference_.now)
       reference_.now->keep (header_.roi.x + header_.first_column, header_.roi.y + y,
-          row_.as_reference (static_cast<std::size_t> (columns_)));
+          row_.as_reference (static_cast<std::size_t> (columns_),
+              [states = row_.states ()] (std::size_t x) { return states[x] != 0; }));
     header_.rows++;
     std::swap (row_, upper_);
+    if constexpr (Code::kByRow)
+      std::swap (entropy_.now, entropy_.upper);
   }
   close_slice (code, to);
   return true;
@@ -601,9 +623,10 @@ CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &ba
   const ConstRangeImage &image = picture.image;
   const bool packed = header.profile == Profile::kPacked;
   std::optional<bool> fits;
-  if (packed && can_do_waves (picture, band.key)) {
+  if (can_do_waves (picture, band.key)) {
     const std::size_t size = to.size ();
-    fits = code_waves (picture, band, to);
+    fits = packed ? code_waves<PackedWriter> (picture, band, to)
+                  : code_waves<EntropyWriter> (picture, band, to);
     if (!fits) { /* never mind what was coded */
       to.resize (size);
       result_ = {};

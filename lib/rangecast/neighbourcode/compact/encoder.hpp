@@ -89,16 +89,20 @@ private:
   void find_motions (const ConstRangeImage &image, int y, const RowBand &band);
   void resize (int columns);
   void reserve_bytes ();
+  void reserve_entries (EntropyWriter &code);
   [[nodiscard]] std::size_t header_size () const;
 
   /* Waves: wave_encoder.cpp */
   [[nodiscard]] bool can_do_waves (const CompactPicture &picture, bool key) const;
+  template <class Code>
   std::optional<bool> code_waves (
       const CompactPicture &picture, const RowBand &band, std::vector<std::uint8_t> &to);
   void begin_waves ();
   int load_wave (const CompactPicture &picture, int y, int end);
   void run_wave (int y, int rows);
+  template <class Code> WaveRow code_wave_runs (Code &slice_code, int y);
   void code_wave_row (PackedWriter &slice_code, int y, int row);
+  void code_wave_row (EntropyWriter &slice_code, int y, int row);
 
   CompactSettings settings_{};
   const CompactQuantisers *quantisers_ =
@@ -128,6 +132,8 @@ private:
   int columns_ = 0;
   std::vector<int> runs_; /* ends of the row's runs */
   EntropyModel model_{};
+  EntropyRowMemory entropy_;
+  std::vector<std::uint32_t> entries_;     /* of the open entropy slice */
   std::vector<std::uint8_t> bytes_;        /* of the open slice, after its header */
   Components size_sums_{}, size_counts_{}; /* of its residuals */
   GolombOrders orders_{};

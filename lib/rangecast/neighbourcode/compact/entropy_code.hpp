@@ -1,295 +1,500 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Profile entropy: each decision of a pixel is coded with the probability of its context. */
+/* Profile entropy: choices and residuals of a row as symbols whose frequencies adapt to their
+ * context. */
 #pragma once
 
+#include <vector>
+
+#include "coded_pixel.hpp"
 #include "motion.hpp"
-#include "range_coder.hpp"
+#include "rans.hpp"
 
 namespace rangecast {
 
-/** Index of the first context of each kind of decision among a slice's probabilities. */
-namespace context {
-inline constexpr int kRunExact = 0;            /* of invalid and of valid pixels */
-inline constexpr int kRunSize = kRunExact + 2; /* 16 each */
-inline constexpr int kLeft = kRunSize + 2 * 16;
-inline constexpr int kOther = kLeft + 64;
-inline constexpr int kPredicted = kOther + 48;
-inline constexpr int kNonZero = kPredicted + 25;          /* 12 for each component */
-inline constexpr int kSize = kNonZero + kComponents * 12; /* 2 x 16 for each component */
-inline constexpr int kEarlier = kSize + kComponents * 2 * 16;
-inline constexpr int kMotion = kEarlier + 36;     /* whether it equals the expected motion */
-inline constexpr int kMotionNumber = kMotion + 1; /* 1 + 16 for each of dx, dy, dz and slopes */
-inline constexpr int kCount = kMotionNumber + 5 * 17;
-} // namespace context
+/** A pixel as contexts see it: 0 if it is invalid, else its PixelChoice plus 1. */
+using PixelClass = std::uint8_t;
+inline constexpr PixelClass kCorrectedClass = kCorrect + 1, kEarlierClass = kTakeEarlier + 1;
+inline constexpr std::size_t kPixelClasses = 8;
 
-using EntropyModel = std::array<Probability, context::kCount>;
+using ChoiceModel = SymbolModel<7>;
+/** Of a number: 0, 1, -1, ... 4, -4 are symbols 0 to 8; those after stand for 2, 4, ... 32, and 64
+ * or more numbers, which raw bits tell apart. */
+using NumberModel = SymbolModel<15>;
 
-/** Probabilities at the start of each slice: learnt from scans and recordings, so that small slices
- *  do not pay for adaptation. Part of the format. */
-extern const EntropyModel kInitialModel;
-/** The same for slices that refer to an earlier frame set. */
-extern const EntropyModel kInitialDeltaModel;
+/** Groups of classes that the upper and upper-right pixel count as. */
+inline constexpr std::size_t kUpperGroups = 5;
+inline constexpr std::size_t kChoiceContexts = kPixelClasses * kUpperGroups * kUpperGroups;
+/** Contexts of each of a residual's numbers, see kResidualContexts. */
+inline constexpr std::size_t kResidualClasses = 10;
+inline constexpr std::size_t kMotionNumbers = std::size (kMotionMembers);
 
-/** What a yes costs, bits, by the upper 8 bits of its probability. */
-extern const std::array<float, 256> kBitsOfProbability;
+/** The frequencies of a slice. */
+struct EntropyModel {
+  ChoiceModel choices[kChoiceContexts];
+  NumberModel residuals[kComponents][kResidualClasses];
+  NumberModel runs[2];       ///< ends of runs of invalid and of valid pixels
+  NumberModel motion_change; ///< 0: motion is as expected, 1: it is not
+  NumberModel motions[kMotionNumbers];
+};
 
-/** Magnitudes with decisions of their own; greater ones are an exponential Golomb code. */
-inline constexpr int kUnarySizes = 4;
-/** Longest prefix of that code; a longer one means damaged data. */
-inline constexpr int kMaxPrefix = 17;
+/** The class of a pixel whose state has its choice. */
+constexpr PixelClass
+class_of (PixelState state)
+{
+  return state >> 16 & 7;
+}
 
-/** The decisions of a slice in their order, the same for both directions. Coder is RangeEncoder or
- *  RangeDecoder: code (probability, yes) writes `yes`, or reads it and ignores the argument; so
- * does bits(). Small, so that a loop can keep a copy in registers; the probabilities are the
- * caller's. */
-template <class Coder> class EntropyCode {
+/** Frequencies at the start of each slice: learnt from scans and recordings, so that small slices
+ * do not pay for adaptation. Part of the format.
+ *  @param key    the slice refers to no earlier frame set
+ *  @param steps  of residuals */
+const EntropyModel &initial_model (bool key, Components steps);
+
+/** What the choice of a pixel depends on beside the class of the left pixel, to which it is added.
+ */
+constexpr std::uint8_t
+upper_context (PixelClass upper, PixelClass upper_right)
+{
+  /* Groups: invalid, left, another neighbour, in full, earlier. */
+  const auto group = [] (PixelClass c) { return c - (c >= 3) - (c >= 4) - (c >= 6); };
+  return static_cast<std::uint8_t> (
+      kPixelClasses * (group (upper) + kUpperGroups * group (upper_right)));
+}
+
+/** The activity of invalid pixels in each number, beyond sums of three valid ones. */
+inline constexpr Activity kNoActivity = 0x40404040;
+
+/** What a residual depends on: one byte for each number. */
+constexpr Activity
+residual_context (Activity left, Activity upper, Activity upper_right)
+{
+  return left + upper + (upper_right & ~kNoActivity);
+}
+/** The context of a number by that byte. */
+inline constexpr auto kResidualContexts = [] {
+  std::array<std::uint8_t, 256> contexts{};
+  for (unsigned sum = 0; sum < 256; sum++)
+    contexts[sum] = static_cast<std::uint8_t> (sum >= 128  ? 9
+                                               : sum >= 64 ? 8
+                                               : sum < 3   ? sum
+                                               : sum < 5   ? 3
+                                               : sum < 8   ? 4
+                                               : sum < 13  ? 5
+                                               : sum < 21  ? 6
+                                                           : 7);
+  return contexts;
+}();
+
+/** Magnitudes with symbols of their own. */
+inline constexpr std::int32_t kMaxOwnSymbol = 4;
+inline constexpr unsigned kFirstEscape = 2 * kMaxOwnSymbol + 1, kLastEscape = 14;
+/** Raw bits of the magnitude of the first escape, and from which on their number is coded. */
+inline constexpr int kLongBits = 6, kBitsOfLongBits = 4, kMaxLongBits = 17;
+
+/** A number that has no symbol of its own: 3 + 2^bits + rest. */
+struct EscapedNumber {
+  std::uint32_t rest;
+  int bits;
+
+  explicit EscapedNumber (std::int32_t number)
+  {
+    const auto size = static_cast<std::uint32_t> (std::abs (number)) - (kMaxOwnSymbol - 1);
+    bits = std::bit_width (size) - 1;
+    rest = size - (1u << bits);
+  }
+  [[nodiscard]] unsigned symbol () const
+  {
+    return kFirstEscape - 1 + static_cast<unsigned> (std::min (bits, kLongBits));
+  }
+};
+
+inline constexpr std::int8_t kSmallNumbers[kLastEscape + 1] = {0, 1, -1, 2, -2, 3, -3, 4, -4};
+
+constexpr unsigned
+symbol_of_small (std::int32_t number)
+{
+  return static_cast<unsigned> (2 * std::abs (number) - (number > 0));
+}
+
+/** A row as the coder needs it. The pixels before the first and after the last are invalid. */
+struct EntropyRow {
+  PixelClass *classes;
+  const PixelClass *upper_classes;
+  Activity *activities; ///< kNoActivity of invalid pixels; of valid ones, 0 before the residuals
+  const Activity *upper_activities;
+  std::uint8_t *contexts;    ///< memory, see upper_context()
+  int *corrected;            ///< memory: columns of the pixels that have residuals
+  Components *residuals;     ///< theirs, in that order
+  std::span<const int> runs; ///< ends of runs of invalid and valid pixels by turns
+};
+
+/** Memory for rows. */
+struct EntropyRowMemory {
+  struct Pixels {
+    std::vector<PixelClass> classes;
+    std::vector<Activity> activities;
+
+    void reserve (std::size_t columns)
+    {
+      classes.reserve (columns + 2);
+      activities.reserve (columns + 2);
+    }
+    void reset (std::size_t columns)
+    {
+      classes.assign (columns + 2, 0);
+      activities.assign (columns + 2, kNoActivity);
+    }
+  };
+  Pixels now, upper;
+  std::vector<std::uint8_t> contexts;
+  std::vector<int> corrected;
+  std::vector<Components> residuals;
+
+  /** Room for rows of so many columns, all pixels invalid. */
+  void reset (std::size_t columns, std::size_t most_columns)
+  {
+    for (Pixels *pixels : {&now, &upper}) {
+      pixels->reserve (most_columns);
+      pixels->reset (columns);
+    }
+    corrected.resize (std::max (corrected.size (), most_columns + 1));
+    contexts.resize (corrected.size ());
+    residuals.resize (corrected.size ());
+  }
+  [[nodiscard]] EntropyRow row (std::span<const int> runs)
+  {
+    return {now.classes.data () + 1, upper.classes.data () + 1, now.activities.data () + 1,
+        upper.activities.data () + 1, contexts.data (), corrected.data (), residuals.data (), runs};
+  }
+};
+
+/** Calls work (begin, end) for each run of valid pixels. */
+template <class Work>
+[[gnu::always_inline]] inline void
+for_valid_runs (std::span<const int> runs, const Work &work)
+{
+  for (std::size_t i = 1; i < runs.size (); i += 2)
+    work (runs[i - 1], runs[i]);
+}
+
+/** Makes contexts. */
+[[gnu::always_inline]] inline void
+find_contexts (const EntropyRow &row)
+{
+  const PixelClass *const upper = row.upper_classes;
+  std::uint8_t *const contexts = row.contexts;
+  const int end = row.runs.back ();
+  for (int x = 0; x < end; x++)
+    contexts[x] = upper_context (upper[x], upper[x + 1]);
+}
+
+/** Whether a pixel that begins a run has no neighbour, so that its choice is not coded in slices
+ *  that refer to no earlier frame set. */
+inline bool
+is_alone (const PixelClass *upper)
+{
+  return (upper[-1] | upper[0] | upper[1]) == 0;
+}
+
+/** Writes the symbols of a slice. A copy continues from where it was taken, once. */
+class EntropyWriter {
 public:
-  /** Whether contexts need the activity of pixels. */
-  static constexpr bool kUsesActivity = true;
+  static constexpr bool kUsesActivity = true, kEarlierInRuns = false, kByRow = true;
 
-  EntropyCode (Coder coder, EntropyModel &model) : model_ (model.data ()), coder_ (coder) {}
-
-  /** Columns by which a run of valid or invalid pixels ends later than the one above.
-   *  @return false if the number is too large */
-  bool run (bool valid, std::int32_t &later)
+  EntropyWriter (std::uint32_t *entries, EntropyModel &model, const EntropyModel &initial)
+      : coder_ (entries), model_ (&model)
   {
-    return number (context::kRunExact + valid, context::kRunSize + 16 * valid, later);
+    model = initial;
   }
 
-  /** Motion of a block, relative to `expected`. @return false if a number is too large */
-  bool motion (const BlockMotion &expected, BlockMotion &m)
+  /** Numbers of memory that a row of so many columns needs at most. */
+  static constexpr std::size_t max_entries (std::size_t columns)
   {
-    if (code (context::kMotion, m == expected)) {
-      m = expected;
-      return true;
-    }
-    int at = context::kMotionNumber;
-    for (const auto member : kMotionMembers) {
-      std::int32_t rest = m.*member - expected.*member;
-      if (!number (at, at + 1, rest))
-        return false;
-      m.*member = expected.*member + rest;
-      at += 17;
-    }
-    return true;
+    constexpr std::size_t kOfNumber = 4;
+    return (columns + 1) * (kOfNumber * (1 + kComponents + 2) + 1) + 64;
+  }
+  RansEncoder &coder () { return coder_; }
+
+  /** Columns by which a run of valid or invalid pixels ends later than the one above. */
+  void run (bool valid, std::int32_t later) { number (model_->runs[valid], later); }
+  /** Motion of a block, relative to `expected`. */
+  void motion (const BlockMotion &expected, const BlockMotion &m)
+  {
+    number (model_->motion_change, m != expected);
+    if (m == expected)
+      return;
+    for (std::size_t i = 0; i < kMotionNumbers; i++)
+      number (model_->motions[i], m.*kMotionMembers[i] - expected.*kMotionMembers[i]);
   }
 
-  /** Whether a valid pixel equals one of the earlier frame set. */
-  bool earlier (const Neighbours &n, bool yes)
+  /** @name How CompactEncoder hands over pixels one by one: row() writes them @{ */
+  void begin_row (const EntropyRow &row) { residual_ = row.residuals; }
+  template <bool Delta> void choice (const Neighbours &, int) {}
+  template <bool Delta> void full (const Neighbours &, bool has_neighbour, Components r)
   {
-    return code (context::kEarlier + earlier_context (n), yes);
+    if (!has_neighbour || !is_zero (r))
+      *residual_++ = r;
+  }
+  /** @} */
+
+  /** @tparam Delta  the slice refers to an earlier frame set */
+  template <bool Delta> [[gnu::always_inline]] void row (const EntropyRow &row)
+  {
+    RansEncoder coder = coder_; /* stays in registers */
+    EntropyModel *const model = model_;
+    std::size_t count = 0;
+    unsigned place = 0;
+    find_contexts (row);
+    for_valid_runs (row.runs, [&] (int begin, int end) {
+      PixelClass left = 0;
+      int x = begin;
+      const auto move_on = [&] {
+        left = row.classes[x];
+        row.corrected[count] = x;
+        count += left == kCorrectedClass;
+        x++;
+      };
+      if (!Delta && is_alone (row.upper_classes + x))
+        move_on ();
+      while (x < end) {
+        coder.code (place++ % kRansStates, model->choices[left + row.contexts[x]],
+            row.classes[x] - std::size_t{1});
+        move_on ();
+      }
+    });
+    for (std::size_t i = 0; i < count; i++)
+      residual (coder, *model, row, row.corrected[i], row.residuals[i]);
+    coder_ = coder;
   }
 
-  /** The PixelChoice of a valid pixel that has a neighbour.
-   *  @tparam Delta  the slice refers to an earlier frame set: contexts must not depend on pixel
-   *  values, because a decoder may not have them */
-  template <bool Delta> int choice (const Neighbours &n, int chosen)
-  {
-    if (n.left.valid ()) {
-      if (code (context::kLeft + static_cast<int> (n.kinds ()), chosen == kTakeLeft))
-        return kTakeLeft;
-    }
-    const int other = other_choice (n, chosen, Delta ? known_candidates (n) : candidates (n));
-    if (other != kPredict)
-      return other;
-    return code (predicted_context (n), chosen == kPredict) ? kPredict : kCorrect;
-  }
+  [[nodiscard]] std::size_t bound () const { return coder_.bound (); }
+  std::size_t finish (std::uint8_t *to) const { return coder_.finish (to); }
 
-  /** The residual of a pixel coded in full. @return false if it is too large */
-  [[gnu::always_inline]] bool residual (const Neighbours &n, bool has_neighbour, Components &r)
-  {
-    const Activity sums = n.activities ();
-    const bool alone = !n.left.valid () || !n.upper ().valid ();
-    bool previous = false;
-    for (int i = 0; i < kComponents; i++) {
-      const int where = surroundings (has_neighbour, alone, sums >> 8 * i & 0xff);
-      std::int32_t value = r[i];
-      if (!number (zero_context (i, previous, where), size_context (i, where), value))
-        return false;
-      r[i] = value;
-      previous = value != 0;
-    }
-    return true;
-  }
-
-  /** @name What decisions would cost, bits @{ */
+  /** @name What symbols would cost, bits @{ */
   [[nodiscard]] float earlier_bits (const Neighbours &n, bool yes) const
   {
-    return bits_of (context::kEarlier + earlier_context (n), yes);
+    return yes ? RansEncoder::bits_of (choices (n).interval (kTakeEarlier)) : 0;
   }
   /** Of the left neighbour, which is valid: to take it, and at least to take another. */
   [[nodiscard]] std::pair<float, float> left_bits (const Neighbours &n) const
   {
-    const int at = context::kLeft + static_cast<int> (n.kinds ());
-    return {bits_of (at, true), bits_of (at, false)};
+    const SymbolInterval left = choices (n).interval (kTakeLeft);
+    return {RansEncoder::bits_of (left),
+        RansEncoder::bits_of ({0, kFrequencySum - 1 - left.frequency})};
   }
   template <bool Delta> [[nodiscard]] ChoiceBits choice_bits (const Neighbours &n) const
   {
+    const bool can_take[kChoices] = {n.left.valid (), n.upper_left ().valid (), n.upper ().valid (),
+        n.upper_right ().valid (), n.any (), true};
+    const ChoiceModel &model = choices (n);
     ChoiceBits bits;
-    bits.fill (kImpossible);
-    float before = 0; /* of the decisions against the choices before */
-    const auto decide = [&] (int at, int choice) {
-      bits[static_cast<std::size_t> (choice)] = before + bits_of (at, true);
-      before += bits_of (at, false);
-    };
-    if (n.left.valid ())
-      decide (context::kLeft + static_cast<int> (n.kinds ()), kTakeLeft);
-    const Candidates c = Delta ? known_candidates (n) : candidates (n);
-    for (int i = 0; i < 3; i++)
-      if (c.is[i])
-        decide (other_context (n, i, c), kTakeUpperLeft + i);
-    if (n.any ())
-      decide (predicted_context (n), kPredict);
-    bits[kCorrect] = before;
+    for (std::size_t i = 0; i < kChoices; i++)
+      bits[i] = can_take[i] ? RansEncoder::bits_of (model.interval (i)) : kImpossible;
+    if (!Delta && !n.any ())
+      bits[kCorrect] = 0;
     return bits;
   }
-  [[nodiscard]] float residual_bits (const Neighbours &n, bool has_neighbour, Components r) const
+  [[nodiscard]] float residual_bits (const Neighbours &n, bool, Components r) const
   {
-    const Activity sums = n.activities ();
-    const bool alone = !n.left.valid () || !n.upper ().valid ();
-    bool previous = false;
+    const auto activity = [] (PixelState s) {
+      return s != 0 ? static_cast<Activity> (s >> 32) : kNoActivity;
+    };
+    const Activity context =
+        residual_context (activity (n.left.state), activity (n.states[0]), activity (n.states[1]));
     float bits = 0;
     for (int i = 0; i < kComponents; i++) {
-      const int where = surroundings (has_neighbour, alone, sums >> 8 * i & 0xff);
-      bits += number_bits (zero_context (i, previous, where), size_context (i, where), r[i]);
-      previous = r[i] != 0;
+      const NumberModel &model = model_->residuals[i][kResidualContexts[context >> 8 * i & 0xff]];
+      if (std::abs (r[i]) <= kMaxOwnSymbol) {
+        bits += RansEncoder::bits_of (model.interval (symbol_of_small (r[i])));
+        continue;
+      }
+      const EscapedNumber escaped (r[i]);
+      bits += RansEncoder::bits_of (model.interval (escaped.symbol ())) +
+              float (1 + escaped.bits + (escaped.bits >= kLongBits ? kBitsOfLongBits : 0));
     }
     return bits;
   }
   /** @} */
 
 private:
-  bool code (int at, bool yes) { return coder_.code (model_[at], yes); }
-
-  /* Which of the three above are valid and differ from the neighbours before them, which would have
-   * been chosen first. */
-  struct Candidates {
-    bool is[3];
-  };
-  static Candidates candidates (const Neighbours &n)
+  [[nodiscard]] const ChoiceModel &choices (const Neighbours &n) const
   {
-    const PixelCode l = n.left.code, ul = n.codes[-1], u = n.codes[0], ur = n.codes[1];
-    return {{static_cast<bool> (n.upper_left ().valid () & (ul != l)),
-        static_cast<bool> (n.upper ().valid () & (u != l) & (u != ul)),
-        static_cast<bool> (n.upper_right ().valid () & (ur != l) & (ur != ul) & (ur != u))}};
+    return model_->choices[class_of (n.left.state) +
+                           upper_context (class_of (n.states[0]), class_of (n.states[1]))];
   }
-  /* The same, from the neighbours' choices alone. */
-  static Candidates known_candidates (const Neighbours &n)
+  [[gnu::always_inline]] static void residual (
+      RansEncoder &coder, EntropyModel &model, const EntropyRow &row, int x, Components r)
   {
-    const PixelState l = n.left.state, u = n.states[0], ur = n.states[1];
-    return {{n.upper_left ().valid () && !is_copy (l, kTakeUpper),
-        n.upper ().valid () && !is_copy (u, kTakeLeft) && !is_copy (l, kTakeUpperRight),
-        n.upper_right ().valid () && !is_copy (ur, kTakeLeft)}};
+    const Activity context = residual_context (
+        row.activities[x - 1], row.upper_activities[x], row.upper_activities[x + 1]);
+    row.activities[x] = activity_of (r);
+    const Components size = r < 0 ? -r : r;
+    Components symbols = 2 * size + (r > 0);
+    const bool escapes = !is_zero (size > kMaxOwnSymbol);
+    if (escapes) [[unlikely]]
+      for (int i = 0; i < kComponents; i++)
+        if (size[i] > kMaxOwnSymbol)
+          symbols[i] = static_cast<std::int32_t> (EscapedNumber (r[i]).symbol ());
+    for (unsigned i = 0; i < kComponents; i++)
+      coder.code (i, model.residuals[i][kResidualContexts[context >> 8 * i & 0xff]],
+          static_cast<std::size_t> (symbols[i]));
+    if (escapes) [[unlikely]]
+      for (unsigned i = 0; i < kComponents; i++)
+        if (size[i] > kMaxOwnSymbol)
+          escape (coder, i, r[i]);
   }
-
-  /* One of the three above, or kPredict for none of them. */
-  int other_choice (const Neighbours &n, int chosen, const Candidates &candidates)
+  static void escape (RansEncoder &coder, unsigned state, std::int32_t number)
   {
-    const bool *const candidate = candidates.is;
-    for (int i = 0; i < 3; i++)
-      if (candidate[i] && code (other_context (n, i, candidates), chosen == kTakeUpperLeft + i))
-        return kTakeUpperLeft + i;
-    return kPredict;
-  }
-
-  /* ---- contexts ---- */
-
-  static int earlier_context (const Neighbours &n)
-  {
-    const auto of = [] (PixelState s) { return (s != 0) + is_copy (s, kTakeEarlier); };
-    return of (n.left.state) + 3 * of (n.states[0]) + 9 * is_copy (n.states[1], kTakeEarlier) +
-           18 * is_copy (n.states[-1], kTakeEarlier);
-  }
-  static int other_context (const Neighbours &n, int i, const Candidates &candidates)
-  {
-    const bool *const is = candidates.is;
-    const int full = 2 * (n.left.kind () == 3) + (n.upper ().kind () == 3);
-    const int later = i == 0 ? is[1] + 2 * is[2] : i == 1 ? is[2] : 0;
-    return context::kOther + 16 * i + 4 * full + later;
-  }
-  static int predicted_context (const Neighbours &n)
-  {
-    return context::kPredicted + n.left.origin () + 5 * n.upper ().origin ();
-  }
-  static int surroundings (bool has_neighbour, bool alone, Activity sum)
-  {
-    return !has_neighbour ? 5 : alone ? 4 : kActivityClass[sum];
-  }
-  static int zero_context (int component, bool previous, int where)
-  {
-    return context::kNonZero + 12 * component + 6 * previous + where;
-  }
-  static int size_context (int component, int where)
-  {
-    return context::kSize + 32 * component + 16 * (where >= 3);
-  }
-
-  /* ---- costs ---- */
-
-  [[nodiscard]] float bits_of (int at, bool yes) const
-  {
-    const Probability p = model_[at];
-    return kBitsOfProbability[(yes ? p : static_cast<Probability> (~p)) >> 8];
-  }
-  [[nodiscard]] float number_bits (int zero, int at, std::int32_t r) const
-  {
-    float bits = bits_of (zero, r != 0);
-    if (r == 0)
-      return bits;
-    bits += bits_of (at++, r < 0);
-    const std::uint32_t size = static_cast<std::uint32_t> (std::abs (r)) - 1;
-    for (std::uint32_t i = 0; i < kUnarySizes; i++) {
-      bits += bits_of (at + static_cast<int> (i), size > i);
-      if (size <= i)
-        return bits;
+    const EscapedNumber escaped (number);
+    const std::uint32_t negative = number < 0;
+    if (escaped.bits < kLongBits) {
+      coder.raw (state, negative | escaped.rest << 1, 1 + escaped.bits);
+      return;
     }
-    const int width = std::bit_width (size - kUnarySizes + 1) - 1;
-    for (int i = 0; i <= width; i++)
-      bits += bits_of (at + kUnarySizes + std::min (i, 10), i < width);
-    return bits + float (width);
+    const int more = escaped.bits - kLongBits;
+    coder.raw (state, negative | static_cast<std::uint32_t> (more) << 1, 1 + kBitsOfLongBits);
+    coder.raw (state, escaped.rest & ((1u << kLongBits) - 1), kLongBits);
+    coder.raw (state, escaped.rest >> kLongBits, more);
+  }
+  void number (NumberModel &model, std::int32_t number)
+  {
+    if (std::abs (number) <= kMaxOwnSymbol) {
+      coder_.code (0, model, symbol_of_small (number));
+      return;
+    }
+    coder_.code (0, model, EscapedNumber (number).symbol ());
+    escape (coder_, 0, number);
   }
 
-  /* Context class for the sum of three activities. */
-  static constexpr std::uint8_t kActivityClass[] = {
-      0, 1, 2, 2, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4};
+  RansEncoder coder_;
+  EntropyModel *model_;
+  Components *residual_ = nullptr; /* the row's next */
+};
 
-  bool number (int zero, int at, std::int32_t &r)
+/** Reads the symbols of a slice. A copy continues from where it was taken, once. */
+class EntropyReader {
+public:
+  /** @param bytes  at least kRansHeaderSize */
+  EntropyReader (
+      std::span<const std::uint8_t> bytes, EntropyModel &model, const EntropyModel &initial)
+      : coder_ (bytes.data (), bytes.size ()), model_ (&model)
   {
-    if (!code (zero, r != 0)) {
-      r = 0;
-      return true;
-    }
-    const bool negative = code (at, r < 0);
-    std::uint32_t size = static_cast<std::uint32_t> (std::abs (r)) - 1;
-    if (!magnitude (at + 1, size))
+    model = initial;
+  }
+
+  /** @return false if the number is too large */
+  bool run (bool valid, std::int32_t &later) { return number (model_->runs[valid], later); }
+  bool motion (const BlockMotion &expected, BlockMotion &m)
+  {
+    std::int32_t change = 0;
+    if (!number (model_->motion_change, change) || change < 0 || change > 1)
       return false;
-    r = static_cast<std::int32_t> (size) + 1;
-    r = negative ? -r : r;
-    return true;
-  }
-
-  bool magnitude (int at, std::uint32_t &size)
-  {
-    for (std::uint32_t i = 0; i < kUnarySizes; i++)
-      if (!code (at + static_cast<int> (i), size > i)) {
-        size = i;
-        return true;
-      }
-    const std::uint32_t rest = size - kUnarySizes + 1;
-    const int width = std::bit_width (rest) - 1;
-    int prefix = 0;
-    while (code (at + kUnarySizes + std::min (prefix, 10), prefix < width))
-      if (++prefix > kMaxPrefix)
+    m = expected;
+    for (std::size_t i = 0; change && i < kMotionNumbers; i++) {
+      std::int32_t more = 0;
+      if (!number (model_->motions[i], more))
         return false;
-    const std::uint32_t low = coder_.bits (rest & ((1u << prefix) - 1), prefix);
-    size = (1u << prefix) + low - 1 + kUnarySizes;
+      m.*kMotionMembers[i] += more;
+    }
     return true;
   }
 
-  Probability *model_;
+  /** Reads classes, residuals and activities of a row. @return false if a number is too large */
+  template <bool Delta> [[gnu::always_inline]] bool row (const EntropyRow &row)
+  {
+    RansDecoder coder = coder_; /* stays in registers */
+    EntropyModel *const model = model_;
+    std::size_t count = 0;
+    unsigned place = 0;
+    find_contexts (row);
+    for_valid_runs (row.runs, [&] (int begin, int end) {
+      std::fill (row.activities + begin, row.activities + end, Activity{0});
+      std::size_t twice_left = 0;
+      int x = begin;
+      const auto move_on = [&] {
+        row.classes[x] = static_cast<PixelClass> (twice_left / 2);
+        row.corrected[count] = x;
+        count += twice_left == 2 * kCorrectedClass;
+        x++;
+      };
+      if (!Delta && is_alone (row.upper_classes + x)) {
+        twice_left = 2 * kCorrectedClass;
+        move_on ();
+      }
+      while (x < end) {
+        auto *const first = reinterpret_cast<char *> (model->choices + row.contexts[x]);
+        auto &choices =
+            *reinterpret_cast<ChoiceModel *> (first + twice_left * (sizeof (ChoiceModel) / 2));
+        twice_left = coder.code (place++ % kRansStates, choices);
+        move_on ();
+      }
+    });
+    bool good = true;
+    for (std::size_t i = 0; i < count; i++)
+      good &= residual (coder, *model, row, row.corrected[i], row.residuals[i]);
+    coder_ = coder;
+    return good;
+  }
 
-protected:
-  Coder coder_;
+  [[nodiscard]] bool overrun () const { return coder_.overrun (); }
+  [[nodiscard]] bool at_clean_end () const { return coder_.at_clean_end (); }
+
+private:
+  [[gnu::always_inline]] static bool residual (
+      RansDecoder &coder, EntropyModel &model, const EntropyRow &row, int x, Components &r)
+  {
+    const Activity context = residual_context (
+        row.activities[x - 1], row.upper_activities[x], row.upper_activities[x + 1]);
+    std::size_t symbols[kComponents], largest = 0;
+    for (unsigned i = 0; i < kComponents; i++) {
+      symbols[i] =
+          coder.code (i, model.residuals[i][kResidualContexts[context >> 8 * i & 0xff]]) / 2 - 1;
+      largest = std::max (largest, symbols[i]);
+    }
+    Components made = {kSmallNumbers[symbols[0]], kSmallNumbers[symbols[1]],
+        kSmallNumbers[symbols[2]], kSmallNumbers[symbols[3]]};
+    bool good = true;
+    if (largest >= kFirstEscape) [[unlikely]]
+      for (unsigned i = 0; i < kComponents; i++)
+        if (symbols[i] >= kFirstEscape) {
+          std::int32_t number = 0;
+          good &= escape (coder, i, symbols[i], number);
+          made[i] = number;
+        }
+    r = made;
+    row.activities[x] = activity_of (made);
+    return good;
+  }
+  static bool escape (RansDecoder &coder, unsigned state, std::size_t symbol, std::int32_t &number)
+  {
+    int bits = static_cast<int> (symbol - kFirstEscape) + 1;
+    const bool is_long = symbol == kLastEscape;
+    const std::uint32_t first = coder.raw (state, 1 + (is_long ? kBitsOfLongBits : bits));
+    std::uint32_t rest = first >> 1;
+    if (is_long) {
+      const int more = static_cast<int> (rest);
+      bits = kLongBits + more;
+      if (bits > kMaxLongBits)
+        return false;
+      rest = coder.raw (state, kLongBits);
+      if (more > 0)
+        rest |= coder.raw (state, more) << kLongBits;
+    }
+    const auto size = static_cast<std::int32_t> (kMaxOwnSymbol - 1 + (1u << bits) + rest);
+    number = first & 1 ? -size : size;
+    return true;
+  }
+  bool number (NumberModel &model, std::int32_t &number)
+  {
+    const std::size_t symbol = coder_.code (0, model) / 2 - 1;
+    if (symbol >= kFirstEscape)
+      return escape (coder_, 0, symbol, number);
+    number = kSmallNumbers[symbol];
+    return true;
+  }
+
+  RansDecoder coder_;
+  EntropyModel *model_;
 };
 
 } // namespace rangecast

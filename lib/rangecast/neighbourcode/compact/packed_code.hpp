@@ -154,9 +154,9 @@ struct ResidualSizes {
 class PackedWriter {
 public:
   static constexpr bool kUsesActivity = false;
-  static constexpr bool kEarlierInRuns = true;
+  static constexpr bool kEarlierInRuns = true, kByRow = false;
 
-  PackedWriter (std::uint8_t *to, EntropyModel &, const EntropyModel &, const ResidualCodes &codes)
+  PackedWriter (std::uint8_t *to, const ResidualCodes &codes)
       : begin_ (to), to_ (to), orders_ (codes.orders), exact_ (codes.exact),
         tables_ (&packed_tables ())
   {

@@ -90,11 +90,14 @@ public:
   /** One byte a pixel, not 0 = equals a pixel of an earlier frame set. */
   [[nodiscard]] std::vector<std::uint8_t> &earlier () { return earlier_; }
 
-  /** The pixels as later frame sets refer to them. */
-  [[nodiscard]] std::span<const PixelCode> as_reference (std::size_t columns)
+  /** The pixels as later frame sets refer to them.
+   *  @param is_valid  of a column */
+  template <class IsValid>
+  [[nodiscard]] std::span<const PixelCode> as_reference (
+      std::size_t columns, const IsValid &is_valid)
   {
     for (std::size_t x = 0; x < columns; x++)
-      reference_[x] = states ()[x] != 0 ? codes ()[x] : kEmptyPixel;
+      reference_[x] = is_valid (x) ? codes ()[x] : kEmptyPixel;
     return std::span (reference_).first (columns);
   }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* CompactEncoder in waves: profile packed, key slices, the first neighbour that is near enough. */
+/* CompactEncoder in waves: key slices, the first neighbour that is near enough. */
 #include "../../base/simd.hpp"
 #include "encoder.hpp"
 
@@ -65,6 +65,10 @@ CompactEncoder::begin_waves ()
     fill_bits (row->valid);
   }
   fill_bits (waves_.full);
+  if (header_.profile == Profile::kEntropy)
+    entropy_.reset (
+        static_cast<std::size_t> (columns_), static_cast<std::size_t> (header_.roi.width));
+  runs_.reserve (static_cast<std::size_t> (header_.roi.width) + 1);
   reserve_bytes ();
 }
 
@@ -135,8 +139,10 @@ CompactEncoder::run_wave (int y, int rows)
       waves_.latest = wave.latest[i];
 }
 
-void
-CompactEncoder::code_wave_row (PackedWriter &slice_code, int y, int row)
+/* Finds contexts and codes the runs of a row. */
+template <class Code>
+WaveRow
+CompactEncoder::code_wave_runs (Code &slice_code, int y)
 {
   auto &memory = waves_.rows[static_cast<std::size_t> (y % kWaveRows)];
   WaveRowMemory &now = waves_.now;
@@ -150,16 +156,25 @@ CompactEncoder::code_wave_row (PackedWriter &slice_code, int y, int row)
   if (memory.span.valid > 0)
     wave_functions (cpu_level ())->find_contexts (known);
   bool is_valid = false;
+  runs_.clear ();
   for (int x = 0; x < columns_; is_valid = !is_valid) {
     const int to = bits_end (now.valid, x, is_valid, columns_);
     slice_code.run (is_valid, to - bits_end (above.valid, x, is_valid, columns_));
+    runs_.push_back (to);
     x = to;
   }
   result_.points += static_cast<std::uint64_t> (memory.span.valid);
-  if (memory.span.valid == 0)
+  return known;
+}
+
+void
+CompactEncoder::code_wave_row (PackedWriter &slice_code, int y, int row)
+{
+  const WaveRow known = code_wave_runs (slice_code, y);
+  if (runs_.size () == 1) /* of invalid pixels */
     return;
-  const PackedRow pixels = {
-      known.contexts, waves_.wave.residuals_of (row), known.full, waves_.codes.data (), begin, end};
+  const PackedRow pixels = {known.contexts, waves_.wave.residuals_of (row), known.full,
+      waves_.codes.data (), known.begin, known.end};
   ResidualSizes sizes;
   for_this_cpu ([&] {
     PackedWriter code = slice_code; /* stays in registers */
@@ -170,7 +185,40 @@ CompactEncoder::code_wave_row (PackedWriter &slice_code, int y, int row)
   size_counts_ += sizes.counts;
 }
 
+void
+CompactEncoder::code_wave_row (EntropyWriter &slice_code, int y, int number)
+{
+  const WaveRow known = code_wave_runs (slice_code, y);
+  const EntropyRow row = entropy_.row (runs_);
+  for_this_cpu ([&, columns = static_cast<std::size_t> (columns_)] {
+    std::fill_n (row.classes, columns, PixelClass{0});
+    std::fill_n (row.activities, columns, kNoActivity);
+    if (runs_.size () == 1) /* of invalid pixels */
+      return;
+    for_valid_runs (runs_, [&] (int begin, int end) {
+      for (int x = begin; x < end; x++)
+        row.classes[x] = known.symbols[x] + PixelClass{1};
+      std::fill (row.activities + begin, row.activities + end, Activity{0});
+    });
+    const WaveCode *const residuals = waves_.wave.residuals_of (number);
+    Components *residual = row.residuals;
+    for (int begin = known.begin; begin < known.end; begin += kWaveWord)
+      for (std::uint32_t bits = known.full[begin / kWaveWord]; bits != 0; bits &= bits - 1) {
+        const int x = begin + std::countr_zero (bits);
+        const WaveCode code = residuals[kWaveRows * x];
+        result_.full_pixels++;
+        if (code == 0 && (row.classes[x - 1] != 0 || !is_alone (row.upper_classes + x)))
+          continue; /* kPredict */
+        row.classes[x] = kCorrectedClass;
+        *residual++ = components_of_wave (code);
+      }
+    slice_code.row<false> (row);
+  });
+  std::swap (entropy_.now, entropy_.upper);
+}
+
 /* @return what code_rows() returns, or nothing if rows must be coded by that */
+template <class Code>
 std::optional<bool>
 CompactEncoder::code_waves (
     const CompactPicture &picture, const RowBand &band, std::vector<std::uint8_t> &to)
@@ -178,7 +226,7 @@ CompactEncoder::code_waves (
   begin_waves ();
   waves_.loaded = band.first_row;
   waves_.latest = wave_pixel (components_of (first_expected (limits_)));
-  PackedWriter code = begin_slice<PackedWriter, false> (band.first_row);
+  Code code = begin_slice<Code, false> (band.first_row);
   for (int y = band.first_row, end = y + band.rows; y < end;) {
     const int rows = load_wave (picture, y, end);
     run_wave (y, rows);
@@ -187,7 +235,9 @@ CompactEncoder::code_waves (
     for (int row = 0; row < rows; row++, y++) {
       const EncoderResult result = result_;
       const Components sums = size_sums_, counts = size_counts_;
-      PackedWriter before = code;
+      if constexpr (Code::kByRow)
+        reserve_entries (code);
+      Code before = code;
       code_wave_row (code, y, row);
       if (code.bound () + header_size () > static_cast<std::size_t> (settings_.max_slice_size)) {
         if (header_.rows == 0)
@@ -196,11 +246,13 @@ CompactEncoder::code_waves (
         size_sums_ = sums;
         size_counts_ = counts;
         close_slice (before, to);
-        code = begin_slice<PackedWriter, false> (y);
+        code = begin_slice<Code, false> (y);
         waves_.latest = wave_pixel (components_of (first_expected (limits_)));
         std::ranges::fill (waves_.upper, kOutsidePixel);
         std::ranges::fill (waves_.above.kinds, std::uint8_t{0});
         std::ranges::fill (waves_.above.valid, std::uint32_t{0});
+        if constexpr (Code::kByRow)
+          entropy_.upper.reset (static_cast<std::size_t> (columns_));
         break; /* the rows from y on depend on those of the slice before */
       }
       header_.rows++;
@@ -210,5 +262,10 @@ CompactEncoder::code_waves (
   close_slice (code, to);
   return true;
 }
+
+template std::optional<bool> CompactEncoder::code_waves<PackedWriter> (
+    const CompactPicture &, const RowBand &, std::vector<std::uint8_t> &);
+template std::optional<bool> CompactEncoder::code_waves<EntropyWriter> (
+    const CompactPicture &, const RowBand &, std::vector<std::uint8_t> &);
 
 } // namespace rangecast
