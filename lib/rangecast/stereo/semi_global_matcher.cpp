@@ -104,21 +104,22 @@ compare_with (const std::uint8_t *__restrict other, const std::uint8_t *__restri
     }
 }
 
-/* @param[out] planes  by neighbour and column, and a plane of their sums */
+/* Describes columns x0 to x1 of a row, which are multiples of kSide.
+ * @param[out] planes  by neighbour and column, and a plane of their sums */
 void
-transform_row (const cv::Mat &padded, int y, std::vector<std::uint8_t> &planes)
+transform_row (const cv::Mat &padded, int y, int x0, int x1, std::vector<std::uint8_t> &planes)
 {
-  const int width = padded.cols - 2 * kRadiusX;
+  const int width = padded.cols - 2 * kRadiusX, n = x1 - x0;
   planes.resize (std::size_t (kNeighbours + 1) * std::size_t (width));
-  const std::uint8_t *own = padded.ptr<std::uint8_t> (y + kRadiusY) + kRadiusX;
-  std::uint8_t *plane = planes.data (), *sums = plane + std::ptrdiff_t (kNeighbours) * width;
-  std::fill_n (sums, width, std::uint8_t{0});
+  const std::uint8_t *own = padded.ptr<std::uint8_t> (y + kRadiusY) + kRadiusX + x0;
+  std::uint8_t *plane = planes.data () + x0, *sums = plane + std::ptrdiff_t (kNeighbours) * width;
+  std::fill_n (sums, n, std::uint8_t{0});
   for (int v = -kRadiusY; v <= kRadiusY; v++)
     for (int u = -kRadiusX; u <= kRadiusX; u++) {
       if ((u + v) % 2 != 0 || (u == 0 && v == 0))
         continue;
       compare_with (
-          padded.ptr<std::uint8_t> (y + kRadiusY + v) + kRadiusX + u, own, width, plane, sums);
+          padded.ptr<std::uint8_t> (y + kRadiusY + v) + kRadiusX + x0 + u, own, n, plane, sums);
       plane += width;
     }
 }
@@ -389,12 +390,18 @@ SemiGlobalMatcher::compare_band (const Stripe &stripe, int band, Memory &m)
   const Tile *tiles = &tiles_[std::size_t (band * stripe.across)];
   const int width = padded_[0].cols - 2 * kRadiusX, begin = band * kSide,
             end = std::min (begin + kSide, stripe.rows);
+  const auto round_down = [] (int x) { return x / kSide * kSide; };
+  /* Columns that are compared, in both pictures. */
+  const int from[] = {round_down (stripe.x0),
+      round_down (stripe.x0 - (min_disparity_ + disparities_ - 1))},
+            to[] = {
+                width, round_down (stripe.x0 + stripe.across * kSide - min_disparity_ + kSide - 1)};
   m.low.resize (std::size_t (width));
   m.high.resize (std::size_t (width));
   for (int row = begin; row < end; row++) {
     const int y = stripe.y0 + row;
     for (int i = 0; i < 2; i++)
-      transform_row (padded_[i], y, m.transformed[i]);
+      transform_row (padded_[i], y, from[i], to[i], m.transformed[i]);
     const std::uint8_t *grey = padded_[0].ptr<std::uint8_t> (y + kRadiusY) + kRadiusX;
     range_of_row (padded_[1].ptr<std::uint8_t> (y + kRadiusY) + kRadiusX, width, m.low.data (),
         m.high.data ());
