@@ -220,22 +220,20 @@ BackgroundDisparity::restore_row (
   choose_background (costs, likely_.ptr<std::int16_t> (job.at.y + y) + job.at.x + x0,
       known_.ptr<std::int16_t> (job.at.y + y) + job.at.x + x0, job.min, job.none, width, d,
       m.restored.data ());
-  const std::uint8_t *begin = m.restored.data (), *end = begin + n;
-  const auto next = [end] (const std::uint8_t *at) {
-    const void *found = std::memchr (at, 1, std::size_t (end - at));
-    return found ? static_cast<const std::uint8_t *> (found) : end;
+  const std::uint8_t *restored = m.restored.data ();
+  const auto next = [restored, width] (int x) {
+    const void *found = std::memchr (restored + x, 1, std::size_t (width - x));
+    return found ? int (static_cast<const std::uint8_t *> (found) - restored) : width;
   };
-  const std::uint8_t *at = next (begin);
-  if (at == end)
+  const int first = next (0);
+  if (first == width)
     return;
   std::int16_t *there = m.there.data (), *claimed = m.claimed.data ();
   find_right (d, x0 + job.right_x, job.right.cols, width, there);
   m.claims.assign (std::size_t (job.right.cols), 32767);
   std::int16_t *claims = m.claims.data ();
-  for (; at != end; at = next (at + 1)) {
-    const auto x = at - begin;
+  for (int x = first; x < width; x = next (x + 1))
     claims[there[x]] = std::min (claims[there[x]], costs.other[x]);
-  }
   /* A right pixel that matches the background better cannot match something else as well. */
   for (int x = 0; x < width; x++)
     claimed[x] = claims[there[x]];
