@@ -86,6 +86,7 @@ Segmenter::find_sides (const SegmentationSettings &settings)
   inside_.setTo (0, inverse_);
 }
 
+/* Values are not loaded by condition in these loops, so that vectors are. */
 namespace {
 
 /* Pixels of a row that are set in a mask of 0 and 255: 1, else 0. */
@@ -101,8 +102,10 @@ void
 choose_values (const float *__restrict values, const std::uint8_t *__restrict mask, int n,
     float *__restrict chosen)
 {
-  for (int x = 0; x < n; x++)
-    chosen[x] = mask[x] ? values[x] : 0;
+  for (int x = 0; x < n; x++) {
+    const float value = values[x];
+    chosen[x] = mask[x] ? value : 0;
+  }
 }
 
 /* Marks pixels of a mask where more than `half` of the pixels around are set. */
@@ -110,8 +113,10 @@ void
 mark_majority (const std::uint16_t *__restrict counts, const std::uint8_t *__restrict mask,
     int half, int n, std::uint8_t *__restrict marks)
 {
-  for (int x = 0; x < n; x++)
-    marks[x] = counts[x] > half ? mask[x] : std::uint8_t{0};
+  for (int x = 0; x < n; x++) {
+    const std::uint8_t pixel = mask[x];
+    marks[x] = counts[x] > half ? pixel : std::uint8_t{0};
+  }
 }
 
 /* Brightness of a row relative to the background, and that of some pixels around: sum and number.
@@ -382,9 +387,10 @@ Segmenter::clear (const RangeImage &image, const BackgroundModel &background, do
     for (int y = 0; y < image.roi.height; y++) {
       const auto clear = inverse_.ptr<std::uint8_t> (y);
       std::uint16_t *depth = image.depth.row (y);
-      for (int x = 0; x < image.roi.width; x++)
-        if (clear[x])
-          depth[x] = kInvalidDepth;
+      for (int x = 0; x < image.roi.width; x++) {
+        const std::uint16_t kept = depth[x];
+        depth[x] = clear[x] ? kInvalidDepth : kept;
+      }
     }
     remove_small_in_space (
         image, depth_unit_m, background.depth_noise () / depth_unit_m, settings.min_area);
