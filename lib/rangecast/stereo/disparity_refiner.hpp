@@ -27,7 +27,7 @@ public:
     int iterations = 2;          ///< 0 = off
   };
 
-  /** Changes no disparity by more than a pixel; adds and removes none.
+  /** Shifts no disparity by more than a pixel before the last plane fit; adds and removes none.
    *  @param tiles     pixels read and written; there must be no disparities around them
    *  @param disparity  CV_16S, 1/16 pixel, of the left image's size */
   void apply (const Job &job, const Tiles &tiles, cv::Mat &disparity);
