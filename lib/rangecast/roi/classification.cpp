@@ -286,14 +286,59 @@ classify (const ClassInput &in, int n, const ClassLimits &limits, const ClassRow
   classify_group<Lanes> ({background, inferred, depth, colour}, n - x, limits, part (x));
 }
 
-/* Histogram of brightness ratios from 1/4 to 4, to find the mode. */
+/* Bins of the logarithm of ratios from 1/4 to 4. Finds them without logarithms, of which the first
+ * bits of a number are nearly one. */
+class LogBins {
+public:
+  static constexpr int kPerOctave = 32, kCount = 4 * kPerOctave;
+
+  LogBins ()
+  {
+    const auto bin_of = [] (std::uint32_t bits) {
+      return static_cast<int> (std::floor (std::log2 (std::bit_cast<float> (bits)) * kPerOctave)) +
+             kCount / 2;
+    };
+    for (std::uint32_t i = 0; i < kPrefixes; i++) {
+      const std::uint32_t begin = (kLeast + i) << kShift, end = begin + (1U << kShift);
+      const int bin = bin_of (begin);
+      std::uint32_t low = begin, high = end; /* searches for the next bin's first number */
+      while (low < high)
+        if (const std::uint32_t middle = low + (high - low) / 2; bin_of (middle) > bin)
+          high = middle;
+        else
+          low = middle + 1;
+      bins_[i] = {bin, low};
+    }
+  }
+  /** @return -1 outside */
+  [[nodiscard]] int find (float ratio) const
+  {
+    const auto bits = std::bit_cast<std::uint32_t> (ratio);
+    const std::uint32_t i = (bits >> kShift) - kLeast;
+    return i < kPrefixes ? bins_[i].first + (bits >= bins_[i].next) : -1;
+  }
+
+private:
+  /* Numbers with the same first bits, so many that they are in two bins at most. */
+  static constexpr int kBits = 6, kShift = 23 - kBits;
+  static_assert (1 << kBits > 1.5 * kPerOctave);
+  static constexpr std::uint32_t kLeast = std::bit_cast<std::uint32_t> (0.25f) >> kShift,
+                                 kPrefixes = 4 << kBits;
+  struct Bins {
+    int first;
+    std::uint32_t next; /* bits of the second one's first number */
+  };
+  std::array<Bins, kPrefixes> bins_;
+};
+
+/* Histogram of brightness ratios, to find the mode. */
 class RatioPeak {
 public:
   void add (float ratio)
   {
-    const int bin = static_cast<int> (std::floor (std::log2 (ratio) * kPerOctave)) + kBins / 2;
-    if (bin >= 0 && bin < kBins)
-      counts_[bin]++;
+    static const LogBins bins;
+    if (const int bin = bins.find (ratio); bin >= 0)
+      counts_[static_cast<std::size_t> (bin)]++;
     all_++;
   }
   /** @return the mode if at least a sixth of all samples share it, else the fallback */
@@ -317,7 +362,7 @@ public:
   }
 
 private:
-  static constexpr int kPerOctave = 32, kBins = 4 * kPerOctave;
+  static constexpr int kPerOctave = LogBins::kPerOctave, kBins = LogBins::kCount;
   std::array<int, kBins> counts_{};
   int all_ = 0;
 };

@@ -6,6 +6,7 @@
 #include <functional>
 #include <opencv2/imgproc.hpp>
 
+#include "../base/simd.hpp"
 #include "classification.hpp"
 
 namespace rangecast {
@@ -85,37 +86,120 @@ Segmenter::find_sides (const SegmentationSettings &settings)
   inside_.setTo (0, inverse_);
 }
 
+/* Values are not loaded by condition in these loops, so that vectors are. */
+namespace {
+
+/* Pixels of a row that are set in a mask of 0 and 255: 1, else 0. */
+void
+count_pixels (const std::uint8_t *__restrict mask, int n, std::uint16_t *__restrict counts)
+{
+  for (int x = 0; x < n; x++)
+    counts[x] = mask[x] & 1;
+}
+
+/* Values of a row where a mask is set, else 0. */
+void
+choose_values (const float *__restrict values, const std::uint8_t *__restrict mask, int n,
+    float *__restrict chosen)
+{
+  for (int x = 0; x < n; x++) {
+    const float value = values[x];
+    chosen[x] = mask[x] ? value : 0;
+  }
+}
+
+/* Marks pixels of a mask where more than `half` of the pixels around are set. */
+void
+mark_majority (const std::uint16_t *__restrict counts, const std::uint8_t *__restrict mask,
+    int half, int n, std::uint8_t *__restrict marks)
+{
+  for (int x = 0; x < n; x++) {
+    const std::uint8_t pixel = mask[x];
+    marks[x] = counts[x] > half ? pixel : std::uint8_t{0};
+  }
+}
+
+/* Brightness of a row relative to the background, and that of some pixels around: sum and number.
+ */
+struct Brightness {
+  const float *ratio, *tolerance, *sum;
+  const std::uint16_t *count;
+};
+
+/* Whether brightness is that of the pixels around, of which there must be some. */
+void
+compare_brightness (const Brightness &b, int min_count, int n, std::uint8_t *__restrict like)
+{
+  const float *__restrict ratio = b.ratio, *__restrict tolerance = b.tolerance,
+                          *__restrict sum = b.sum;
+  const std::uint16_t *__restrict count = b.count;
+  for (int x = 0; x < n; x++) {
+    const auto pixels = float (count[x]);
+    const float off = std::abs (ratio[x] * pixels - sum[x]), max = tolerance[x] * pixels;
+    like[x] = (off <= max) & (count[x] >= min_count) ? kYes : 0;
+  }
+}
+
+} // namespace
+
+/* The brightness of pixels relative to that of pixels of a mask within reach.
+ * @param min_count  least number of those
+ * @param[out] like  255 = within tolerance */
+void
+Segmenter::compare_with_mean (const cv::Mat &mask, int reach, int min_count, cv::Mat &like)
+{
+  const int n = mask.cols;
+  counts_.create (mask.size (), CV_16U);
+  like.create (mask.size (), CV_8U);
+  for_this_cpu ([&] {
+    box_counts_.find (
+        mask.size (), reach, cv::BORDER_CONSTANT,
+        [&] (int y, std::uint16_t *counts) { count_pixels (mask.ptr (y), n, counts); },
+        [&] (int y, const std::uint16_t *sums) {
+          std::copy_n (sums, n, counts_.ptr<std::uint16_t> (y));
+        });
+    box_values_.find (
+        mask.size (), reach, cv::BORDER_CONSTANT,
+        [&] (int y, float *values) {
+          choose_values (ratio_.ptr<float> (y), mask.ptr (y), n, values);
+        },
+        [&] (int y, const float *sums) {
+          compare_brightness ({ratio_.ptr<float> (y), tolerance_.ptr<float> (y), sums,
+                                  counts_.ptr<std::uint16_t> (y)},
+              min_count, n, like.ptr (y));
+        });
+  });
+}
+
 /* Ignores shadows and light of any strength where depth matches the background all around. */
 void
 Segmenter::ignore_lighting (int reach)
 {
-  const cv::Size window (2 * reach + 1, 2 * reach + 1);
+  const int side = 2 * reach + 1, n = sides_.cols;
   cv::compare (sides_, int (Side::kForeground), opened_, cv::CMP_EQ);
-  cv::dilate (opened_, opened_, cv::getStructuringElement (cv::MORPH_RECT, window));
-  placed_.convertTo (behind_, CV_32F, 1.0 / kYes);
-  cv::boxFilter (behind_, behind_, CV_32F, window);
-  cv::compare (behind_, 0.5, inverse_, cv::CMP_GT);
-  cv::bitwise_and (inverse_, lit_, inverse_);
+  cv::dilate (opened_, opened_, cv::getStructuringElement (cv::MORPH_RECT, cv::Size (side, side)));
+  inverse_.create (sides_.size (), CV_8U);
+  for_this_cpu ([&] {
+    box_counts_.find (
+        sides_.size (), reach, cv::BORDER_DEFAULT,
+        [&] (int y, std::uint16_t *counts) { count_pixels (placed_.ptr (y), n, counts); },
+        [&] (int y, const std::uint16_t *counts) {
+          mark_majority (counts, lit_.ptr (y), side * side / 2, n, inverse_.ptr (y));
+        });
+  });
   inverse_.setTo (0, opened_);
   other_.setTo (0, inverse_);
   /* A shadow that reaches the person's feet: pixels without depth have the brightness of the shadow
    * next to them. */
   if (cv::countNonZero (inverse_) == 0)
     return;
-  inverse_.convertTo (dark_, CV_32F, 1.0 / kYes);
-  cv::multiply (ratio_, dark_, dark_beside_);
-  cv::boxFilter (dark_beside_, dark_beside_, CV_32F, window, {-1, -1}, false, cv::BORDER_CONSTANT);
-  cv::boxFilter (dark_, dark_, CV_32F, window, {-1, -1}, false, cv::BORDER_CONSTANT);
-  for (int y = 0; y < other_.rows; y++) {
-    std::uint8_t *other = other_.ptr (y);
-    const std::uint8_t *lit = lit_.ptr (y), *side = sides_.ptr (y), *in = surrounded_.ptr (y);
-    const auto sum = dark_beside_.ptr<float> (y), count = dark_.ptr<float> (y);
-    const auto ratio = ratio_.ptr<float> (y), tolerance = tolerance_.ptr<float> (y);
-    for (int x = 0; x < other_.cols; x++)
-      if (other[x] && lit[x] && !in[x] && Side (side[x]) != Side::kForeground && count[x] > 4.5f &&
-          std::abs (ratio[x] - sum[x] / count[x]) < tolerance[x])
-        other[x] = 0;
-  }
+  constexpr int kEnough = 5; /* pixels */
+  compare_with_mean (inverse_, reach, kEnough, opened_);
+  cv::bitwise_and (opened_, lit_, opened_);
+  opened_.setTo (0, surrounded_);
+  cv::compare (sides_, int (Side::kForeground), dark_, cv::CMP_EQ);
+  opened_.setTo (0, dark_);
+  other_.setTo (0, opened_);
 }
 
 /* Of the pixels with the background's hue, only those with the brightness of background within
@@ -124,26 +208,12 @@ Segmenter::ignore_lighting (int reach)
 void
 Segmenter::find_same (int reach)
 {
-  const cv::Size window (2 * reach + 1, 2 * reach + 1);
   cv::bitwise_or (other_, nearer_, opened_);
   cv::bitwise_or (opened_, surrounded_, opened_);
   cv::compare (opened_, 0, opened_, cv::CMP_EQ);
-  opened_.convertTo (behind_, CV_32F, 1.0 / kYes);
-  cv::multiply (ratio_, behind_, light_beside_);
-  cv::boxFilter (
-      light_beside_, light_beside_, CV_32F, window, {-1, -1}, false, cv::BORDER_CONSTANT);
-  cv::boxFilter (behind_, behind_, CV_32F, window, {-1, -1}, false, cv::BORDER_CONSTANT);
-  inverse_.create (same_.size (), CV_8U);
-  for (int y = 0; y < same_.rows; y++) {
-    std::uint8_t *same = same_.ptr (y), *alone = inverse_.ptr (y);
-    const auto sum = light_beside_.ptr<float> (y), count = behind_.ptr<float> (y);
-    const auto ratio = ratio_.ptr<float> (y), tolerance = tolerance_.ptr<float> (y);
-    for (int x = 0; x < same_.cols; x++) {
-      alone[x] = count[x] < 0.5f ? kYes : 0;
-      if (alone[x] || std::abs (ratio[x] - sum[x] / count[x]) > tolerance[x])
-        same[x] = 0;
-    }
-  }
+  compare_with_mean (opened_, reach, 1, inverse_);
+  cv::bitwise_and (same_, inverse_, same_);
+  cv::compare (counts_, 0, inverse_, cv::CMP_EQ);
   majority_.find (same_, 1, opened_); /* single pixels may match by chance */
   cv::bitwise_and (opened_, nearer_, same_);
 }
@@ -317,9 +387,10 @@ Segmenter::clear (const RangeImage &image, const BackgroundModel &background, do
     for (int y = 0; y < image.roi.height; y++) {
       const auto clear = inverse_.ptr<std::uint8_t> (y);
       std::uint16_t *depth = image.depth.row (y);
-      for (int x = 0; x < image.roi.width; x++)
-        if (clear[x])
-          depth[x] = kInvalidDepth;
+      for (int x = 0; x < image.roi.width; x++) {
+        const std::uint16_t kept = depth[x];
+        depth[x] = clear[x] ? kInvalidDepth : kept;
+      }
     }
     remove_small_in_space (
         image, depth_unit_m, background.depth_noise () / depth_unit_m, settings.min_area);

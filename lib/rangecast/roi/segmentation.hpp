@@ -6,6 +6,7 @@
 
 #include "../geometry/connected_components.hpp"
 #include "background.hpp"
+#include "box_sums.hpp"
 #include "depth_fill.hpp"
 #include "majority.hpp"
 #include "surroundings.hpp"
@@ -76,6 +77,7 @@ private:
   void classify (const ConstRangeImage &image, const BackgroundModel &background,
       double depth_unit_m, const SegmentationSettings &settings);
   void find_sides (const SegmentationSettings &settings);
+  void compare_with_mean (const cv::Mat &mask, int reach, int min_count, cv::Mat &like);
   void ignore_lighting (int reach);
   void find_same (int reach);
   void join_cues (const SegmentationSettings &settings);
@@ -93,12 +95,15 @@ private:
   cv::Mat seen_;   /* the background's depth is known, 255 = yes */
   cv::Mat placed_; /* result of comparing depth with the background's, 255 = the same */
   cv::Mat sides_, surrounded_, inside_; /* inside_: surrounded_ without holes */
-  cv::Mat dark_beside_, dark_, by_colour_;
+  cv::Mat dark_, by_colour_;
   cv::Mat ratio_, tolerance_; /* brightness relative to the background, and its noise */
-  cv::Mat behind_, light_beside_, opened_, kernel_, guard_;
+  cv::Mat counts_;            /* CV_16U: see compare_with_mean() */
+  cv::Mat opened_, kernel_, guard_;
   cv::Mat mask_, inverse_, steps_;
   ConnectedComponents components_;
   Majority majority_;
+  BoxSums<std::uint16_t> box_counts_;
+  BoxSums<float> box_values_;
   DepthFill fill_;
   Surroundings surroundings_;
   std::vector<int> areas_;

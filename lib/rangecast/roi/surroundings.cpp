@@ -8,25 +8,42 @@
 
 namespace rangecast {
 
+/* Values are not loaded by condition in the loops below, so that vectors are. */
+namespace {
+
+/* The sides of blocks of 2 x 2 pixels.
+ * @param width  of the rows above and below; @param more  scratch memory for one more */
+void
+halve_row (const std::uint8_t *__restrict above, const std::uint8_t *__restrict below, int width,
+    std::int8_t *__restrict more, std::uint8_t *__restrict blocks)
+{
+  const auto sign_of = [] (std::uint8_t side) {
+    return (side == std::uint8_t (Side::kForeground)) - (side == std::uint8_t (Side::kBackground));
+  };
+  for (int x = 0; x < width; x++)
+    more[x] = std::int8_t (sign_of (above[x]) + sign_of (below[x]));
+  more[width] = more[width - 1];
+  for (int x = 0; x < (width + 1) / 2; x++) {
+    const auto sum = std::int8_t (more[2 * x] + more[2 * x + 1]);
+    blocks[x] = std::uint8_t ((sum > 0) * std::uint8_t (Side::kForeground) |
+                              (sum < 0) * std::uint8_t (Side::kBackground));
+  }
+}
+
+} // namespace
+
 void
 Surroundings::halve (const cv::Mat &sides)
 {
+  static_assert (int (Side::kUnknown) == 0);
   blocks_.create ((sides.rows + 1) / 2, (sides.cols + 1) / 2, CV_8U);
-  const auto more = [] (std::uint8_t side) {
-    return (Side (side) == Side::kForeground) - (Side (side) == Side::kBackground);
-  };
-  for (int y = 0; y < blocks_.rows; y++) {
-    const auto above = sides.ptr<std::uint8_t> (2 * y);
-    const auto below = sides.ptr<std::uint8_t> (std::min (2 * y + 1, sides.rows - 1));
-    auto block = blocks_.ptr<std::uint8_t> (y);
-    for (int x = 0; x < blocks_.cols; x++) {
-      const int u = 2 * x, v = std::min (u + 1, sides.cols - 1);
-      const int sum = more (above[u]) + more (above[v]) + more (below[u]) + more (below[v]);
-      block[x] = std::uint8_t (sum > 0   ? Side::kForeground
-                               : sum < 0 ? Side::kBackground
-                                         : Side::kUnknown);
-    }
-  }
+  more_.resize (std::size_t (sides.cols) + 1);
+  for_this_cpu ([&] {
+    for (int y = 0; y < blocks_.rows; y++)
+      halve_row (sides.ptr<std::uint8_t> (2 * y),
+          sides.ptr<std::uint8_t> (std::min (2 * y + 1, sides.rows - 1)), sides.cols, more_.data (),
+          blocks_.ptr<std::uint8_t> (y));
+  });
 }
 
 namespace {
@@ -40,9 +57,10 @@ step_row (const std::uint8_t *__restrict side, const std::uint8_t *__restrict se
 {
   const auto most = static_cast<std::uint8_t> (reach);
   for (int x = 0; x < n; x++) {
-    const auto farther = static_cast<std::uint8_t> (distance[x] + 1);
-    new_seen[x] = side[x] ? side[x] : seen[x];
-    new_distance[x] = side[x] ? std::uint8_t{1} : std::min (farther, most);
+    const std::uint8_t own = side[x], before = seen[x],
+                       farther = std::min (static_cast<std::uint8_t> (distance[x] + 1), most);
+    new_seen[x] = own ? own : before;
+    new_distance[x] = own ? std::uint8_t{1} : farther;
   }
 }
 
@@ -146,8 +164,10 @@ Surroundings::choose (const cv::Mat &sides, cv::Mat &inside)
       }
     }
     std::uint8_t *__restrict in = inside.ptr<std::uint8_t> (y);
-    for (int x = 0; x < width; x++)
-      in[x] = side[x] == std::uint8_t (Side::kUnknown) ? enough[x] : std::uint8_t{0};
+    for (int x = 0; x < width; x++) {
+      const std::uint8_t seen = enough[x];
+      in[x] = side[x] == std::uint8_t (Side::kUnknown) ? seen : std::uint8_t{0};
+    }
   }
 }
 

@@ -34,6 +34,7 @@ private:
   Sights before_[3], row_[3]; /* previous row, current row: three directions */
   Sights along_;
   std::vector<std::uint8_t> side_before_; /* of the previous row */
+  std::vector<std::int8_t> more_;         /* of a row of pixels: foreground minus background */
   std::vector<std::uint8_t> enough_;      /* of a row, by pixel: 255 = sees enough foreground */
   cv::Mat blocks_;                        /* CV_8U: sides of 2x2 pixels */
   cv::Mat foreground_, background_;       /* CV_8U: number of directions in which it is seen */

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 
 namespace rangecast {
 namespace {
@@ -122,6 +123,62 @@ BackgroundDisparity::extend (
   });
 }
 
+namespace {
+
+/* Of the patches of a row, sums: difference between both images at the disparity and at the
+ * background's, contrast, difference from the picture in which the background was seen. */
+struct RowCosts {
+  const std::int16_t *own, *other, *contrast, *change;
+};
+
+/* Replaces disparities by the background's, and clears those of pixels that the right camera does
+ * not see.
+ * @param back, seen     the background's disparities, likely and known
+ * @param[out] restored  1 = replaced, else 0 */
+void
+choose_background (const RowCosts &costs, const std::int16_t *__restrict back,
+    const std::int16_t *__restrict seen, int min, int none, int n, std::int16_t *__restrict d,
+    std::uint8_t *__restrict restored)
+{
+  const std::int16_t *__restrict own = costs.own, *__restrict other = costs.other,
+                                 *__restrict contrast = costs.contrast,
+                                 *__restrict change = costs.change;
+  for (int x = 0; x < n; x++) {
+    const std::int16_t behind = back[x]; /* not loaded by condition, so that vectors are */
+    const bool still = (seen[x] != kUnknown) & (change[x] <= kNoiseSum),
+               fits = (behind != kUnknown) & (other[x] <= kNoiseSum + contrast[x] / 2),
+               better = (d[x] < min) | (other[x] + kNoise * kArea < own[x]),
+               hidden = still & (seen[x] == kHidden), background = still | (fits & better);
+    const auto kept = static_cast<std::int16_t> (d[x] < min ? none : d[x]);
+    const std::int16_t visible = background ? behind : kept;
+    d[x] = hidden ? static_cast<std::int16_t> (none) : visible;
+    restored[x] = background & !hidden;
+  }
+}
+
+/* Columns of the right image that pixels match.
+ * @param x0  that of the first pixel, with disparity 0 */
+void
+find_right (const std::int16_t *__restrict d, int x0, int right_width, int n,
+    std::int16_t *__restrict there)
+{
+  for (int x = 0; x < n; x++)
+    there[x] =
+        static_cast<std::int16_t> (std::clamp (x0 + x - ((d[x] + 8) >> 4), 0, right_width - 1));
+}
+
+void
+clear_claimed (const std::int16_t *__restrict own, const std::int16_t *__restrict claimed, int min,
+    int none, int n, std::int16_t *__restrict d)
+{
+  for (int x = 0; x < n; x++) {
+    const std::int16_t kept = d[x];
+    d[x] = (kept >= min) & (claimed[x] < own[x]) ? static_cast<std::int16_t> (none) : kept;
+  }
+}
+
+} // namespace
+
 /* Compares patches of both images where there is a disparity. memory.grey is the left image. @param
  * disparity  of the size of job.left */
 void
@@ -155,30 +212,32 @@ void
 BackgroundDisparity::restore_row (
     const Job &job, int x0, int y, int i, int width, Memory &m, std::int16_t *d) const
 {
-  const std::int16_t *own = m.own.row (i), *other = m.other.row (i), *contrast = m.contrast.row (i),
-                     *change = m.change.row (i);
-  const auto back = likely_.ptr<std::int16_t> (job.at.y + y) + job.at.x + x0,
-             seen = known_.ptr<std::int16_t> (job.at.y + y) + job.at.x + x0;
-  m.claims.assign (std::size_t (job.right.cols), 32767);
-  const auto there = [&] (int x) {
-    return std::size_t (
-        std::clamp (x0 + x + job.right_x - ((d[x] + 8) >> 4), 0, job.right.cols - 1));
+  const RowCosts costs = {m.own.row (i), m.other.row (i), m.contrast.row (i), m.change.row (i)};
+  const auto n = std::size_t (width);
+  m.restored.resize (n);
+  m.there.resize (n);
+  m.claimed.resize (n);
+  choose_background (costs, likely_.ptr<std::int16_t> (job.at.y + y) + job.at.x + x0,
+      known_.ptr<std::int16_t> (job.at.y + y) + job.at.x + x0, job.min, job.none, width, d,
+      m.restored.data ());
+  const std::uint8_t *restored = m.restored.data ();
+  const auto next = [restored, width] (int x) {
+    const void *found = std::memchr (restored + x, 1, std::size_t (width - x));
+    return found ? int (static_cast<const std::uint8_t *> (found) - restored) : width;
   };
-  for (int x = 0; x < width; x++) {
-    const bool still = seen[x] != kUnknown && change[x] <= kNoiseSum,
-               fits = back[x] != kUnknown && other[x] <= kNoiseSum + contrast[x] / 2;
-    if (still && seen[x] == kHidden)
-      d[x] = static_cast<std::int16_t> (job.none);
-    else if (still || (fits && (d[x] < job.min || other[x] + kNoise * kArea < own[x]))) {
-      d[x] = back[x];
-      m.claims[there (x)] = std::min (m.claims[there (x)], other[x]);
-    } else if (d[x] < job.min)
-      d[x] = static_cast<std::int16_t> (job.none);
-  }
+  const int first = next (0);
+  if (first == width)
+    return;
+  std::int16_t *there = m.there.data (), *claimed = m.claimed.data ();
+  find_right (d, x0 + job.right_x, job.right.cols, width, there);
+  m.claims.assign (std::size_t (job.right.cols), 32767);
+  std::int16_t *claims = m.claims.data ();
+  for (int x = first; x < width; x = next (x + 1))
+    claims[there[x]] = std::min (claims[there[x]], costs.other[x]);
   /* A right pixel that matches the background better cannot match something else as well. */
   for (int x = 0; x < width; x++)
-    if (d[x] >= job.min && m.claims[there (x)] < own[x])
-      d[x] = static_cast<std::int16_t> (job.none);
+    claimed[x] = claims[there[x]];
+  clear_claimed (costs.own, claimed, job.min, job.none, width, d);
 }
 
 void

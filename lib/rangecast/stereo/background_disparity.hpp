@@ -44,6 +44,8 @@ private:
   struct Memory {
     Plane grey, before, pixels, own, other, contrast, change, sums;
     std::vector<std::int16_t> columns;
+    std::vector<std::uint8_t> restored; /* of a row: 1 = its disparity became the background's */
+    std::vector<std::int16_t> there, claimed; /* of a row: column of the right image, its claim */
     std::vector<std::int16_t> claims; /* by column of the right image: cost of the best match */
   };
   /* Positions of the images of one call. */

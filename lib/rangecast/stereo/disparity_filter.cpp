@@ -42,6 +42,40 @@ copy_with_border (
   }
 }
 
+/* Differences of grey levels where there is a disparity, else 0; and where that is. */
+void
+subtract_row (const std::int16_t *__restrict d, const std::int16_t *__restrict left,
+    const std::int16_t *__restrict right, int min, int n, std::int16_t *__restrict valid,
+    std::int16_t *__restrict difference)
+{
+  for (int x = 0; x < n; x++) {
+    const auto is_valid = std::int16_t (d[x] >= min), all = std::int16_t (left[x] - right[x]);
+    valid[x] = is_valid;
+    difference[x] = std::int16_t (all & -is_valid);
+  }
+}
+
+/* Sums over the patches of a row: see compare_patches(). */
+struct PatchSums {
+  const std::int16_t *counts, *differences, *sizes, *contrasts;
+};
+
+/* @param share  maximum difference relative to contrast, 1/256 */
+void
+clear_unlike_of_row (const std::int16_t *__restrict from, const PatchSums &sums, int share,
+    std::int16_t none, int n, std::int16_t *__restrict to)
+{
+  const std::int16_t *__restrict counts = sums.counts, *__restrict differences = sums.differences,
+                                 *__restrict sizes = sums.sizes,
+                                 *__restrict contrasts = sums.contrasts;
+  for (int x = 0; x < n; x++) {
+    const std::int16_t d = from[x]; /* not loaded by condition, so that vectors are */
+    const int unlike = kPatchArea * (sizes[x] - std::abs (int (differences[x])) / 2),
+              max = (share * contrasts[x] / 256 + kNoise * kPatchArea) * counts[x];
+    to[x] = unlike > max ? none : d;
+  }
+}
+
 } // namespace
 
 /* Sums over patches: number of pixels with disparity, signed and absolute difference between both
@@ -68,10 +102,8 @@ DisparityFilter::compare_patches (const cv::Mat &left, const cv::Mat &right, int
       const std::int16_t *l = m.grey.row (y + kPatchRadius) + kPatchRadius;
       look_up (d + begin, end - begin, right.ptr<std::uint8_t> (row), right.cols,
           x0 + begin + right_x, size);
-      for (int x = begin; x < end; x++) {
-        valid[x] = d[x] >= min;
-        difference[x] = std::int16_t (valid[x] ? l[x] - size[x - begin] : 0);
-      }
+      subtract_row (
+          d + begin, l + begin, size, min, end - begin, valid + begin, difference + begin);
     }
     for (int x = 0; x < width; x++)
       size[x] = std::int16_t (std::abs (difference[x]));
@@ -92,15 +124,9 @@ DisparityFilter::clear_unlike (const cv::Mat &left, const cv::Mat &right, int ri
     Memory &m = memory_.of (worker);
     compare_patches (left, right, right_x, min, tile, disparity, m);
     for (int y = 0; y < tile.height; y++) {
-      const std::int16_t *counts = m.counts.row (y), *differences = m.differences.row (y),
-                         *sizes = m.sizes.row (y), *contrasts = m.contrasts.row (y);
-      const auto from = disparity.ptr<std::int16_t> (tile.y + y) + tile.x;
-      auto out = to.ptr<std::int16_t> (tile.y + y) + tile.x;
-      for (int x = 0; x < tile.width; x++) {
-        const int unlike = kPatchArea * (sizes[x] - std::abs (int (differences[x])) / 2),
-                  max = (share * contrasts[x] / 256 + kNoise * kPatchArea) * counts[x];
-        out[x] = unlike > max ? std::int16_t (min - 16) : from[x];
-      }
+      clear_unlike_of_row (disparity.ptr<std::int16_t> (tile.y + y) + tile.x,
+          {m.counts.row (y), m.differences.row (y), m.sizes.row (y), m.contrasts.row (y)}, share,
+          std::int16_t (min - 16), tile.width, to.ptr<std::int16_t> (tile.y + y) + tile.x);
     }
   });
 }

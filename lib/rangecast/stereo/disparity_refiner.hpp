@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "../base/simd.hpp"
 #include "tiles.hpp"
 
 namespace rangecast {
@@ -26,7 +27,7 @@ public:
     int iterations = 2;          ///< 0 = off
   };
 
-  /** Changes no disparity by more than a pixel; adds and removes none.
+  /** Shifts no disparity by more than a pixel before the last plane fit; adds and removes none.
    *  @param tiles     pixels read and written; there must be no disparities around them
    *  @param disparity  CV_16S, 1/16 pixel, of the left image's size */
   void apply (const Job &job, const Tiles &tiles, cv::Mat &disparity);
@@ -34,44 +35,51 @@ public:
 private:
   /* Scratch memory of one thread. */
   struct Memory {
-    std::vector<float> columns[4], sums[4], shifts; /* of rows */
-    std::vector<std::uint8_t> counts[2];
-    std::vector<std::int32_t> at;
-    std::vector<std::uint32_t> greys;
-    /* Of a part and kPatch pixels around: gradient times difference of grey levels, gradient
-     * squared, gradient, difference; 0 without disparity. */
-    std::vector<float> planes[4];
+    std::vector<float> sums, left, shares, valid; /* of rows */
+    std::vector<std::uint8_t> counts, near;       /* of rows */
+    std::vector<std::int32_t> at, greys;          /* of rows */
+    std::vector<float> columns[4], threes[4];     /* of sums over patches: see find_shift() */
+    /* Gradient and difference of grey levels of the last rows; 0 without disparity. */
+    std::vector<float> slopes, differences;
     int stride = 0;
   };
-  /* A pixel near a step: the neighbours that belong to its surface (see members_of()), and their
-   * weights (see fit_plane()). */
-  struct Edge {
-    int x, y; /* in the padded planes */
-    std::uint64_t members;
-    float at, across, down;
+  static constexpr int kGroup = kMaxLanes;
+  /* Adjacent pixels, of which those near a step are fitted one by one. */
+  struct Edges {
+    int x, y;                /* in the padded planes */
+    std::int32_t is[kGroup]; /* -1 = near a step and with a disparity, else 0 */
+    /* Neighbours that belong to its surface, row by row, beginning with the highest bit: above and
+     * in the pixel's row, and below. */
+    std::uint32_t members[2][kGroup];
+    float count[kGroup];                            /* of members */
+    float at[kGroup], across[kGroup], down[kGroup]; /* their weights: see fit_planes() */
   };
   struct Part {
     cv::Rect at; /* columns with disparities of a tile */
-    std::vector<Edge> edges;
+    std::vector<Edges> edges;
   };
   void begin (const cv::Size &size, const Tiles &tiles);
   void load (const Job &job, const cv::Mat &disparity, cv::Rect &part);
   void mark_steps (const cv::Rect &part);
-  void find_edges (Part &part, Memory &memory);
-  void smooth (const Part &part, Memory &memory);
-  void compare (const Job &job, const cv::Rect &at, Memory &memory) const;
-  void move (const Job &job, const Part &part, Memory &memory);
+  template <typename Lanes> void find_edges (Part &part, Memory &memory);
+  template <typename Lanes> void fit_planes (Edges &edges, int lane) const;
+  template <typename Lanes> void smooth (const Part &part, Memory &memory);
+  template <typename Lanes> void smooth_edges (const Edges &edges, int lane);
+  static void begin_moves (const cv::Rect &at, Memory &memory);
+  static float *row_of (std::vector<float> &rows, int y, const Memory &memory);
+  template <typename Lanes>
+  void compare_row (const Job &job, const cv::Rect &at, int y, Memory &memory) const;
+  template <typename Lanes> static void move_window (const cv::Rect &at, int y, Memory &memory);
+  template <typename Lanes> void move (const Job &job, const Part &part, Memory &memory);
+  template <typename Lanes>
+  void move_edges (const Edges &edges, const cv::Rect &at, int lane, Memory &memory);
   void put_back (const Job &job, const cv::Rect &part, cv::Mat &disparity) const;
-  [[nodiscard]] std::uint64_t members_of (int x, int y) const;
-  static void fit_plane (Edge &edge);
-  [[nodiscard]] float on_plane (const Edge &edge) const;
-  static float shift_of (const Edge &edge, const cv::Rect &at, const Memory &memory);
 
   /* All are padded, so that windows stay inside. */
   cv::Mat first_, now_, next_; /* CV_32F, pixels more than the farthest; 0 = none */
   cv::Mat steps_;              /* CV_8U: 1 = no disparity, or next to a step */
   cv::Mat valid_;              /* CV_8U: 1 = there is a disparity */
-  cv::Mat colours_[3];         /* CV_8U: R, G, B */
+  cv::Mat colour_;             /* CV_32S: R, G, B and 0 in memory order */
   std::vector<Part> parts_;
   WorkerMemory<Memory> memory_;
 };

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -41,9 +40,12 @@ constexpr std::int16_t kAmbiguous = INT16_MIN;
  * there, disparities; pixels of half the size around a tile from which it is taken. */
 constexpr int kMany = 64, kMargin = 2, kAround = 4;
 
+/* By grey level step; greater steps are as the last one. */
+constexpr int kSteps = 32;
+static_assert (kJump * kEdge / (kEdge + kSteps - 1) <= kMinJump);
 constexpr auto kJumps = [] {
-  std::array<std::uint8_t, 256> jumps{};
-  for (int step = 0; step < 256; step++)
+  std::array<std::uint8_t, kSteps> jumps{};
+  for (int step = 0; step < kSteps; step++)
     jumps[std::size_t (step)] = std::uint8_t (std::max (kMinJump, kJump * kEdge / (kEdge + step)));
   return jumps;
 }();
@@ -77,12 +79,12 @@ max_of (const typename Lanes::B &a, const typename Lanes::B &b)
   return a > b ? a : b;
 }
 
-/* a + b, at most 255. */
+/* a - b, at least 0. */
 template <typename Lanes>
 inline typename Lanes::B
-add_up_to_255 (const typename Lanes::B &a, const typename Lanes::B &b)
+subtract_down_to_0 (const typename Lanes::B &a, const typename Lanes::B &b)
 {
-  return min_of<Lanes> (a, ~b) + b;
+  return a - min_of<Lanes> (a, b);
 }
 
 /* Computes the differences of a row's pixels to one neighbour, offset to start at 0, and adds them
@@ -102,21 +104,22 @@ compare_with (const std::uint8_t *__restrict other, const std::uint8_t *__restri
     }
 }
 
-/* @param[out] planes  by neighbour and column, and a plane of their sums */
+/* Describes columns x0 to x1 of a row, which are multiples of kSide.
+ * @param[out] planes  by neighbour and column, and a plane of their sums */
 void
-transform_row (const cv::Mat &padded, int y, std::vector<std::uint8_t> &planes)
+transform_row (const cv::Mat &padded, int y, int x0, int x1, std::vector<std::uint8_t> &planes)
 {
-  const int width = padded.cols - 2 * kRadiusX;
+  const int width = padded.cols - 2 * kRadiusX, n = x1 - x0;
   planes.resize (std::size_t (kNeighbours + 1) * std::size_t (width));
-  const std::uint8_t *own = padded.ptr<std::uint8_t> (y + kRadiusY) + kRadiusX;
-  std::uint8_t *plane = planes.data (), *sums = plane + std::ptrdiff_t (kNeighbours) * width;
-  std::fill_n (sums, width, std::uint8_t{0});
+  const std::uint8_t *own = padded.ptr<std::uint8_t> (y + kRadiusY) + kRadiusX + x0;
+  std::uint8_t *plane = planes.data () + x0, *sums = plane + std::ptrdiff_t (kNeighbours) * width;
+  std::fill_n (sums, n, std::uint8_t{0});
   for (int v = -kRadiusY; v <= kRadiusY; v++)
     for (int u = -kRadiusX; u <= kRadiusX; u++) {
       if ((u + v) % 2 != 0 || (u == 0 && v == 0))
         continue;
       compare_with (
-          padded.ptr<std::uint8_t> (y + kRadiusY + v) + kRadiusX + u, own, width, plane, sums);
+          padded.ptr<std::uint8_t> (y + kRadiusY + v) + kRadiusX + x0 + u, own, n, plane, sums);
       plane += width;
     }
 }
@@ -196,6 +199,26 @@ compare (const RowView &left, const std::uint8_t *grey, int x, const RowView &ri
       const B all = (cost + differs) * 2 - sum - Lanes::at (sums - d);
       cost = all >> kCostShift;
     }
+  }
+}
+
+/* The penalties of jumps between kSide pixels and as many others. */
+template <typename Lanes>
+inline void
+find_jumps (const std::uint8_t *pixels, const std::uint8_t *others, std::uint8_t *jumps)
+{
+  using B = typename Lanes::B;
+  constexpr int kBytes = sizeof (B);
+  for (int part = 0; part < kSide; part += kBytes) {
+    const B a = Lanes::at (pixels + part), b = Lanes::at (others + part),
+            step = min_of<Lanes> (
+                max_of<Lanes> (a, b) - min_of<Lanes> (a, b), B{} + std::uint8_t (kSteps - 1)),
+            low = Lanes::at (kJumps.data ());
+    static_assert (kSteps == 32);
+    if constexpr (kBytes == kSteps)
+      Lanes::at (jumps + part) = __builtin_shuffle (low, step);
+    else
+      Lanes::at (jumps + part) = __builtin_shuffle (low, Lanes::at (kJumps.data () + kBytes), step);
   }
 }
 
@@ -327,6 +350,36 @@ begin_paths (std::vector<std::uint8_t> &path, int count)
   std::fill_n (path.begin () + std::ptrdiff_t (n) + kSide, kSide, kNever);
 }
 
+/* The best of `count` disparities from `low` on for a row of a tile, and what their costs, and
+ * those of the disparities before and after, leave of 255. */
+struct Best {
+  int low, count;
+  const std::int16_t *place;
+  const std::uint8_t *most, *farther, *nearer;
+};
+
+/* @param[out] whole, disparity  pixels, 1/16 pixel */
+inline void
+interpolate (const Best &best, std::int16_t *__restrict whole, std::int16_t *__restrict disparity)
+{
+  float bends[kSide], slopes[kSide];
+  for (int i = 0; i < kSide; i++) {
+    const auto most = float (best.most[i]), before = float (best.farther[i]),
+               after = float (best.nearer[i]);
+    bends[i] = std::max (2 * most - after - before, 1.f);
+    slopes[i] = after - before;
+  }
+  std::int32_t parts[kSide];
+  /* Rounded half up; floats are exact and so is their quotient's integer part. */
+  for (int i = 0; i < kSide; i++)
+    parts[i] = std::int32_t ((16 * slopes[i] + bends[i]) / (2 * bends[i]));
+  for (int i = 0; i < kSide; i++) {
+    const bool inside = (best.place[i] > 0) & (best.place[i] < best.count - 1);
+    whole[i] = std::int16_t (best.place[i] + best.low);
+    disparity[i] = std::int16_t (16 * whole[i] + (inside ? parts[i] : 0));
+  }
+}
+
 } // namespace
 
 /* The costs of all tiles of a band, row by row. */
@@ -337,12 +390,18 @@ SemiGlobalMatcher::compare_band (const Stripe &stripe, int band, Memory &m)
   const Tile *tiles = &tiles_[std::size_t (band * stripe.across)];
   const int width = padded_[0].cols - 2 * kRadiusX, begin = band * kSide,
             end = std::min (begin + kSide, stripe.rows);
+  const auto round_down = [] (int x) { return x / kSide * kSide; };
+  /* Columns that are compared, in both pictures. */
+  const int from[] = {round_down (stripe.x0),
+      round_down (stripe.x0 - (min_disparity_ + disparities_ - 1))},
+            to[] = {
+                width, round_down (stripe.x0 + stripe.across * kSide - min_disparity_ + kSide - 1)};
   m.low.resize (std::size_t (width));
   m.high.resize (std::size_t (width));
   for (int row = begin; row < end; row++) {
     const int y = stripe.y0 + row;
     for (int i = 0; i < 2; i++)
-      transform_row (padded_[i], y, m.transformed[i]);
+      transform_row (padded_[i], y, from[i], to[i], m.transformed[i]);
     const std::uint8_t *grey = padded_[0].ptr<std::uint8_t> (y + kRadiusY) + kRadiusX;
     range_of_row (padded_[1].ptr<std::uint8_t> (y + kRadiusY) + kRadiusX, width, m.low.data (),
         m.high.data ());
@@ -356,6 +415,26 @@ SemiGlobalMatcher::compare_band (const Stripe &stripe, int band, Memory &m)
   }
 }
 
+/* Jumps between each column and the one before. */
+template <typename Lanes>
+void
+SemiGlobalMatcher::find_jumps_of_band (const Stripe &stripe, int band, Memory &m)
+{
+  const int begin = band * kSide, rows = std::min (kSide, stripe.rows - begin);
+  const std::size_t n = std::size_t (stripe.across) * kTileArea;
+  m.jumps.resize (n + kSide);
+  std::fill_n (&m.jumps[n], kSide, std::uint8_t{0}); /* before the first column from the right */
+  std::uint8_t jumps[kTileArea] = {};
+  for (int i = 0; i < stripe.across; i++) {
+    for (int row = 0; row < rows; row++) {
+      const std::uint8_t *grey = padded_[0].ptr<std::uint8_t> (stripe.y0 + begin + row + kRadiusY) +
+                                 kRadiusX + stripe.x0 + i * kSide;
+      find_jumps<Lanes> (grey, grey - 1, jumps + row * kSide);
+    }
+    transpose<Lanes> (jumps, kSide, &m.jumps[std::size_t (i) * kTileArea], kSide);
+  }
+}
+
 /* Both paths along the rows of a band, together. */
 template <typename Lanes>
 void
@@ -364,19 +443,10 @@ SemiGlobalMatcher::walk_band (const Stripe &stripe, int band, Memory &m)
   using B = typename Lanes::B;
   const Tile *tiles = &tiles_[std::size_t (band * stripe.across)];
   compare_band<Lanes> (stripe, band, m);
-  /* Jumps between each column and the one before. */
-  const int columns = stripe.columns;
-  m.jumps.assign (std::size_t (columns + 1) * kSide, 0);
-  for (int row = 0; row < std::min (kSide, stripe.rows - band * kSide); row++) {
-    const std::uint8_t *grey =
-        stripe.left.ptr<std::uint8_t> (stripe.y0 + band * kSide + row) + stripe.x0;
-    for (int x = 1; x < columns; x++)
-      m.jumps[std::size_t (x * kSide + row)] =
-          kJumps[std::size_t (std::abs (grey[x] - grey[x - 1]))];
-  }
+  find_jumps_of_band<Lanes> (stripe, band, m);
   const std::size_t first = tiles[0].at, n = end_of (tiles[stripe.across - 1]) - first;
   m.costs.resize (std::max (m.costs.size (), n));
-  m.sums.resize (std::max (m.sums.size (), n));
+  m.rests.resize (std::max (m.rests.size (), n));
   for (const int way : {1, -1}) {
     std::array<std::uint8_t, kSide> lowest{};
     const int begin = way > 0 ? 0 : stripe.across - 1;
@@ -384,7 +454,7 @@ SemiGlobalMatcher::walk_band (const Stripe &stripe, int band, Memory &m)
       const Tile &tile = tiles[i];
       const std::ptrdiff_t each = std::ptrdiff_t (tile.count) * kSide;
       std::uint8_t *costs = m.costs.data () + (tile.at - first),
-                   *sums = m.sums.data () + (tile.at - first);
+                   *rests = m.rests.data () + (tile.at - first);
       if (i == begin)
         begin_paths (m.path, tile.count);
       else
@@ -392,29 +462,29 @@ SemiGlobalMatcher::walk_band (const Stripe &stripe, int band, Memory &m)
       if (way > 0)
         for (int d = 0; d < tile.count; d++)
           transpose<Lanes> (&costs_[tile.at] + d * kSide, each, costs + d * kSide, each);
-      const int last = std::min (kSide, columns - i * kSide);
+      const int last = std::min (kSide, stripe.columns - i * kSide);
       for (int k = 0; k < last; k++) {
         const int x = way > 0 ? k : last - 1 - k;
         const std::uint8_t *jumps =
             m.jumps.data () + std::ptrdiff_t (i * kSide + x + (way > 0 ? 0 : 1)) * kSide;
-        std::uint8_t *sum = sums + x * each;
+        std::uint8_t *rest = rests + x * each;
         for (int part = 0; part < kSide; part += int (sizeof (B))) {
           const auto walk = [&] (const auto &use) {
             step<Lanes> (costs + x * each + part, m.path.data () + kSide + part,
                 lowest.data () + part, jumps + part, tile.count, use);
           };
           if (way > 0)
-            walk ([&] (int d, const B &now) { Lanes::at (sum + d * kSide + part) = now; });
+            walk ([&] (int d, const B &now) { Lanes::at (rest + d * kSide + part) = ~now; });
           else
             walk ([&] (int d, const B &now) {
-              B &to = Lanes::at (sum + d * kSide + part);
-              to = add_up_to_255<Lanes> (to, now);
+              B &to = Lanes::at (rest + d * kSide + part);
+              to = subtract_down_to_0<Lanes> (to, now);
             });
         }
       }
       if (way < 0)
         for (int d = 0; d < tile.count; d++)
-          transpose<Lanes> (sums + d * kSide, each, &sums_[tile.at] + d * kSide, each);
+          transpose<Lanes> (rests + d * kSide, each, &rests_[tile.at] + d * kSide, each);
     }
   }
 }
@@ -438,29 +508,29 @@ SemiGlobalMatcher::realign (const Tile &from, const Tile &to, Memory &m)
 
 /* The disparities of a row of a tile with the lowest cost, with subpixel precision by a parabola
  * through it and its neighbours; none if another one is nearly as good.
- * @param x, y   position in the stripe; @param least  the lowest costs */
+ * @param x, y   position in the stripe; @param most  what the lowest costs leave of 255 */
 template <typename Lanes>
 void
 SemiGlobalMatcher::choose (
-    const Stripe &stripe, const Tile &tile, int x, int y, const std::uint8_t *least, Memory &m)
+    const Stripe &stripe, const Tile &tile, int x, int y, const std::uint8_t *most, Memory &m)
 {
   using B = typename Lanes::B;
   constexpr int kAtOnce = 256; /* disparities that a byte tells apart */
-  const std::uint8_t *totals = m.totals.data () + kSide;
+  const std::uint8_t *rests = m.last.data () + kSide;
   const int n = tile.count;
-  std::int16_t best[kSide], bend[kSide], slope[kSide];
+  std::int16_t best[kSide];
   std::uint8_t place[kSide], found[kSide], farther[kSide] = {}, nearer[kSide] = {};
   std::fill_n (best, kSide, std::int16_t{0});
   for (int begin = (n - 1) / kAtOnce * kAtOnce; begin >= 0; begin -= kAtOnce) {
     for (int part = 0; part < kSide; part += int (sizeof (B))) {
-      const B lowest = Lanes::at (least + part);
+      const B highest = Lanes::at (most + part);
       B at{}, any{}, before = Lanes::at (farther + part), after = Lanes::at (nearer + part);
       for (int d = std::min (n, begin + kAtOnce) - 1; d >= begin; d--) {
-        const std::uint8_t *total = totals + d * kSide + part;
-        const B is_best = (B)(Lanes::at (total) == lowest);
+        const std::uint8_t *rest = rests + d * kSide + part;
+        const B is_best = (B)(Lanes::at (rest) == highest);
         at = is_best ? B{} + std::uint8_t (d - begin) : at;
-        before = is_best ? Lanes::at (total - kSide) : before;
-        after = is_best ? Lanes::at (total + kSide) : after;
+        before = is_best ? Lanes::at (rest - kSide) : before;
+        after = is_best ? Lanes::at (rest + kSide) : after;
         any |= is_best;
       }
       Lanes::at (place + part) = at;
@@ -472,38 +542,31 @@ SemiGlobalMatcher::choose (
       best[i] = std::int16_t (found[i] ? begin + place[i] : best[i]);
   }
   const std::size_t at = std::size_t (y) * std::size_t (stripe.across * kSide) + std::size_t (x);
-  std::int16_t *whole = &matches_.whole[at], *disparity = &matches_.disparity[at];
-  for (int i = 0; i < kSide; i++) {
-    const bool inside = best[i] > 0 && best[i] < n - 1;
-    bend[i] = std::int16_t (greater (nearer[i] + farther[i] - 2 * least[i], 1));
-    slope[i] = std::int16_t (inside ? farther[i] - nearer[i] : 0);
-    whole[i] = std::int16_t (best[i] + tile.low);
-  }
-  /* Rounded half up; floats are exact and so is their quotient's integer part. */
+  std::int16_t *disparity = &matches_.disparity[at];
+  interpolate ({tile.low, n, best, most, farther, nearer}, &matches_.whole[at], disparity);
   for (int i = 0; i < kSide; i++)
-    disparity[i] =
-        std::int16_t (16 * whole[i] + int (float (slope[i] * 16 + bend[i]) / float (2 * bend[i])));
-  std::copy_n (least, kSide, &matches_.sum[at]);
+    matches_.sum[at + std::size_t (i)] = std::uint8_t (255 - most[i]);
   if (settings_.uniqueness_ratio > 0)
-    clear_rivalled (totals, n, best, least, disparity);
+    clear_rivalled (rests, n, best, most, disparity);
 }
 
 /* Clears matches of a row of a tile if any cost but those next to the best one is nearly as good.
  */
 void
-SemiGlobalMatcher::clear_rivalled (const std::uint8_t *totals, int disparities,
-    const std::int16_t *best, const std::uint8_t *least, std::int16_t *disparity) const
+SemiGlobalMatcher::clear_rivalled (const std::uint8_t *rests, int disparities,
+    const std::int16_t *best, const std::uint8_t *most, std::int16_t *disparity) const
 {
   const int share = 100 - settings_.uniqueness_ratio;
-  std::int16_t like[kSide], rivals[kSide] = {};
+  std::int16_t like[kSide], rivals[kSide] = {}; /* like: what rivals leave more than */
   for (int i = 0; i < kSide; i++)
-    like[i] = std::int16_t (share > 0 ? std::min ((100 * least[i] + share - 1) / share, 256) : 256);
+    like[i] = std::int16_t (
+        255 - (share > 0 ? std::min ((100 * (255 - most[i]) + share - 1) / share, 256) : 256));
   for (int d = 0; d < disparities; d++)
     for (int i = 0; i < kSide; i++)
-      rivals[i] = std::int16_t (rivals[i] + (totals[d * kSide + i] < like[i] ? 1 : 0));
+      rivals[i] = std::int16_t (rivals[i] + (rests[d * kSide + i] > like[i] ? 1 : 0));
   for (int i = 0; i < kSide; i++) {
     for (int d = std::max (best[i] - 1, 0); d <= std::min (best[i] + 1, disparities - 1); d++)
-      rivals[i] = std::int16_t (rivals[i] - (totals[d * kSide + i] < like[i] ? 1 : 0));
+      rivals[i] = std::int16_t (rivals[i] - (rests[d * kSide + i] > like[i] ? 1 : 0));
     if (rivals[i] > 0)
       disparity[i] = kAmbiguous;
   }
@@ -535,15 +598,14 @@ SemiGlobalMatcher::walk_columns (const Stripe &stripe, int column, Memory &m)
         if (const int last = (row - way) / kSide; last != band)
           realign (tile_of (last), tile, m);
         const std::uint8_t *grey = grey_of (row), *before = grey_of (row - way);
-        for (int i = 0; i < kSide; i++)
-          jumps[std::size_t (i)] = kJumps[std::size_t (std::abs (grey[i] - before[i]))];
+        find_jumps<Lanes> (grey, before, jumps.data ());
       }
       const std::size_t at =
           tile.at + std::size_t (row - band * kSide) * std::size_t (tile.count) * kSide;
-      std::uint8_t *sums = &sums_[at];
-      m.totals.resize (std::max (m.totals.size (), std::size_t (tile.count + 2) * kSide));
-      std::uint8_t *totals = m.totals.data () + kSide;
-      std::array<std::uint8_t, kSide> least;
+      std::uint8_t *rests = &rests_[at];
+      m.last.resize (std::max (m.last.size (), std::size_t (tile.count + 2) * kSide));
+      std::uint8_t *last = m.last.data () + kSide;
+      std::array<std::uint8_t, kSide> most;
       for (int part = 0; part < kSide; part += int (sizeof (B))) {
         const auto walk = [&] (const auto &use) {
           step<Lanes> (&costs_[at] + part, m.path.data () + kSide + part, lowest.data () + part,
@@ -551,21 +613,21 @@ SemiGlobalMatcher::walk_columns (const Stripe &stripe, int column, Memory &m)
         };
         if (way > 0)
           walk ([&] (int d, const B &now) {
-            B &to = Lanes::at (sums + d * kSide + part);
-            to = add_up_to_255<Lanes> (to, now);
+            B &to = Lanes::at (rests + d * kSide + part);
+            to = subtract_down_to_0<Lanes> (to, now);
           });
         else {
-          B least_of_all = B{} + std::uint8_t{255};
+          B most_of_all{};
           walk ([&] (int d, const B &now) {
-            const B total = add_up_to_255<Lanes> (Lanes::at (sums + d * kSide + part), now);
-            Lanes::at (totals + d * kSide + part) = total;
-            least_of_all = min_of<Lanes> (least_of_all, total);
+            const B rest = subtract_down_to_0<Lanes> (Lanes::at (rests + d * kSide + part), now);
+            Lanes::at (last + d * kSide + part) = rest;
+            most_of_all = max_of<Lanes> (most_of_all, rest);
           });
-          Lanes::at (least.data () + part) = least_of_all;
+          Lanes::at (most.data () + part) = most_of_all;
         }
       }
       if (way < 0)
-        choose<Lanes> (stripe, tile, column * kSide, row, least.data (), m);
+        choose<Lanes> (stripe, tile, column * kSide, row, most.data (), m);
     }
   }
 }
@@ -607,7 +669,7 @@ SemiGlobalMatcher::match_stripe (
     const Stripe &stripe, int y, int end, int n_threads, cv::Mat &disparity)
 {
   const auto n = std::size_t (stripe.bands * kSide) * std::size_t (stripe.across * kSide);
-  for (Costs *costs : {&costs_, &sums_})
+  for (Costs *costs : {&costs_, &rests_})
     costs->resize (std::max (costs->size (), end_of (tiles_.back ())));
   matches_.disparity.resize (std::max (matches_.disparity.size (), n));
   matches_.whole.resize (matches_.disparity.size ());

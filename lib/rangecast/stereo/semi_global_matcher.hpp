@@ -44,9 +44,9 @@ private:
   struct Memory {
     Costs transformed[2], low, high;  /* of a row: see transform_row(), range_of_row() */
     Costs jumps;                      /* of a band, by column and row */
-    Costs costs, sums;                /* of a band, by column, disparity and row */
+    Costs costs, rests;               /* of a band, by column, disparity and row */
     Costs path, realigned;            /* by disparity: costs of the last pixels of paths */
-    Costs totals;                     /* of a row of a tile, by disparity */
+    Costs last;                       /* of a row of a tile, by disparity: rests of all paths */
     std::vector<std::uint32_t> right; /* of a row: see check_row() */
   };
   /* The disparities to search in a tile of kSide x kSide pixels. */
@@ -71,13 +71,15 @@ private:
   void add_bands (Stripe &stripe);
   void match_stripe (const Stripe &stripe, int y, int end, int n_threads, cv::Mat &disparity);
   static void realign (const Tile &from, const Tile &to, Memory &memory);
-  void clear_rivalled (const std::uint8_t *totals, int disparities, const std::int16_t *best,
-      const std::uint8_t *least, std::int16_t *disparity) const;
+  void clear_rivalled (const std::uint8_t *rests, int disparities, const std::int16_t *best,
+      const std::uint8_t *most, std::int16_t *disparity) const;
   template <typename Lanes> void compare_band (const Stripe &stripe, int band, Memory &memory);
+  template <typename Lanes>
+  void find_jumps_of_band (const Stripe &stripe, int band, Memory &memory);
   template <typename Lanes> void walk_band (const Stripe &stripe, int band, Memory &memory);
   template <typename Lanes> void walk_columns (const Stripe &stripe, int column, Memory &memory);
   template <typename Lanes>
-  void choose (const Stripe &stripe, const Tile &tile, int x, int y, const std::uint8_t *least,
+  void choose (const Stripe &stripe, const Tile &tile, int x, int y, const std::uint8_t *most,
       Memory &memory);
   void check_row (const Stripe &stripe, int y, Memory &memory, cv::Mat &disparity) const;
 
@@ -92,7 +94,7 @@ private:
   int min_disparity_ = 0, disparities_ = 0, coarse_min_ = 0;
   cv::Mat padded_[2]; /* CV_8U: left and right */
   std::vector<Tile> tiles_;
-  Costs costs_, sums_; /* of the tiles: matching costs; costs along paths */
+  Costs costs_, rests_; /* of the tiles: matching costs; what costs along paths leave of 255 */
   Matches matches_;
   WorkerMemory<Memory> memory_;
   std::unique_ptr<SemiGlobalMatcher> coarse_; /* for half the size */

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
 
 #include "../base/simd.hpp"
@@ -209,41 +210,59 @@ SilhouetteFilter::likely (const Settings &settings, const cv::Vec4b &own, int x,
   return total < kEnough ? settings.min - 1 : cv::v_reduce_sum (sum) / total;
 }
 
+/* Marks pixels of a row that may change: at a step to farther pixels, or without disparity near
+ * pixels of interest.
+ * @param lowest, highest  within reach */
+void
+SilhouetteFilter::mark_row (const Settings &settings, const std::int16_t *__restrict disparity,
+    const std::int16_t *__restrict lowest, const std::int16_t *__restrict highest, int n,
+    std::uint8_t *__restrict marks)
+{
+  const int share = share_of (settings), offset = settings.offset, min = settings.min,
+            nearest = settings.nearest, limit = std::max (min, nearest),
+            look_near = settings.only_beyond ? settings.look_near : INT16_MAX;
+  for (int x = 0; x < n; x++) {
+    const int d = disparity[x], tolerance = std::max (16, (d + offset) * share >> 16);
+    const bool inside = (d < nearest) | (lowest[x] >= d - tolerance) | (lowest[x] > look_near);
+    marks[x] = (highest[x] >= limit) & ((d < min) | !inside);
+  }
+}
+
 void
 SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, const cv::Rect &tile,
     const cv::Mat &disparity, Memory &m, cv::Mat &to) const
 {
-  const int share = static_cast<int> (65536 * settings.step), reach = settings.radius * 2 / 3,
-            min = settings.min;
-  const auto tolerance = [&] (int d) { return std::max (16, (d + settings.offset) * share >> 16); };
+  const int reach = settings.radius * 2 / 3, min = settings.min;
+  const auto none = static_cast<std::int16_t> (min - 16);
+  const auto smaller = [] (std::int16_t a, std::int16_t b) { return std::min (a, b); };
+  const auto greater = [] (std::int16_t a, std::int16_t b) { return std::max (a, b); };
   cut (disparity, tile, reach, m.around);
-  choose_in_windows (m.around, 2 * reach + 1, m.line, m.lowest,
-      [] (std::int16_t a, std::int16_t b) { return std::min (a, b); });
-  choose_in_windows (m.around, 2 * reach + 1, m.line, m.highest,
-      [] (std::int16_t a, std::int16_t b) { return std::max (a, b); });
+  choose_in_windows (m.around, 2 * reach + 1, m.line, m.lowest, smaller);
+  choose_in_windows (m.around, 2 * reach + 1, m.line, m.highest, greater);
+  m.marks.resize (std::size_t (tile.width));
   for (int y = 0; y < tile.height; y++) {
-    const auto pixels = colour.ptr<cv::Vec4b> (tile.y + y) + tile.x;
-    const auto from = disparity.ptr<std::int16_t> (tile.y + y) + tile.x;
-    auto out = to.ptr<std::int16_t> (tile.y + y) + tile.x;
-    const std::int16_t *lowest = m.lowest.row (y), *highest = m.highest.row (y);
-    for (int x = 0; x < tile.width; x++) {
-      out[x] = from[x];
+    const int at_y = tile.y + y;
+    const auto pixels = colour.ptr<cv::Vec4b> (at_y) + tile.x;
+    const auto from = disparity.ptr<std::int16_t> (at_y) + tile.x;
+    auto out = to.ptr<std::int16_t> (at_y) + tile.x;
+    std::copy_n (from, tile.width, out);
+    mark_row (settings, from, m.lowest.row (y), m.highest.row (y), tile.width, m.marks.data ());
+    const std::uint8_t *mark = m.marks.data (), *end = mark + tile.width;
+    while (const void *found = std::memchr (mark, 1, std::size_t (end - mark))) {
+      mark = static_cast<const std::uint8_t *> (found);
+      const int x = int (mark++ - m.marks.data ()), at_x = tile.x + x;
       const bool valid = from[x] >= min;
-      if (highest[x] < std::max (min, settings.nearest) ||
-          (valid && (from[x] < settings.nearest || lowest[x] >= from[x] - tolerance (from[x]) ||
-                        (settings.only_beyond && lowest[x] > settings.look_near))))
-        continue; /* inside a surface, or nothing near */
-      const int d = valid ? from[x] : likely (settings, pixels[x], tile.x + x, tile.y + y);
+      const cv::Vec4b &own = pixels[x];
+      const int d = valid ? from[x] : likely (settings, own, at_x, at_y);
       if (d < std::max (min, settings.nearest))
         continue;
-      const cv::Vec4b &own = pixels[x];
-      const int at_x = tile.x + x, at_y = tile.y + y, max = tolerance (d);
+      const int max = std::max (16, (d + settings.offset) * share_of (settings) >> 16);
       const Votes votes = valid && !settings.only_beyond
                               ? vote<false> (settings, own, at_x, at_y, d, max)
                               : vote<true> (settings, own, at_x, at_y, d, max);
 
       if (valid && votes.far > votes.same)
-        out[x] = static_cast<std::int16_t> (min - 16);
+        out[x] = none;
       else if (!valid && votes.same > 4 * (votes.near + votes.far) && votes.same > votes.none)
         out[x] = static_cast<std::int16_t> (d);
     }

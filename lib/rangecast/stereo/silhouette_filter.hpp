@@ -39,6 +39,7 @@ public:
 private:
   struct Memory {
     Plane around, lowest, highest, line;
+    std::vector<std::uint8_t> marks; /* of a row: see mark_row() */
   };
   /* Similarity in colour of the samples around a pixel, by their depth. */
   struct Votes {
@@ -53,6 +54,13 @@ private:
   [[nodiscard]] Votes vote (
       const Settings &settings, const cv::Vec4b &own, int x, int y, int d, int max) const;
   [[nodiscard]] int likely (const Settings &settings, const cv::Vec4b &own, int x, int y) const;
+  /* For tolerances in units of 1/65536. */
+  static int share_of (const Settings &settings)
+  {
+    return static_cast<int> (65536 * settings.step);
+  }
+  static void mark_row (const Settings &settings, const std::int16_t *disparity,
+      const std::int16_t *lowest, const std::int16_t *highest, int n, std::uint8_t *marks);
   void apply_to (const Settings &settings, const cv::Mat &colour, const cv::Rect &tile,
       const cv::Mat &disparity, Memory &memory, cv::Mat &to) const;
 

@@ -30,25 +30,27 @@ luma_of (const Pixels::I &pixels)
   return (pixels >> kRed & 255) + 2 * (pixels >> kGreen & 255) + (pixels >> kBlue & 255);
 }
 
-/* In 16 bits, which vectors hold twice as many of.
+/* In 16 bits, which vectors hold twice as many of. The sums of one picture are not kept, but follow
+ * from its mean.
  * @param frames  number of them in the mean with this one */
 inline void
 add_to_mean (const std::uint8_t *__restrict picture, int n, int frames,
     std::int16_t *__restrict sums, std::uint8_t *__restrict means)
 {
-  if (frames == 1) {
-    for (int i = 0; i < n; i++) {
-      sums[i] = std::int16_t (kScale * picture[i]);
-      means[i] = picture[i];
-    }
-    return;
-  }
   const auto share = std::int16_t (std::min (65536 / frames, 32767));
-  for (int i = 0; i < n; i++) {
-    const auto step = std::int16_t (kScale * picture[i] - sums[i]);
-    sums[i] = std::int16_t (sums[i] + std::int16_t (step * share >> 16));
+  const auto add = [&] (int i, std::int16_t before) {
+    const auto step = std::int16_t (kScale * picture[i] - before);
+    sums[i] = std::int16_t (before + std::int16_t (step * share >> 16));
     means[i] = std::uint8_t (std::uint16_t (sums[i] + kScale / 2) / kScale);
-  }
+  };
+  if (frames == 1)
+    std::copy_n (picture, n, means);
+  else if (frames == 2)
+    for (int i = 0; i < n; i++)
+      add (i, std::int16_t (kScale * means[i]));
+  else
+    for (int i = 0; i < n; i++)
+      add (i, sums[i]);
 }
 
 } // namespace

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <rangecast/base/cpu.hpp>
 #include <rangecast/stereo/disparity_refiner.hpp>
 
 using namespace rangecast;
@@ -103,6 +104,37 @@ TEST (DisparityRefiner, threads_and_tiles_change_nothing)
   one.refine (2, 1);
   many.refine (2, 7);
   EXPECT_EQ (cv::norm (one.disparity, many.disparity, cv::NORM_INF), 0);
+}
+
+/* Groups of pixels near steps end at, and reach beyond, the edges of parts. */
+TEST (DisparityRefiner, rungs_agree_at_steps_and_in_parts_of_any_width)
+{
+  for (const int width : {1, 2, 7, 8, 9, 31, 33, 100}) {
+    std::vector<cv::Mat> results;
+    for (const CpuLevel level : kCpuLevels) {
+      limit_cpu (level);
+      Pair pair;
+      pair.disparity (cv::Rect (44, 0, 9, kHeight)) += 16 * 4;
+      pair.disparity (cv::Rect (36, 40, 6, 3)).setTo (0);
+      pair.disparity (cv::Rect (58, 20, 1, 30)).setTo (0);
+      const cv::Mat before = pair.disparity.clone ();
+      /* Around the parts there are no disparities. */
+      cv::Mat inside = cv::Mat::zeros (pair.disparity.size (), CV_8U);
+      const std::vector<cv::Rect> parts = {{40, 4, width, 37}, {kWidth - width, 52, width, 40}};
+      for (const cv::Rect &part : parts)
+        inside (part).setTo (255);
+      pair.disparity.setTo (0, ~inside);
+      pair.refine (2, parts);
+      cv::Mat beside = pair.disparity.clone ();
+      beside.setTo (0, inside);
+      EXPECT_EQ (cv::countNonZero (beside), 0);
+      EXPECT_GT (cv::norm (pair.disparity, before, cv::NORM_INF, inside), 0);
+      results.push_back (pair.disparity.clone ());
+    }
+    limit_cpu (kCpuLevels[std::size (kCpuLevels) - 1]);
+    for (const cv::Mat &result : results)
+      EXPECT_EQ (cv::norm (result, results[0], cv::NORM_INF), 0) << width;
+  }
 }
 
 TEST (DisparityRefiner, what_has_no_disparity_or_is_too_far_stays_as_it_is)
