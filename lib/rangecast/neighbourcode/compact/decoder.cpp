@@ -323,7 +323,8 @@ CompactDecoder::make_run (
     const PixelClass now = classes[x];
     if (now <= kTakeUpperRight + 1) [[likely]] {
       const std::uint64_t take_left = zero_mask (now - kTakeLeft - 1u);
-      const auto from = static_cast<std::ptrdiff_t> (x + now) - 1 - kTakeUpper;
+      /* For the left pixel, which is not there, the upper-left one's place. */
+      const auto from = static_cast<std::ptrdiff_t> (x + now + (take_left & 1)) - 1 - kTakeUpper;
       if constexpr (Delta) /* codes do not tell unknown pixels from invalid ones */
         bad |= ((upper_classes[from] != 0) | (now == kTakeLeft + 1)) == 0;
       left = select (take_left, left, upper[from]);
