@@ -4,7 +4,7 @@
 import { BLEND, STRIPS } from './core.js';
 
 // rangecast::Shader
-const COVERING = 0, COLOUR = 1, STRIP = 3, BLEND_VERTEX = 6, BLEND_FRAGMENT = 7, FINISH = 8, FILL = 10, SUM = 11;
+const COVERING = 0, COLOUR = 1, STRIP = 3, BLEND_VERTEX = 6, BLEND_FRAGMENT = 7, FILL = 10, SUM = 11;
 // Floats of rc_camera_picture: those of the picture, and of each layer.
 const HEAD = 21, LAYER = 48;
 
@@ -49,8 +49,7 @@ export class Renderer {
   start () {
     const gl = this.gl;
     this.blend = this.program (BLEND_VERTEX, BLEND_FRAGMENT);
-    this.finish = this.program (COVERING, FINISH);
-    this.fill = this.program (COVERING, FILL);
+    this.finish = this.program (COVERING, FILL);
     this.sums = []; // by number of cells - 1
     this.strips = this.program (STRIP, COLOUR);
     this.nothing = gl.createVertexArray ();
@@ -240,13 +239,9 @@ export class Renderer {
     gl.viewport (0, 0, width, height);
     gl.depthFunc (gl.ALWAYS);
     this.addUp (picture, cells, count);
-    gl.bindFramebuffer (gl.FRAMEBUFFER, framebuffer);
-    this.coverFromSums (this.finish, picture, height);
-    gl.depthMask (false);
-    gl.depthFunc (gl.LESS); // spares pixels that need no filling the shader
-    this.coverFromSums (this.fill, picture, height);
-    gl.depthMask (true);
     gl.disable (gl.DEPTH_TEST);
+    gl.bindFramebuffer (gl.FRAMEBUFFER, framebuffer);
+    this.finishPicture (picture, height);
   }
 
   // Returns what leads from a pixel of the picture to each cell.
@@ -289,8 +284,9 @@ export class Renderer {
     this.unbindTextures ();
   }
 
-  coverFromSums (program, picture, height) {
-    const gl = this.gl, [x, y, columns, rows] = picture.subarray (8, 12);
+  // In one pass: SwiftShader takes longer for two, of which depth tests would spare it most of the second.
+  finishPicture (picture, height) {
+    const gl = this.gl, program = this.finish, [x, y, columns, rows] = picture.subarray (8, 12);
     program.use ();
     this.bindTextures (program, this.sumTarget, 'u_sum');
     gl.uniform4i (program.at ('u_part'), x, y, x + columns - 1, y + rows - 1);

@@ -188,9 +188,10 @@ void main ()
   float farthest = 0.5 + 0.5 * (u_shift.x + u_shift.y / (distance + u_shift.z));
   vec4 sum = vec4 (0.0);
   for (int i = 0; i < CELLS; i++) {
-    vec4 texel = texelFetch (u_colours, at + u_cells[i], 0);
-    float weight = depths[i] <= farthest ? weight_of (texel.a) : 0.0;
-    sum += weight * vec4 (texel.rgb, 1.0);
+    if (depths[i] < 1.0 && depths[i] <= farthest) {
+      vec4 texel = texelFetch (u_colours, at + u_cells[i], 0);
+      sum += weight_of (texel.a) * vec4 (texel.rgb, 1.0);
+    }
   }
   float root = sqrt (sqrt (sum.a / float (CELLS)));
   fragment = sum.a > 0.0 ? vec4 (sum.rgb / sum.a, max (root, kInside)) : vec4 (0.0);
@@ -198,11 +199,11 @@ void main ()
 }
 )";
 
-/* The picture, and with FILL those pixels of it that the first one left to be filled: it marks them
- * in the depth buffer. Outlines are smoothed over the four neighbours, which also closes cracks of
- * one pixel between what two views draw. Where no camera saw the outside of a surface, so that the
- * inside of one behind shows through (beside a nose, round glasses), small gaps take the colours
- * around them, from the farther surfaces: what a nearer one hides is theirs. */
+/* Without FILL, gaps stay as they are, and are marked in the depth buffer. Outlines are smoothed
+ * over the four neighbours, which also closes cracks of one pixel between what two views draw.
+ * Where no camera saw the outside of a surface, so that the inside of one behind shows through
+ * (beside a nose, round glasses), small gaps take the colours around them, from the farther
+ * surfaces: what a nearer one hides is theirs. */
 const char *const kFinishFragment = R"(
 precision highp int;
 precision highp sampler2D;
@@ -288,10 +289,10 @@ void main ()
   }
   bool is_gap = heaviest > 0.0 && heaviest < weight_of (kOutside);
 #if FILL
-  if (!is_gap)
-    discard;
-  vec4 filled = fill (at);
-  sum = vec4 (mix (sum.rgb / sum.a, filled.rgb, filled.a), 1.0);
+  if (is_gap) {
+    vec4 filled = fill (at);
+    sum = vec4 (mix (sum.rgb / sum.a, filled.rgb, filled.a), 1.0);
+  }
 #elif WITH_DEPTH
   gl_FragDepth = texelFetch (u_depths, at, 0).r;
 #else

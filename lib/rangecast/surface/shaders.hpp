@@ -20,7 +20,7 @@ enum class Shader : unsigned {
   kBlendFragment,
   kFinishFragment,      ///< pass 3: the picture; depth is 1 where pass 4 is needed, else 0
   kFinishDepthFragment, ///< the same, with the surfaces' depth
-  kFillFragment,        ///< pass 4: small gaps
+  kFillFragment,        ///< pass 4: the picture with small gaps filled
   kSumFragment,         ///< pass 2: colours of one cell added up by weight; see sum_shader()
 };
 
