@@ -147,14 +147,15 @@ uniform float u_unit;
 uniform vec4 u_lens; /* principal point in the ROI, 1 / focal lengths; pixels */
 uniform vec3 u_viewer; /* in the view's camera coordinates, metres */
 out vec4 v_colour;
+const float kMinAngle = 0.03; /* square root of the minimum weight; the cosine's power is 6 */
 void main ()
 {
   vec2 at = 0.25 * a_place;
   gl_Position = clip_position (at, a_depth);
   vec3 ray = vec3 ((at - u_lens.xy) * u_lens.zw, 1.0);
-  float along = max (dot (normalize (ray), normalize (ray * a_depth * u_unit - u_viewer)), 0.0);
-  /* the weight falls with the cosine's power of 6 */
-  v_colour = vec4 (a_colour.rgb, max (sqrt (a_colour.a * along * along * along), kMinOutside));
+  float along = dot (normalize (ray), normalize (ray * a_depth * u_unit - u_viewer));
+  float root = a_colour.a * max (along * along * along, kMinAngle);
+  v_colour = vec4 (a_colour.rgb, max (sqrt (root), kMinOutside));
 }
 )";
 
