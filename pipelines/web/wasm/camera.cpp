@@ -171,14 +171,15 @@ void
 write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from_world, int width,
     int height, const Roi &part, int max_side)
 {
-  rangecast::BlendAtlas atlas;
-  std::vector<double> alignments;
+  static rangecast::BlendAtlas atlas;
+  static std::vector<double> alignments;
   const bool blends = scene.mode == rangecast::StripMode::kBlend;
   const Roi covered = rangecast::covered_part (clip_from_world, scene.hull, width, height, part);
   const auto shift =
       rangecast::depth_shift (clip_from_world, clip_from_world, rangecast::kBlendRange_m);
   const bool backs = !blends && scene.rig_views == 1;
   constexpr unsigned colour = rangecast::kBackgroundColour;
+  alignments.clear ();
   for (const Layer &layer : scene.layers)
     alignments.push_back (rangecast::view_alignment (clip_from_world, layer.view));
   const bool any = blends && !covered.empty () && !alignments.empty ();
