@@ -1,21 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "blendpainter.hpp"
 
+#include <algorithm>
 #include <cstddef>
-#include <cstring>
 #include <rangecast/surface/painting.hpp>
 
 #include "backgroundpainter.hpp"
-
-#ifndef GL_RGBA16F
-#define GL_RGBA16F 0x881A
-#endif
-#ifndef GL_RGBA32F
-#define GL_RGBA32F 0x8814
-#endif
-#ifndef GL_HALF_FLOAT
-#define GL_HALF_FLOAT 0x140B
-#endif
 
 using rangecast::BlendVertex;
 using rangecast::Shader;
@@ -35,6 +25,14 @@ set_angle_uniforms (GstGLShader *shader, const RenderPicture &picture, const Ren
 }
 
 void
+set_shift_uniform (GstGLShader *shader, const RenderPicture &picture)
+{
+  const auto shift = rangecast::depth_shift (
+      picture.clip_from_world, picture.clip_from_world, picture.blend_range_m);
+  gst_gl_shader_set_uniform_3f (shader, "u_shift", shift.a, shift.b, shift.g);
+}
+
+void
 describe_vertices (const GstGLFuncs *gl)
 {
   const auto attribute = [gl] (guint location, gint size, guint type, bool in_one, std::size_t at) {
@@ -50,33 +48,23 @@ describe_vertices (const GstGLFuncs *gl)
 } // namespace
 
 bool
-BlendPainter::is_supported (GstGLContext *context)
-{
-  return !is_gles (context) ||
-         gst_gl_context_check_feature (context, "GL_EXT_color_buffer_float") ||
-         gst_gl_context_check_feature (context, "GL_EXT_color_buffer_half_float");
-}
-
-bool
 BlendPainter::start (GstGLContext *context, GError **error)
 {
   context_ = context;
-  const auto renderer =
-      reinterpret_cast<const char *> (context->gl_vtable->GetString (GL_RENDERER));
-  in_software_ = renderer && std::strstr (renderer, "llvmpipe");
   const struct {
     GstGLShader *&shader;
     Shader vertex, fragment;
   } stages[] = {
-      {shaders_[kDepth], Shader::kBlendDepthVertex, Shader::kBlendDepthFragment},
-      {shaders_[kSum], Shader::kBlendSumVertex, Shader::kBlendSumFragment},
-      {divide_shaders_[0], Shader::kCoveringVertex, Shader::kDivideFragment},
-      {divide_shaders_[1], Shader::kCoveringVertex, Shader::kDivideDepthFragment},
+      {cell_shader_, Shader::kBlendVertex, Shader::kBlendFragment},
+      {fill_shader_, Shader::kCoveringVertex, Shader::kFillFragment},
+      {finish_shaders_[0], Shader::kCoveringVertex, Shader::kFinishFragment},
+      {finish_shaders_[1], Shader::kCoveringVertex, Shader::kFinishDepthFragment},
   };
   for (const auto &[shader, vertex, fragment] : stages)
     if (!(shader = make_shader (context, vertex, fragment, error)))
       return false;
   context->gl_vtable->GenVertexArrays (1, &array_);
+  context->gl_vtable->GetIntegerv (GL_MAX_TEXTURE_SIZE, &largest_);
   return true;
 }
 
@@ -92,12 +80,14 @@ BlendPainter::stop ()
         gl->DeleteBuffers (1, &objects.vertices);
         gl->DeleteVertexArrays (1, &objects.array);
       }
-  for (GstGLShader *&shader : shaders_)
-    gst_clear_object (&shader);
-  for (GstGLShader *&shader : divide_shaders_)
-    gst_clear_object (&shader);
+  for (GstGLShader **shader :
+      {&cell_shader_, &fill_shader_, &finish_shaders_[0], &finish_shaders_[1]})
+    gst_clear_object (shader);
+  for (LazyShader &shader : sum_shaders_)
+    shader.stop ();
   gl->DeleteVertexArrays (1, &array_);
-  delete_targets ();
+  delete_target (cells_);
+  delete_target (sums_);
   *this = {};
 }
 
@@ -127,171 +117,215 @@ BlendPainter::upload (std::span<const RenderLayer> layers)
   return uploaded;
 }
 
-/* Both sides of all surfaces: weights leave next to nothing of what is seen from behind. */
-void
-BlendPainter::draw_layers (
-    std::span<const RenderLayer> layers, const RenderPicture &picture, Pass pass) const
-{
-  const GstGLFuncs *gl = context_->gl_vtable;
-  GstGLShader *shader = shaders_[pass];
-  gst_gl_shader_use (shader);
-  for (const RenderLayer &layer : layers) {
-    if (layer.blend_vertices.empty ())
-      continue;
-    const auto &matrix = picture.clip_from_world;
-    const double gap_m =
-        pass == kDepth ? rangecast::depth_pass_gap (matrix, *layer.view, picture.blend_range_m)
-                       : rangecast::sum_pass_gap (matrix, *layer.view);
-    set_position_uniforms (
-        shader, rangecast::place_layer (
-                    clip_from_pixel (matrix, *layer.view, layer.image.roi), matrix, gap_m));
-    if (pass == kSum)
-      set_angle_uniforms (shader, picture, layer);
-    gl->BindVertexArray (objects_[turn_][std::size_t (layer.image.view_id)].array);
-    gl->DrawArrays (GL_TRIANGLE_STRIP, 0, GLsizei (layer.blend_vertices.size ()));
-  }
-}
-
 bool
 BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> layers)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
-  const rangecast::Roi &covered = picture.covered;
-  const bool precise =
-      !is_gles (context_) && (in_software_ || picture.rig_views > rangecast::kMaxHalfFloatViews);
-  if (!bind_targets (picture.width, picture.height, precise))
-    return false;
-
-  gl->Viewport (0, 0, picture.width, picture.height);
-  gl->Enable (GL_SCISSOR_TEST); /* to clear float targets is a good part of a picture's cost */
-  gl->Scissor (covered.x, covered.y, covered.width, covered.height);
-  gl->ClearColor (0, 0, 0, 0);
-  gl->Clear (GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  gl->Enable (GL_DEPTH_TEST);
-  gl->ColorMask (FALSE, FALSE, FALSE, FALSE);
-  draw_layers (layers, picture, kDepth);
-
-  gl->ColorMask (TRUE, TRUE, TRUE, TRUE);
-  gl->DepthMask (FALSE);
-  gl->DepthFunc (GL_LEQUAL);
-  gl->Enable (GL_BLEND);
-  gl->BlendFunc (GL_ONE, GL_ONE);
-  gl->FrontFace (rangecast::mirrors (picture.clip_from_world) ? GL_CW : GL_CCW);
-  const auto weights = rangecast::blend_weights (picture.rig_views, precise);
-  gst_gl_shader_use (shaders_[kSum]);
-  gst_gl_shader_set_uniform_3f (
-      shaders_[kSum], "u_weights", weights.max, weights.min, weights.inside);
-  draw_layers (layers, picture, kSum);
-  gl->Disable (GL_BLEND);
-  gl->BlendFunc (GL_ONE, GL_ZERO);
-  gl->DepthMask (TRUE);
-
-  divide (picture, weights.outside ());
+  const rangecast::Roi &part = picture.part, &covered = picture.covered;
+  const float *background = picture.background;
+  const bool any = !covered.empty () && !layers.empty ();
+  if (any) {
+    if (!start_picture (picture, layers))
+      return false;
+    gl->GetIntegerv (GL_DRAW_FRAMEBUFFER_BINDING, &output_);
+    gl->Enable (GL_DEPTH_TEST);
+    gl->Disable (GL_BLEND);
+    draw_cells (picture, layers);
+    gl->Viewport (0, 0, picture.width, picture.height);
+    gl->DepthFunc (GL_ALWAYS);
+    add_up (picture);
+    gl->BindFramebuffer (GL_FRAMEBUFFER, guint (output_));
+  }
+  gl->Enable (GL_SCISSOR_TEST);
+  gl->Scissor (part.x, part.y, part.width, part.height);
+  gl->ClearColor (background[0], background[1], background[2], background[3]);
+  if (picture.background_shade <= 0) /* else it has been drawn */
+    gl->Clear (GL_COLOR_BUFFER_BIT);
+  if (any)
+    finish (picture);
+  if (part.width == picture.width && part.height == picture.height)
+    gl->Disable (GL_SCISSOR_TEST);
+  else
+    gl->Scissor (part.x, part.y, part.width, part.height);
   gl->DepthFunc (GL_LESS);
-  gl->FrontFace (GL_CCW);
   gl->Disable (GL_DEPTH_TEST);
   gst_gl_context_clear_shader (context_);
   return true;
 }
 
-/* Pass 3, into the framebuffer that was bound before. Pixels outside of picture.covered become
- * background.
- * @param outside  pixels of less weight show only the inside of surfaces: in gaps up to a 30th of
- *                 the picture's height they take the colours around them, in gaps up to a 15th a
- *                 share of those */
+/* Makes all that the passes need. @return false if OpenGL cannot have it */
+bool
+BlendPainter::start_picture (const RenderPicture &picture, std::span<const RenderLayer> layers)
+{
+  alignments_.clear ();
+  for (const RenderLayer &layer : layers)
+    alignments_.push_back (rangecast::view_alignment (picture.clip_from_world, *layer.view));
+  rangecast::make_blend_atlas (alignments_, picture.covered, largest_, atlas_);
+  return prepare (cells_, atlas_.width, atlas_.height) &&
+         prepare (sums_, picture.width, picture.height) &&
+         sum_shaders_[atlas_.cells - 1].make (
+             context_, rangecast::sum_shader (atlas_.cells), "mode blend");
+}
+
+/* Pass 1. Both sides of all surfaces: weights leave next to nothing of what is seen from behind. */
 void
-BlendPainter::divide (const RenderPicture &picture, float outside) const
+BlendPainter::draw_cells (const RenderPicture &picture, std::span<const RenderLayer> layers) const
 {
   const GstGLFuncs *gl = context_->gl_vtable;
-  const rangecast::Roi &part = picture.part, &covered = picture.covered;
-  const float *background = picture.background;
-  gl->DepthFunc (GL_ALWAYS);
-  gl->BindFramebuffer (GL_FRAMEBUFFER, guint (output_));
-  gl->Scissor (part.x, part.y, part.width, part.height);
-  gl->ClearColor (background[0], background[1], background[2], background[3]);
-  if (picture.background_shade <= 0) /* else it has been drawn */
-    gl->Clear (GL_COLOR_BUFFER_BIT);
-  gl->Scissor (covered.x, covered.y, covered.width, covered.height);
-  GstGLShader *shader = divide_shaders_[picture.keeps_depth ? 1 : 0];
-  gst_gl_shader_use (shader);
-  static const char *const kNames[] = {"u_sum", "u_depth"};
-  for (std::size_t i = 0; i < targets_.size (); i++) {
-    gl->ActiveTexture (guint (GL_TEXTURE0 + i));
-    gl->BindTexture (GL_TEXTURE_2D, targets_[i]);
-    gst_gl_shader_set_uniform_1i (shader, kNames[i], gint (i));
+  const rangecast::Roi &covered = picture.covered;
+  gl->BindFramebuffer (GL_FRAMEBUFFER, cells_.framebuffer);
+  gl->Disable (GL_SCISSOR_TEST); /* llvmpipe clears all in a third of the time of a part */
+  gl->ClearColor (0, 0, 0, 0);
+  gl->Clear (GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  gl->Enable (GL_SCISSOR_TEST);
+  gl->DepthFunc (GL_LESS);
+  gl->FrontFace (rangecast::mirrors (picture.clip_from_world) ? GL_CW : GL_CCW);
+  gst_gl_shader_use (cell_shader_);
+  for (std::size_t i = 0; i < layers.size (); i++) {
+    if (layers[i].blend_vertices.empty ())
+      continue;
+    const auto [right, down] = atlas_.from_picture[atlas_.cell_of[i]];
+    gl->Viewport (right, down, picture.width, picture.height);
+    gl->Scissor (covered.x + right, covered.y + down, covered.width, covered.height);
+    draw_layer (picture, layers[i]);
   }
+  gl->FrontFace (GL_CCW);
+}
+
+void
+BlendPainter::draw_layer (const RenderPicture &picture, const RenderLayer &layer) const
+{
+  const GstGLFuncs *gl = context_->gl_vtable;
+  const auto &matrix = picture.clip_from_world;
+  set_position_uniforms (
+      cell_shader_, rangecast::place_layer (clip_from_pixel (matrix, *layer.view, layer.image.roi),
+                        matrix, rangecast::inside_gap (matrix, *layer.view)));
+  set_angle_uniforms (cell_shader_, picture, layer);
+  gl->BindVertexArray (objects_[turn_][std::size_t (layer.image.view_id)].array);
+  gl->DrawArrays (GL_TRIANGLE_STRIP, 0, GLsizei (layer.blend_vertices.size ()));
+}
+
+/* Pass 2. */
+void
+BlendPainter::add_up (const RenderPicture &picture) const
+{
+  const GstGLFuncs *gl = context_->gl_vtable;
+  const rangecast::Roi &covered = picture.covered;
+  gl->BindFramebuffer (GL_FRAMEBUFFER, sums_.framebuffer);
+  gl->Scissor (covered.x, covered.y, covered.width, covered.height);
+  GstGLShader *shader = sum_shaders_[atlas_.cells - 1].shader ();
+  gst_gl_shader_use (shader);
+  bind_textures (shader, cells_, "u_colours");
+  gst_gl_shader_set_uniform_2iv (
+      shader, "u_cells", guint (atlas_.cells), atlas_.from_picture[0].data ());
+  set_shift_uniform (shader, picture);
+  draw_covering (gl, array_);
+  unbind_textures ();
+}
+
+/* Passes 3 and 4, into the framebuffer that was bound before. Pixels outside of picture.covered
+ * become background. Gaps up to a 30th of the picture's height that show only the inside of
+ * surfaces take the colours around them, those up to a 15th a share of those. */
+void
+BlendPainter::finish (const RenderPicture &picture) const
+{
+  const GstGLFuncs *gl = context_->gl_vtable;
+  const rangecast::Roi &covered = picture.covered;
+  gl->Scissor (covered.x, covered.y, covered.width, covered.height);
+  cover_from_sums (finish_shaders_[picture.keeps_depth ? 1 : 0], picture);
+  gl->DepthMask (FALSE);
+  if (!picture.keeps_depth)
+    gl->DepthFunc (GL_LESS); /* spares all other pixels the shader */
+  cover_from_sums (fill_shader_, picture);
+  gl->DepthMask (TRUE);
+}
+
+void
+BlendPainter::cover_from_sums (GstGLShader *shader, const RenderPicture &picture) const
+{
+  const rangecast::Roi &covered = picture.covered;
+  gst_gl_shader_use (shader);
+  bind_textures (shader, sums_, "u_sum");
   gst_gl_shader_set_uniform_4i (shader, "u_part", covered.x, covered.y,
       covered.x + covered.width - 1, covered.y + covered.height - 1);
-  const auto shift = rangecast::depth_shift (
-      picture.clip_from_world, picture.clip_from_world, picture.blend_range_m);
-  gst_gl_shader_set_uniform_3f (shader, "u_shift", shift.a, shift.b, shift.g);
-  gst_gl_shader_set_uniform_1f (shader, "u_outside", outside);
-  gst_gl_shader_set_uniform_1i (shader, "u_reach", rangecast::fill_reach (part.height));
-  set_background_uniforms (shader, picture.background, picture.background_shade, part);
-  draw_covering (gl, array_);
-  for (std::size_t i = targets_.size (); i-- > 0;) { /* they are targets again next time */
-    gl->ActiveTexture (guint (GL_TEXTURE0 + i));
+  set_shift_uniform (shader, picture);
+  gst_gl_shader_set_uniform_1i (shader, "u_reach", rangecast::fill_reach (picture.part.height));
+  set_background_uniforms (shader, picture.background, picture.background_shade, picture.part);
+  draw_covering (context_->gl_vtable, array_);
+  unbind_textures ();
+}
+
+/* Binds colours and depths of a target to two texture units. */
+void
+BlendPainter::bind_textures (GstGLShader *shader, const Target &target, const char *colours) const
+{
+  const GstGLFuncs *gl = context_->gl_vtable;
+  const char *const names[] = {colours, "u_depths"};
+  for (guint i = 0; i < 2; i++) {
+    gl->ActiveTexture (GL_TEXTURE0 + i);
+    gl->BindTexture (GL_TEXTURE_2D, target.textures[i]);
+    gst_gl_shader_set_uniform_1i (shader, names[i], gint (i));
+  }
+}
+
+/* They are rendered to again next time. */
+void
+BlendPainter::unbind_textures () const
+{
+  const GstGLFuncs *gl = context_->gl_vtable;
+  for (guint i = 2; i-- > 0;) {
+    gl->ActiveTexture (GL_TEXTURE0 + i);
     gl->BindTexture (GL_TEXTURE_2D, 0);
   }
-  if (part.width == width_ && part.height == height_)
-    gl->Disable (GL_SCISSOR_TEST);
-  else
-    gl->Scissor (part.x, part.y, part.width, part.height);
 }
 
-/* Replaces the targets if size or precision change. @return false if OpenGL cannot have them:
- * what was bound is bound again */
+/* Enlarges a target, in steps, so that a person who moves does not need new textures in each
+ * picture. @return false if OpenGL cannot have it */
 bool
-BlendPainter::bind_targets (int width, int height, bool precise)
+BlendPainter::prepare (Target &target, int width, int height) const
 {
+  if (target.width >= width && target.height >= height)
+    return !target.failed;
   const GstGLFuncs *gl = context_->gl_vtable;
-  const bool same = width == width_ && height == height_ && precise == precise_;
-  if (same && failed_)
-    return false;
-  gl->GetIntegerv (GL_DRAW_FRAMEBUFFER_BINDING, &output_);
-  if (same) {
-    gl->BindFramebuffer (GL_FRAMEBUFFER, framebuffer_);
-    return true;
-  }
-  failed_ = !make_targets (width, height, precise);
-  width_ = width;
-  height_ = height;
-  precise_ = precise;
-  if (failed_)
-    gl->BindFramebuffer (GL_FRAMEBUFFER, guint (output_));
-  return !failed_;
-}
-
-bool
-BlendPainter::make_targets (int width, int height, bool precise)
-{
-  const GstGLFuncs *gl = context_->gl_vtable;
-  delete_targets ();
+  constexpr int kStep = 128;
+  const auto side = [&] (int pixels, int before) {
+    return std::max (before, std::min ((pixels + kStep - 1) / kStep * kStep, largest_));
+  };
+  gint bound = 0;
+  gl->GetIntegerv (GL_DRAW_FRAMEBUFFER_BINDING, &bound);
+  width = side (width, target.width);
+  height = side (height, target.height);
+  delete_target (target);
+  target.width = width;
+  target.height = height;
   const struct {
     guint internal, format, type, attachment;
   } formats[] = {
-      {guint (precise ? GL_RGBA32F : GL_RGBA16F), GL_RGBA,
-          guint (precise ? GL_FLOAT : GL_HALF_FLOAT), GL_COLOR_ATTACHMENT0},
+      {GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, GL_COLOR_ATTACHMENT0},
       {GL_DEPTH_COMPONENT24, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT, GL_DEPTH_ATTACHMENT},
   };
-  gl->GenFramebuffers (1, &framebuffer_);
-  gl->BindFramebuffer (GL_FRAMEBUFFER, framebuffer_);
-  gl->GenTextures (GLsizei (targets_.size ()), targets_.data ());
-  for (std::size_t i = 0; i < targets_.size (); i++) {
-    gl->BindTexture (GL_TEXTURE_2D, targets_[i]);
-    define_texture (gl, formats[i].internal, width, height, formats[i].format, formats[i].type);
-    gl->FramebufferTexture2D (GL_FRAMEBUFFER, formats[i].attachment, GL_TEXTURE_2D, targets_[i], 0);
+  gl->GenFramebuffers (1, &target.framebuffer);
+  gl->BindFramebuffer (GL_FRAMEBUFFER, target.framebuffer);
+  gl->GenTextures (2, target.textures.data ());
+  for (std::size_t i = 0; i < 2; i++) {
+    const auto &[internal, format, type, attachment] = formats[i];
+    gl->BindTexture (GL_TEXTURE_2D, target.textures[i]);
+    define_texture (gl, internal, width, height, format, type);
+    gl->FramebufferTexture2D (GL_FRAMEBUFFER, attachment, GL_TEXTURE_2D, target.textures[i], 0);
   }
   gl->BindTexture (GL_TEXTURE_2D, 0);
-  return gl->CheckFramebufferStatus (GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+  target.failed = gl->CheckFramebufferStatus (GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE;
+  gl->BindFramebuffer (GL_FRAMEBUFFER, guint (bound));
+  return !target.failed;
 }
 
 void
-BlendPainter::delete_targets ()
+BlendPainter::delete_target (Target &target) const
 {
   const GstGLFuncs *gl = context_->gl_vtable;
-  gl->DeleteFramebuffers (1, &framebuffer_);
-  gl->DeleteTextures (GLsizei (targets_.size ()), targets_.data ());
-  framebuffer_ = 0;
-  targets_ = {};
+  if (target.framebuffer) {
+    gl->DeleteFramebuffers (1, &target.framebuffer);
+    gl->DeleteTextures (2, target.textures.data ());
+  }
+  target = {};
 }

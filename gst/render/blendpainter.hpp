@@ -3,26 +3,27 @@
 
 #include <array>
 #include <span>
+#include <vector>
 
 #include "glhelpers.hpp"
 #include "picture.hpp"
 
 /** Draws frame sets in mode blend: decides which views a pixel shows, and how much of each.
  *
- *  1. Depth: the nearest surface of each pixel, moved back by the blend range.
- *  2. Sum: colour times weight, and weight, of all views in front of that. A view's weight falls
- *     with the angle between its ray and the viewer's; its slant and distance to a depth edge are
- *     in its vertices (lib/rangecast/surface/blend_planes.hpp).
- *  3. Division, with smooth outlines, and small gaps filled.
+ *  1. Each view into a cell of an atlas (lib/rangecast/surface/painting.hpp): colour and weight of
+ *     its nearest surface, and depth. A view's weight falls with the angle between its ray and the
+ *     viewer's; its slant and distance to a depth edge are in its vertices
+ *     (lib/rangecast/surface/blend_planes.hpp).
+ *  2. Sum: colour times weight of the cells that are within the blend range of the nearest one,
+ *     divided by the sum of weights.
+ *  3. The picture, with smooth outlines.
+ *  4. Small gaps are filled, only where pass 3 has found one.
  *
- *  After C. Buehler et al., "Unstructured lumigraph rendering", SIGGRAPH 2001, and M. Zwicker et
- *  al., "Surface splatting", SIGGRAPH 2001. The targets take 12 bytes a pixel (20 if precise),
- *  whatever the number of views. OpenGL 3.3, or OpenGL ES 3.0 with half-float render targets. All
- *  functions on the OpenGL thread. */
+ *  After C. Buehler et al., "Unstructured lumigraph rendering", SIGGRAPH 2001. The targets take 8
+ *  bytes a pixel, and as many for each cell. OpenGL 3.3 or OpenGL ES 3.0. All functions on the
+ *  OpenGL thread. */
 class BlendPainter {
 public:
-  /** Whether OpenGL can render to half-float textures. */
-  static bool is_supported (GstGLContext *context);
   /** Compiles the shaders. @return false, with `error` set, if one does not compile */
   bool start (GstGLContext *context, GError **error);
   /** Deletes everything that OpenGL has of it. */
@@ -33,7 +34,7 @@ public:
   /** Draws one picture of what was uploaded last into the bound framebuffer, whose depth has been
    *  cleared if the picture keeps depth. If the picture does not fill the framebuffer, scissors
    *  keep to its part afterwards.
-   *  @return false if OpenGL has no float framebuffer of the picture's size; nothing is drawn */
+   *  @return false if OpenGL has no framebuffer of the size that it takes; nothing is drawn */
   bool draw (const RenderPicture &picture, std::span<const RenderLayer> layers);
 
 private:
@@ -41,26 +42,36 @@ private:
     guint vertices = 0, array = 0;
     std::size_t capacity = 0; /* of the buffer, bytes */
   };
-  enum Pass { kDepth, kSum, kPasses };
-  bool bind_targets (int width, int height, bool precise);
-  bool make_targets (int width, int height, bool precise);
-  void delete_targets ();
-  void draw_layers (
-      std::span<const RenderLayer> layers, const RenderPicture &picture, Pass pass) const;
-  void divide (const RenderPicture &picture, float outside) const;
+  /* A framebuffer with textures of colours and depth, which grow. */
+  struct Target {
+    guint framebuffer = 0;
+    std::array<guint, 2> textures{};
+    int width = 0, height = 0;
+    bool failed = false; /* with that size */
+  };
+  bool start_picture (const RenderPicture &picture, std::span<const RenderLayer> layers);
+  bool prepare (Target &target, int width, int height) const;
+  void delete_target (Target &target) const;
+  void bind_textures (GstGLShader *shader, const Target &target, const char *colours) const;
+  void unbind_textures () const;
+  void draw_cells (const RenderPicture &picture, std::span<const RenderLayer> layers) const;
+  void draw_layer (const RenderPicture &picture, const RenderLayer &layer) const;
+  void add_up (const RenderPicture &picture) const;
+  void finish (const RenderPicture &picture) const;
+  void cover_from_sums (GstGLShader *shader, const RenderPicture &picture) const;
 
   GstGLContext *context_ = nullptr;
-  bool in_software_ = false; /* llvmpipe: converting half floats costs it a fifth of the time */
-  std::array<GstGLShader *, kPasses> shaders_{};
-  std::array<GstGLShader *, 2> divide_shaders_{}; /* without depth, with it */
-  guint array_ = 0;                               /* of draw_covering() */
+  gint largest_ = 0; /* side of a texture, pixels */
+  GstGLShader *cell_shader_ = nullptr, *fill_shader_ = nullptr;
+  std::array<GstGLShader *, 2> finish_shaders_{};                 /* without depth, with it */
+  std::array<LazyShader, rangecast::kMaxBlendCells> sum_shaders_; /* by number of cells - 1 */
+  guint array_ = 0;                                               /* of draw_covering() */
   /* In turns: OpenGL may still read those of one frame set while the next one is uploaded. */
   std::array<std::array<ViewObjects, rangecast::kMaxViews>, 2> objects_{};
   std::size_t turn_ = 0;
 
-  guint framebuffer_ = 0;
-  std::array<guint, 2> targets_{}; /* textures: sums, depth */
-  int width_ = 0, height_ = 0;
-  bool precise_ = false, failed_ = false; /* with that size */
-  gint output_ = 0;                       /* framebuffer that the picture goes to */
+  Target cells_, sums_;
+  std::vector<double> alignments_;
+  rangecast::BlendAtlas atlas_;
+  gint output_ = 0; /* framebuffer that the picture goes to */
 };

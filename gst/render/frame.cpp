@@ -100,8 +100,6 @@ draw (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool keep, boo
     std::lock_guard guard (priv->lock);
     settings = priv->settings;
   }
-  if (!priv->renderer.can_blend () && settings.strips.mode == rangecast::StripMode::kBlend)
-    settings.strips.mode = rangecast::StripMode::kStrips;
   const GstClockTime running = strip_running_time (self, GST_BUFFER_PTS (out));
   const auto orbit = settings.camera.at (orbit_time (priv, running));
   priv->scene.build (

@@ -245,9 +245,7 @@ gst_strip_render_gl_start (GstGLBaseFilter *filter)
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (filter)->priv;
   g_clear_error (&priv->gl_error);
   try {
-    if (priv->renderer.start (filter->context, &priv->gl_error) && !priv->renderer.can_blend ())
-      GST_WARNING_OBJECT (
-          filter, "OpenGL cannot render to half-float textures: mode blend draws strips");
+    priv->renderer.start (filter->context, &priv->gl_error);
   } catch (const std::exception &error) {
     g_set_error_literal (
         &priv->gl_error, GST_GL_CONTEXT_ERROR, GST_GL_CONTEXT_ERROR_FAILED, error.what ());

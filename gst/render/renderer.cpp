@@ -44,7 +44,6 @@ bool
 Renderer::start (GstGLContext *context, GError **error)
 {
   context_ = context;
-  can_blend_ = BlendPainter::is_supported (context);
   GST_DEBUG_OBJECT (context, "drawing with %s",
       reinterpret_cast<const char *> (context->gl_vtable->GetString (GL_RENDERER)));
   if (painter_.start (context, error))
@@ -156,7 +155,7 @@ Renderer::draw_buffer (Call &call)
   }
   call.result.reason = drawn ? fatal_error (context_->gl_vtable) : "there is no framebuffer for it";
   if (!call.result.reason && !call.has_targets)
-    call.result.reason = "it has no float framebuffer of that size for mode blend";
+    call.result.reason = "it has no framebuffer of the size that mode blend takes";
   call.result.drawn = drawn && !call.result.reason;
   GstGLSyncMeta *sync = gst_buffer_get_gl_sync_meta (call.out);
   if (call.result.drawn && sync) /* other contexts wait there for our commands */

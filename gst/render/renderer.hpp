@@ -30,8 +30,6 @@ public:
   /** @return false if OpenGL has no framebuffer as large as the pictures; `error` names sizes */
   bool set_output (GstGLContext *context, const GstVideoInfo &info, GError **error);
   /** @} */
-  /** Whether mode blend can be drawn, once started. */
-  [[nodiscard]] bool can_blend () const { return can_blend_; }
 
   struct Result {
     bool drawn = false;
@@ -56,7 +54,6 @@ private:
   GstGLContext *context_ = nullptr;
   GstGLFramebuffer *framebuffer_ = nullptr;
   int width_ = 0, height_ = 0;
-  bool can_blend_ = false;
   MultiviewLayout layout_;
   guint64 uploaded_ = 0; /* serial of the scene that OpenGL has; 0: none */
   StripPainter painter_;

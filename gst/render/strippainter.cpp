@@ -58,7 +58,7 @@ StripPainter::start (GstGLContext *context, GError **error)
     return false;
   }
   context->gl_vtable->GetIntegerv (GL_MAX_TEXTURE_SIZE, &largest_);
-  if (BlendPainter::is_supported (context) && !blend_painter_.start (context, error))
+  if (!blend_painter_.start (context, error))
     return false;
   for (std::size_t i = 0; i < shaders_.size (); i++) {
     shaders_[i] = make_shader (context, kVertexShaders[i], Shader::kColourFragment, error);

@@ -45,10 +45,6 @@ class Page {
   constructor (module) {
     this.camera = new Core (module);
     this.renderer = new Renderer (canvas, (number) => this.camera.text (this.camera.call ('rc_shader', number)));
-    if (!this.renderer.canBlend && settings.mode === BLEND) {
-      settings.mode = STRIPS;
-      say ('This browser cannot draw into float textures: views are drawn as strips, not blended.', 'note');
-    }
     this.worker = new Worker ('decoder.js', { type: 'module' });
     this.worker.onmessage = ({ data }) => this[data.type] (data);
     this.worker.onerror = (event) => say (`The decoder could not be started: ${event.message ?? 'its file could not be loaded'}.`);
@@ -151,7 +147,7 @@ class Page {
   }
 
   // show: draws one picture, or one for each eye
-  paint (show = () => this.renderer.draw (this.picture ('rc_camera_picture', canvas.width, canvas.height, 0))) {
+  paint (show = () => this.renderer.draw (this.picture ('rc_camera_picture', canvas.width, canvas.height, this.renderer.largest))) {
     const begin = performance.now (), frame = this.pending;
     this.pending = null;
     try {
@@ -213,8 +209,6 @@ class Page {
     this.draw ();
   }
   toggleMode () {
-    if (!this.renderer.canBlend)
-      return;
     settings.mode = settings.mode === BLEND ? STRIPS : BLEND;
     element ('mode').textContent = settings.mode === BLEND ? 'Blend' : 'Strips';
     this.draw ();

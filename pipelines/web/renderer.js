@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Draws frame sets with WebGL2, as striprender does: its shaders, and numbers from the same code (rc_camera_picture). Knows nothing
-// of streams. What WebGL2 lacks: float targets and their blending are extensions (without EXT_color_buffer_float or _half_float,
-// mode strips is drawn); sums are half floats, so colours of more than 16 views would lose bits.
+// of streams.
 import { BLEND, STRIPS } from './core.js';
 
 // rangecast::Shader
-const COVERING = 0, COLOUR = 1, STRIP = 3, BLEND_DEPTH = 6, BLEND_DEPTH_FRAGMENT = 7, BLEND_SUM = 8, BLEND_SUM_FRAGMENT = 9, DIVIDE = 10;
+const COVERING = 0, COLOUR = 1, STRIP = 3, BLEND_VERTEX = 6, BLEND_FRAGMENT = 7, FILL = 10, SUM = 11;
 // Floats of rc_camera_picture: those of the picture, and of each layer.
 const HEAD = 21, LAYER = 48;
 
@@ -49,18 +48,19 @@ export class Renderer {
   // Also after the browser has lost the context and given it back.
   start () {
     const gl = this.gl;
-    this.canBlend = Boolean (gl.getExtension ('EXT_color_buffer_float') || gl.getExtension ('EXT_color_buffer_half_float'));
-    const program = (vertex, fragment) => new Program (gl, this.shader (vertex), this.shader (fragment));
-    this.depthPass = program (BLEND_DEPTH, BLEND_DEPTH_FRAGMENT);
-    this.sumPass = program (BLEND_SUM, BLEND_SUM_FRAGMENT);
-    this.divide = program (COVERING, DIVIDE);
-    this.strips = program (STRIP, COLOUR);
+    this.blend = this.program (BLEND_VERTEX, BLEND_FRAGMENT);
+    this.finish = this.program (COVERING, FILL);
+    this.sums = []; // by number of cells - 1
+    this.strips = this.program (STRIP, COLOUR);
     this.nothing = gl.createVertexArray ();
     this.objects = new Map (); // by view-id
     this.layers = [];
-    this.targets = null;
+    this.cellTarget = this.newTarget ();
+    this.sumTarget = this.newTarget ();
     this.largest = gl.getParameter (gl.MAX_TEXTURE_SIZE);
   }
+
+  program (vertex, fragment) { return new Program (this.gl, this.shader (vertex), this.shader (fragment)); }
 
   // Takes the layers of a frame set: { id, vertices: Uint8Array, width, height, depth, colour } (planes in mode strips only).
   upload (mode, layers) {
@@ -174,88 +174,128 @@ export class Renderer {
     this.gl.uniform2fv (program.at ('u_behind'), layer.subarray (18 * place + 16, 18 * place + 18));
   }
 
-  makeTargets (width, height) {
-    const gl = this.gl;
-    if (this.targets?.width === width && this.targets.height === height)
+  newTarget () { return { width: 0, height: 0, framebuffer: null, colours: null, depths: null }; }
+
+  // Enlarges a target, in steps, so that a person who moves does not need new textures in each picture.
+  prepare (target, width, height) {
+    const gl = this.gl, step = 128;
+    if (target.width >= width && target.height >= height)
       return;
-    if (this.targets) {
-      gl.deleteFramebuffer (this.targets.framebuffer);
-      gl.deleteTexture (this.targets.sums);
-      gl.deleteTexture (this.targets.depth);
-    }
+    gl.deleteFramebuffer (target.framebuffer);
+    gl.deleteTexture (target.colours);
+    gl.deleteTexture (target.depths);
+    target.width = Math.max (target.width, Math.min (Math.ceil (width / step) * step, this.largest));
+    target.height = Math.max (target.height, Math.min (Math.ceil (height / step) * step, this.largest));
     const texture = (internal, format, type) => {
       const made = gl.createTexture ();
       gl.bindTexture (gl.TEXTURE_2D, made);
-      gl.texImage2D (gl.TEXTURE_2D, 0, internal, width, height, 0, format, type, null);
+      gl.texImage2D (gl.TEXTURE_2D, 0, internal, target.width, target.height, 0, format, type, null);
       this.setNearest ();
       return made;
     };
     gl.activeTexture (gl.TEXTURE0);
-    this.targets = { width, height, framebuffer: gl.createFramebuffer (), sums: texture (gl.RGBA16F, gl.RGBA, gl.HALF_FLOAT),
-      depth: texture (gl.DEPTH_COMPONENT24, gl.DEPTH_COMPONENT, gl.UNSIGNED_INT) };
+    target.framebuffer = gl.createFramebuffer ();
+    target.colours = texture (gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE);
+    target.depths = texture (gl.DEPTH_COMPONENT24, gl.DEPTH_COMPONENT, gl.UNSIGNED_INT);
     gl.bindTexture (gl.TEXTURE_2D, null);
-    gl.bindFramebuffer (gl.FRAMEBUFFER, this.targets.framebuffer);
-    gl.framebufferTexture2D (gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.targets.sums, 0);
-    gl.framebufferTexture2D (gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, this.targets.depth, 0);
+    gl.bindFramebuffer (gl.FRAMEBUFFER, target.framebuffer);
+    gl.framebufferTexture2D (gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.colours, 0);
+    gl.framebufferTexture2D (gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, target.depths, 0);
     if (gl.checkFramebufferStatus (gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE && !gl.isContextLost ())
-      throw new Error ('WebGL2 has no float framebuffer of this size.');
+      throw new Error ('WebGL2 has no framebuffer of this size.');
   }
 
-  // As BlendPainter::draw ().
-  drawBlended (picture, framebuffer, width, height) {
+  bindTextures (program, target, colours) {
     const gl = this.gl;
-    const [x, y, columns, rows] = picture.subarray (8, 12);
-    this.makeTargets (width, height);
-    gl.bindFramebuffer (gl.FRAMEBUFFER, this.targets.framebuffer);
-    gl.enable (gl.SCISSOR_TEST);
-    gl.scissor (x, y, columns, rows);
-    gl.clearColor (0, 0, 0, 0);
-    gl.clear (gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    gl.enable (gl.DEPTH_TEST);
-    gl.depthFunc (gl.LESS);
-    gl.colorMask (false, false, false, false);
-    this.depthPass.use ();
-    this.eachLayer (picture, (layer) => this.setPlace (this.depthPass, layer, 0));
-
-    gl.colorMask (true, true, true, true);
-    gl.depthMask (false);
-    gl.depthFunc (gl.LEQUAL);
-    gl.enable (gl.BLEND);
-    gl.blendFunc (gl.ONE, gl.ONE);
-    gl.frontFace (picture[16] ? gl.CW : gl.CCW);
-    this.sumPass.use ();
-    gl.uniform3fv (this.sumPass.at ('u_weights'), picture.subarray (4, 7));
-    this.eachLayer (picture, (layer) => {
-      this.setPlace (this.sumPass, layer, 1);
-      gl.uniform4fv (this.sumPass.at ('u_lens'), layer.subarray (36, 40));
-      gl.uniform3fv (this.sumPass.at ('u_viewer'), layer.subarray (40, 43));
-      gl.uniform1f (this.sumPass.at ('u_unit'), layer[43]);
-    });
-    gl.disable (gl.BLEND);
-    gl.depthMask (true);
-    gl.frontFace (gl.CCW);
-    gl.disable (gl.DEPTH_TEST);
-
-    gl.bindFramebuffer (gl.FRAMEBUFFER, framebuffer);
-    this.divide.use ();
-    for (const [unit, name, texture] of [[0, 'u_sum', this.targets.sums], [1, 'u_depth', this.targets.depth]]) {
+    [[colours, target.colours], ['u_depths', target.depths]].forEach (([name, texture], unit) => {
       gl.activeTexture (gl.TEXTURE0 + unit);
       gl.bindTexture (gl.TEXTURE_2D, texture);
-      gl.uniform1i (this.divide.at (name), unit);
+      gl.uniform1i (program.at (name), unit);
+    });
+  }
+  // They are rendered to again next time.
+  unbindTextures () {
+    for (const unit of [1, 0]) {
+      this.gl.activeTexture (this.gl.TEXTURE0 + unit);
+      this.gl.bindTexture (this.gl.TEXTURE_2D, null);
     }
-    gl.uniform4i (this.divide.at ('u_part'), x, y, x + columns - 1, y + rows - 1);
-    gl.uniform3fv (this.divide.at ('u_shift'), picture.subarray (12, 15));
-    gl.uniform1f (this.divide.at ('u_outside'), picture[7]);
-    gl.uniform1i (this.divide.at ('u_reach'), picture[15]);
-    gl.uniform4fv (this.divide.at ('u_background'), picture.subarray (0, 4));
-    gl.uniform3f (this.divide.at ('u_shade'), 0, height, 0);
-    gl.bindVertexArray (this.nothing);
-    gl.drawArrays (gl.TRIANGLES, 0, 3);
-    gl.bindVertexArray (null);
-    for (const unit of [1, 0]) { // they are targets again next time
-      gl.activeTexture (gl.TEXTURE0 + unit);
-      gl.bindTexture (gl.TEXTURE_2D, null);
-    }
+  }
+  cover () {
+    this.gl.bindVertexArray (this.nothing);
+    this.gl.drawArrays (this.gl.TRIANGLES, 0, 3);
+    this.gl.bindVertexArray (null);
+  }
+
+  // As BlendPainter::draw (); the framebuffer has been cleared.
+  drawBlended (picture, framebuffer, width, height) {
+    const gl = this.gl, [count, columns, rows] = picture.subarray (4, 7);
+    if (count === 0)
+      return;
+    this.prepare (this.cellTarget, columns, rows);
+    this.prepare (this.sumTarget, width, height);
+    gl.enable (gl.DEPTH_TEST);
+    gl.enable (gl.SCISSOR_TEST);
+    const cells = this.drawCells (picture, width, height, columns, rows);
+    gl.viewport (0, 0, width, height);
+    gl.depthFunc (gl.ALWAYS);
+    this.addUp (picture, cells, count);
+    gl.disable (gl.DEPTH_TEST);
+    gl.bindFramebuffer (gl.FRAMEBUFFER, framebuffer);
+    this.finishPicture (picture, height);
+  }
+
+  // Returns what leads from a pixel of the picture to each cell.
+  drawCells (picture, width, height, columns, rows) {
+    const gl = this.gl, cells = new Int32Array (16), [x, y, coveredColumns, coveredRows] = picture.subarray (8, 12);
+    gl.bindFramebuffer (gl.FRAMEBUFFER, this.cellTarget.framebuffer);
+    gl.scissor (0, 0, columns, rows);
+    gl.clearColor (0, 0, 0, 0);
+    gl.clear (gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.depthFunc (gl.LESS);
+    gl.frontFace (picture[16] ? gl.CW : gl.CCW);
+    this.blend.use ();
+    this.layers.forEach ((_, i) => {
+      const at = HEAD + LAYER * i + 18;
+      cells.set (picture.subarray (at + 1, at + 3), 2 * picture[at]);
+    });
+    this.eachLayer (picture, (layer) => {
+      const [, right, down] = layer.subarray (18, 21);
+      gl.viewport (right, down, width, height);
+      gl.scissor (x + right, y + down, coveredColumns, coveredRows);
+      this.setPlace (this.blend, layer, 0);
+      gl.uniform4fv (this.blend.at ('u_lens'), layer.subarray (36, 40));
+      gl.uniform3fv (this.blend.at ('u_viewer'), layer.subarray (40, 43));
+      gl.uniform1f (this.blend.at ('u_unit'), layer[43]);
+    });
+    gl.frontFace (gl.CCW);
+    return cells;
+  }
+
+  addUp (picture, cells, count) {
+    const gl = this.gl;
+    gl.bindFramebuffer (gl.FRAMEBUFFER, this.sumTarget.framebuffer);
+    gl.scissor (...picture.subarray (8, 12));
+    const program = this.sums[count - 1] ??= this.program (COVERING, SUM + count - 1);
+    program.use ();
+    this.bindTextures (program, this.cellTarget, 'u_colours');
+    gl.uniform2iv (program.at ('u_cells'), cells.subarray (0, 2 * count));
+    gl.uniform3fv (program.at ('u_shift'), picture.subarray (12, 15));
+    this.cover ();
+    this.unbindTextures ();
+  }
+
+  // In one pass: SwiftShader takes longer for two, of which depth tests would spare it most of the second.
+  finishPicture (picture, height) {
+    const gl = this.gl, program = this.finish, [x, y, columns, rows] = picture.subarray (8, 12);
+    program.use ();
+    this.bindTextures (program, this.sumTarget, 'u_sum');
+    gl.uniform4i (program.at ('u_part'), x, y, x + columns - 1, y + rows - 1);
+    gl.uniform3fv (program.at ('u_shift'), picture.subarray (12, 15));
+    gl.uniform1i (program.at ('u_reach'), picture[15]);
+    gl.uniform4fv (program.at ('u_background'), picture.subarray (0, 4));
+    gl.uniform3f (program.at ('u_shade'), 0, height, 0);
+    this.cover ();
+    this.unbindTextures ();
   }
 
   // As StripPainter::draw ().

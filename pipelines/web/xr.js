@@ -48,7 +48,7 @@ export class Headset {
       const { x, y, width: columns, height: rows } = layer.getViewport (view);
       const matrix = product (view.projectionMatrix, view.transform.inverse.matrix);
       camera.input (new Uint8Array (matrix.buffer));
-      renderer.draw (this.page.picture ('rc_camera_eye', width, height, x, y, columns, rows, 0), { framebuffer, width, height, part: [x, y, columns, rows] });
+      renderer.draw (this.page.picture ('rc_camera_eye', width, height, x, y, columns, rows, renderer.largest), { framebuffer, width, height, part: [x, y, columns, rows] });
     }
   }
 }

@@ -10,19 +10,33 @@ namespace {
 /* By which insides move back, metres. */
 constexpr double kInsideGap_m = 0.015;
 
-/* The largest weight: half floats (up to 65504) hold the sum of four surfaces of each view. The
- * smallest weight is a share of it. */
-constexpr float kMaxWeight = 1000, kMaxSum = 64000, kMinShare = 2e-6f;
+/* 8 bytes each. */
+constexpr std::int64_t kMaxAtlasPixels = std::int64_t{1} << 25;
 
 } // namespace
 
-BlendWeights
-blend_weights (std::size_t rig_views, bool precise)
+void
+make_blend_atlas (
+    std::span<const double> alignments, const Roi &covered, int max_side, BlendAtlas &to)
 {
-  const auto n = static_cast<float> (std::max<std::size_t> (rig_views, 1));
-  const float max = precise ? kMaxWeight : std::min (kMaxWeight, kMaxSum / (4 * n)),
-              min = kMinShare * max;
-  return {max, min, min / (2.5f * n)};
+  const std::int64_t pixels = std::int64_t{covered.width} * covered.height;
+  const int columns = max_side / covered.width, rows = max_side / covered.height;
+  const auto fitting = static_cast<std::size_t> (std::max<std::int64_t> (
+      std::min (std::int64_t{columns} * rows, kMaxAtlasPixels / pixels), 1));
+  to.cells = std::min ({alignments.size (), kMaxBlendCells, fitting});
+  const int count = static_cast<int> (to.cells), used = std::min (count, columns);
+  to.width = used * covered.width;
+  to.height = (count + used - 1) / std::max (used, 1) * covered.height;
+  for (int i = 0; i < count; i++)
+    to.from_picture[static_cast<std::size_t> (i)] = {
+        i % used * covered.width - covered.x, i / used * covered.height - covered.y};
+  to.cell_of.resize (alignments.size ());
+  for (std::size_t i = 0; i < alignments.size (); i++) {
+    std::size_t rank = 0;
+    for (std::size_t k = 0; k < alignments.size (); k++)
+      rank += alignments[k] > alignments[i] || (alignments[k] == alignments[i] && k < i);
+    to.cell_of[i] = std::min (rank, to.cells - 1);
+  }
 }
 
 LayerPlace
@@ -33,15 +47,9 @@ place_layer (const Mat4 &clip_from_pixel, const Mat4 &clip_from_world, double ga
 }
 
 double
-sum_pass_gap (const Mat4 &clip_from_world, const View &view)
+inside_gap (const Mat4 &clip_from_world, const View &view)
 {
   return kInsideGap_m * std::clamp (-2 * view_alignment (clip_from_world, view), 0.0, 1.0);
-}
-
-double
-depth_pass_gap (const Mat4 &clip_from_world, const View &view, double blend_range_m)
-{
-  return blend_range_m + sum_pass_gap (clip_from_world, view);
 }
 
 double

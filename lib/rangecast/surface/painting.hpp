@@ -2,8 +2,12 @@
 /* The numbers that the shaders of shaders.hpp take, for painters in OpenGL and WebGL2. */
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <span>
+#include <vector>
 
+#include "shaders.hpp"
 #include "surface_scene.hpp"
 #include "view_matrices.hpp"
 
@@ -17,18 +21,22 @@ inline constexpr double kBlendRange_m = 0.02;
 /** The background, sRGB, 0xRRGGBB. */
 inline constexpr unsigned kBackgroundColour = 0x20242a;
 
-/** Up to so many views half floats keep 8 bits of colour: each addition is rounded to 11 bits. */
-inline constexpr std::size_t kMaxHalfFloatViews = 16;
-
-/** u_weights of pass 2. The inside of a surface weighs so little that the sum tells a pixel in
- *  which all views show an inside from one in which a view shows an outside. */
-struct BlendWeights {
-  float max, min, inside;
-  /** Minimum weight of an outside, less rounding: u_outside of pass 3. */
-  [[nodiscard]] float outside () const { return 0.9f * min; }
+/** Mode kBlend, pass 1: each view is drawn into a cell of one framebuffer of its own. Cells are as
+ *  large as the part of the picture that may be covered. With more views than cells, those that
+ *  look least as the viewer does share the last one, where the nearest surface counts. */
+struct BlendAtlas {
+  int width = 0, height = 0; ///< of all cells together
+  std::size_t cells = 0;
+  std::array<std::array<int, 2>, kMaxBlendCells> from_picture{}; ///< what leads from a pixel of
+                                                                 ///< the picture to a cell's
+  std::vector<std::size_t> cell_of;                              ///< by number of the layer
 };
-/** @param precise  the sums are floats of 32 bits, not 16 */
-BlendWeights blend_weights (std::size_t rig_views, bool precise);
+/** @param alignments   view_alignment() of each layer
+ *  @param covered      part of the picture, not empty
+ *  @param max_side     of a texture, pixels; at least those of `covered`
+ *  @param[out] to      replaced; keeps its memory */
+void make_blend_atlas (
+    std::span<const double> alignments, const Roi &covered, int max_side, BlendAtlas &to);
 
 /** Where a layer is drawn: u_clip_from_pixel and u_behind. */
 struct LayerPlace {
@@ -37,16 +45,15 @@ struct LayerPlace {
 };
 LayerPlace place_layer (const Mat4 &clip_from_pixel, const Mat4 &clip_from_world, double gap_m);
 
-/** Metres by which pass 1 and pass 2 of mode kBlend move a view's surfaces away from the viewer.
- *  Views that look against the viewer show the inside of surfaces, which fills holes, but must not
- *  hide an outside a little behind it. */
-double depth_pass_gap (const Mat4 &clip_from_world, const View &view, double blend_range_m);
-double sum_pass_gap (const Mat4 &clip_from_world, const View &view);
+/** Metres by which mode kBlend moves a view's surfaces away from the viewer. Views that look
+ * against the viewer show the inside of surfaces, which fills holes, but must not hide an outside a
+ * little behind it. */
+double inside_gap (const Mat4 &clip_from_world, const View &view);
 /** The same in the other modes. Where two views see one surface, the one that looks more as the
  *  viewer does is in front: it has more pixels there, and noise must not let both show. */
 double strip_gap (const Mat4 &clip_from_world, const View &view, double view_gap_m);
 
-/** The angle between a view's ray and the viewer's: u_lens, u_viewer and u_unit of pass 2. */
+/** The angle between a view's ray and the viewer's: u_lens, u_viewer and u_unit of pass 1. */
 struct LayerAngles {
   float lens[4];   ///< principal point in the ROI, 1 / focal lengths; pixels
   float viewer[3]; ///< in the view's camera coordinates, metres

@@ -127,83 +127,106 @@ void main ()
 
 /* ---- mode kBlend ---- */
 
+/* Fourth roots of weights, from 0 to 1, fit into 8 bits. The inside of a surface weighs so little
+ * that a sum tells a pixel in which all views show an inside from one in which a view shows an
+ * outside. */
+const char *const kBlendWeights = R"(
+precision highp float;
+const float kInside = 1.0 / 255.0, kMinOutside = 10.0 / 255.0;
+float weight_of (float root)
+{
+  return root * root * root * root;
+}
+)";
+
 const char *const kBlendVertex = R"(
 layout (location = 0) in vec2 a_place; /* quarters of a pixel */
 layout (location = 1) in float a_depth;
-invariant gl_Position; /* in both passes */
-#if SUM
+layout (location = 2) in vec4 a_colour; /* and the square root of the weight */
 uniform float u_unit;
 uniform vec4 u_lens; /* principal point in the ROI, 1 / focal lengths; pixels */
 uniform vec3 u_viewer; /* in the view's camera coordinates, metres */
-layout (location = 2) in vec4 a_colour; /* and the square root of the weight */
 out vec4 v_colour;
 const float kMinAngle = 0.03; /* square root of the minimum weight; the cosine's power is 6 */
-#endif
 void main ()
 {
   vec2 at = 0.25 * a_place;
   gl_Position = clip_position (at, a_depth);
-#if SUM
   vec3 ray = vec3 ((at - u_lens.xy) * u_lens.zw, 1.0);
   float along = dot (normalize (ray), normalize (ray * a_depth * u_unit - u_viewer));
-  v_colour = vec4 (a_colour.rgb, a_colour.a * max (along * along * along, kMinAngle));
-#endif
+  float root = a_colour.a * max (along * along * along, kMinAngle);
+  v_colour = vec4 (a_colour.rgb, max (sqrt (root), kMinOutside));
 }
 )";
 
 const char *const kBlendFragment = R"(
-precision highp float;
-#if SUM
 in vec4 v_colour;
-uniform vec3 u_weights; /* maximum, minimum, inside */
-out vec4 sum;
-#endif
+out vec4 fragment;
 void main ()
 {
-#if SUM
-  float weight = gl_FrontFacing ? max (v_colour.a * v_colour.a * u_weights.x, u_weights.y) : u_weights.z;
-  sum = vec4 (v_colour.rgb * weight, weight);
-#endif
+  fragment = vec4 (v_colour.rgb, gl_FrontFacing ? v_colour.a : kInside);
 }
 )";
 
-/* Outlines are smoothed over the four neighbours, which also closes cracks of one pixel between
- * what two views draw. Where no camera saw the outside of a surface, so that the inside of one
- * behind shows through (beside a nose, round glasses), small gaps take the colours around them,
- * from the farther surfaces: what a nearer one hides is theirs. */
-const char *const kDivideFragment = R"(
+/* Adds up, of each pixel, the colours of all cells that are within the blend range. */
+const char *const kSumFragment = R"(
 precision highp int;
 precision highp sampler2D;
-uniform sampler2D u_sum; /* R, G, B times weight; weight */
-uniform sampler2D u_depth;
+uniform sampler2D u_colours;
+uniform sampler2D u_depths;
+uniform ivec2 u_cells[CELLS]; /* from a pixel of the picture to that of a cell */
+uniform vec3 u_shift; /* a, b, g of DepthShift */
+out vec4 fragment; /* and the fourth root of the mean weight */
+void main ()
+{
+  ivec2 at = ivec2 (gl_FragCoord.xy);
+  float depths[CELLS], nearest = 1.0;
+  for (int i = 0; i < CELLS; i++) { /* without loops at run time, which cost software a multiple */
+    depths[i] = texelFetch (u_depths, at + u_cells[i], 0).r;
+    nearest = min (nearest, depths[i]);
+  }
+  float distance = u_shift.y / (2.0 * nearest - 1.0 - u_shift.x);
+  float farthest = 0.5 + 0.5 * (u_shift.x + u_shift.y / (distance + u_shift.z));
+  vec4 sum = vec4 (0.0);
+  for (int i = 0; i < CELLS; i++) {
+    if (depths[i] < 1.0 && depths[i] <= farthest) {
+      vec4 texel = texelFetch (u_colours, at + u_cells[i], 0);
+      sum += weight_of (texel.a) * vec4 (texel.rgb, 1.0);
+    }
+  }
+  float root = sqrt (sqrt (sum.a / float (CELLS)));
+  fragment = sum.a > 0.0 ? vec4 (sum.rgb / sum.a, max (root, kInside)) : vec4 (0.0);
+  gl_FragDepth = nearest;
+}
+)";
+
+/* Without FILL, gaps stay as they are, and are marked in the depth buffer. Outlines are smoothed
+ * over the four neighbours, which also closes cracks of one pixel between what two views draw.
+ * Where no camera saw the outside of a surface, so that the inside of one behind shows through
+ * (beside a nose, round glasses), small gaps take the colours around them, from the farther
+ * surfaces: what a nearer one hides is theirs. */
+const char *const kFinishFragment = R"(
+precision highp int;
+precision highp sampler2D;
+uniform sampler2D u_sum; /* colours, fourth roots of weights */
+uniform sampler2D u_depths;
 uniform vec3 u_shift; /* a, b, g of DepthShift */
 uniform ivec4 u_part; /* first and last pixel */
-uniform float u_outside; /* minimum weight of an outside, less rounding */
 uniform int u_reach; /* pixels: wider gaps are not filled */
 out vec4 fragment;
+/* Minimum of an outside of which no cell but one of eight has anything, less rounding. */
+const float kOutside = 0.5 * kMinOutside;
+#if FILL
 float distance_at (ivec2 at)
 {
-  return u_shift.y / (2.0 * texelFetch (u_depth, at, 0).r - 1.0 - u_shift.x) - u_shift.z;
+  return u_shift.y / (2.0 * texelFetch (u_depths, at, 0).r - 1.0 - u_shift.x);
 }
-/* The first outside in a direction, and how many steps away; 0: none within reach. */
-int trace (ivec2 at, ivec2 step, out vec4 outside)
+/* How many steps away the first outside in a direction is; 0: none within reach. */
+int trace (ivec2 at, ivec2 step)
 {
-  outside = vec4 (0.0);
-  int last = 0;
-  for (int r = 1; r <= u_reach; r += 1 + r / 4) {
-    outside = texelFetch (u_sum, clamp (at + r * step, u_part.xy, u_part.zw), 0);
-    if (outside.a >= u_outside) {
-      for (int back = r - 1; back > last; back--) { /* the strides grow */
-        vec4 nearer = texelFetch (u_sum, clamp (at + back * step, u_part.xy, u_part.zw), 0);
-        if (nearer.a < u_outside)
-          break;
-        outside = nearer;
-        r = back;
-      }
+  for (int r = 1; r <= u_reach; r++)
+    if (texelFetch (u_sum, clamp (at + r * step, u_part.xy, u_part.zw), 0).a >= kOutside)
       return r;
-    }
-    last = r;
-  }
   return 0;
 }
 ivec2 direction (int k) /* 0 to 7; k and 7 - k are opposite */
@@ -216,37 +239,46 @@ ivec2 direction (int k) /* 0 to 7; k and 7 - k are opposite */
 vec4 fill (ivec2 at)
 {
   const float kSameSurface = 0.02; /* metres */
-  vec4 outside;
+  ivec4 there, opposite;
   float farthest = 0.0;
   int widest = 0;
   for (int k = 0; k < 4; k++) {
-    int there = trace (at, direction (k), outside), opposite = trace (at, direction (7 - k), outside);
-    if (there == 0 || opposite == 0)
+    there[k] = trace (at, direction (k));
+    opposite[k] = trace (at, direction (7 - k));
+    if (there[k] == 0 || opposite[k] == 0)
       return vec4 (0.0);
-    widest = max (widest, there + opposite);
-    farthest = max (farthest, max (distance_at (at + there * direction (k)),
-                                  distance_at (at + opposite * direction (7 - k))));
+    widest = max (widest, there[k] + opposite[k]);
+    farthest = max (farthest, max (distance_at (at + there[k] * direction (k)),
+                                  distance_at (at + opposite[k] * direction (7 - k))));
   }
   float share = clamp (2.0 - 2.0 * float (widest) / float (u_reach), 0.0, 1.0);
   if (share <= 0.0)
     return vec4 (0.0);
   vec4 sum = vec4 (0.0);
   for (int k = 0; k < 8; k++) {
-    ivec2 way = trace (at, direction (k), outside) * direction (k);
+    ivec2 way = (k < 4 ? there[k] : opposite[7 - k]) * direction (k);
     if (distance_at (at + way) > farthest - kSameSurface)
-      sum += vec4 (outside.rgb / outside.a, 1.0) / float (way.x * way.x + way.y * way.y);
+      sum += vec4 (texelFetch (u_sum, at + way, 0).rgb, 1.0) / float (way.x * way.x + way.y * way.y);
   }
   return vec4 (sum.rgb / sum.a, share);
+}
+#endif
+/* Colour times weight, and weight. */
+vec4 weighted (ivec2 at)
+{
+  vec4 texel = texelFetch (u_sum, at, 0);
+  float weight = weight_of (texel.a);
+  return vec4 (texel.rgb * weight, weight);
 }
 void main ()
 {
   vec4 ground = background (gl_FragCoord.xy);
   ivec2 at = ivec2 (gl_FragCoord.xy), first = u_part.xy, last = u_part.zw;
-  vec4 sum = texelFetch (u_sum, at, 0);
-  vec4 west = texelFetch (u_sum, ivec2 (max (at.x - 1, first.x), at.y), 0);
-  vec4 east = texelFetch (u_sum, ivec2 (min (at.x + 1, last.x), at.y), 0);
-  vec4 north = texelFetch (u_sum, ivec2 (at.x, max (at.y - 1, first.y)), 0);
-  vec4 south = texelFetch (u_sum, ivec2 (at.x, min (at.y + 1, last.y)), 0);
+  vec4 sum = weighted (at);
+  vec4 west = weighted (ivec2 (max (at.x - 1, first.x), at.y));
+  vec4 east = weighted (ivec2 (min (at.x + 1, last.x), at.y));
+  vec4 north = weighted (ivec2 (at.x, max (at.y - 1, first.y)));
+  vec4 south = weighted (ivec2 (at.x, min (at.y + 1, last.y)));
   vec4 weights = vec4 (west.a, east.a, north.a, south.a);
   float covered = dot (vec4 (greaterThan (weights, vec4 (0.0))), vec4 (1.0));
   /* a pixel that is drawn: from 1/2 where none beside it is; one that is not: up to 1/2, or a crack */
@@ -256,17 +288,20 @@ void main ()
     sum = west + east + north + south;
     heaviest = max (max (west.a, east.a), max (north.a, south.a));
   }
-  if (heaviest > 0.0 && heaviest < u_outside) {
+  bool is_gap = heaviest > 0.0 && heaviest < weight_of (kOutside);
+#if FILL
+  if (is_gap) {
     vec4 filled = fill (at);
     sum = vec4 (mix (sum.rgb / sum.a, filled.rgb, filled.a), 1.0);
   }
-#if WITH_DEPTH
-  float depth = texelFetch (u_depth, at, 0).r, distance = distance_at (at);
-  gl_FragDepth = depth < 1.0 ? 0.5 + 0.5 * (u_shift.x + u_shift.y / distance) : 1.0;
+#elif WITH_DEPTH
+  gl_FragDepth = texelFetch (u_depths, at, 0).r;
+#else
+  gl_FragDepth = is_gap ? 1.0 : 0.0;
 #endif
   float behind = (1.0 - coverage) * ground.a;
   float alpha = coverage + behind;
-  vec3 colour = coverage * sum.rgb / max (sum.a, 1e-7) + behind * ground.rgb;
+  vec3 colour = coverage * sum.rgb / max (sum.a, 1e-15) + behind * ground.rgb;
   fragment = alpha > 0.0 ? vec4 (colour / alpha, alpha) : ground;
 }
 )";
@@ -279,12 +314,18 @@ strip_vertex_shader (bool with_offsets, bool both_sides)
          std::to_string (both_sides) + "\n" + kClipPosition + kStripVertex;
 }
 
+std::string
+finish_shader (bool fill, bool with_depth)
+{
+  return "#define FILL " + std::to_string (fill) + "\n#define WITH_DEPTH " +
+         std::to_string (with_depth) + kBackgroundFunction + kBlendWeights + kFinishFragment;
+}
+
 } // namespace
 
 std::string
 shader_source (Shader shader)
 {
-  const std::string depth_pass = "#define SUM 0", sum_pass = "#define SUM 1";
   switch (shader) {
     case Shader::kCoveringVertex:
       return kCoveringVertex;
@@ -298,20 +339,21 @@ shader_source (Shader shader)
       return strip_vertex_shader (true, true);
     case Shader::kPointVertex:
       return strip_vertex_shader (false, false);
-    case Shader::kBlendDepthVertex:
-      return depth_pass + kClipPosition + kBlendVertex;
-    case Shader::kBlendDepthFragment:
-      return depth_pass + kBlendFragment;
-    case Shader::kBlendSumVertex:
-      return sum_pass + kClipPosition + kBlendVertex;
-    case Shader::kBlendSumFragment:
-      return sum_pass + kBlendFragment;
-    case Shader::kDivideFragment:
-      return std::string ("#define WITH_DEPTH 0") + kBackgroundFunction + kDivideFragment;
-    case Shader::kDivideDepthFragment:
-      return std::string ("#define WITH_DEPTH 1") + kBackgroundFunction + kDivideFragment;
+    case Shader::kBlendVertex:
+      return std::string (kBlendWeights) + kClipPosition + kBlendVertex;
+    case Shader::kBlendFragment:
+      return std::string (kBlendWeights) + kBlendFragment;
+    case Shader::kFinishFragment:
+      return finish_shader (false, false);
+    case Shader::kFinishDepthFragment:
+      return finish_shader (false, true);
+    case Shader::kFillFragment:
+      return finish_shader (true, false);
+    case Shader::kSumFragment:
+      break;
   }
-  return {};
+  const int cells = static_cast<int> (shader) - static_cast<int> (Shader::kSumFragment) + 1;
+  return "#define CELLS " + std::to_string (cells) + kBlendWeights + kSumFragment;
 }
 
 } // namespace rangecast

@@ -3,26 +3,38 @@
  * line that says the version. The numbers that it takes: painting.hpp. */
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 namespace rangecast {
 
 /** Shaders, each of one stage. */
-enum class Shader {
+enum class Shader : unsigned {
   kCoveringVertex,     ///< three vertices without attributes that cover the viewport
   kColourFragment,     ///< the colour of v_colour
   kBackgroundFragment, ///< background-shade
   kStripVertex,        ///< StripVertex of mode kStrips
   kRectangleVertex,    ///< of mode kRectangles
   kPointVertex,        ///< of mode kPoints
-  kBlendDepthVertex,   ///< BlendVertex, pass 1: depth
-  kBlendDepthFragment,
-  kBlendSumVertex, ///< pass 2: colour times weight
-  kBlendSumFragment,
-  kDivideFragment,      ///< pass 3: the picture
-  kDivideDepthFragment, ///< the same, with depth
+  kBlendVertex,        ///< BlendVertex, pass 1: each view into its cell
+  kBlendFragment,
+  kFinishFragment,      ///< pass 3: the picture; depth is 1 where pass 4 is needed, else 0
+  kFinishDepthFragment, ///< the same, with the surfaces' depth
+  kFillFragment,        ///< pass 4: the picture with small gaps filled
+  kSumFragment,         ///< pass 2: colours of one cell added up by weight; see sum_shader()
 };
-inline constexpr int kShaders = 12;
+
+/** Greatest number of cells that pass 2 of mode kBlend adds up. */
+inline constexpr std::size_t kMaxBlendCells = 8;
+inline constexpr std::size_t kShaders =
+    static_cast<std::size_t> (Shader::kSumFragment) + kMaxBlendCells;
+
+/** The fragment shader of pass 2 for so many cells, from 1. */
+constexpr Shader
+sum_shader (std::size_t cells)
+{
+  return static_cast<Shader> (static_cast<std::size_t> (Shader::kSumFragment) + cells - 1);
+}
 
 /** The source of a shader. */
 std::string shader_source (Shader shader);

@@ -20,12 +20,13 @@ SurfaceScene::set_rig (const Rig &rig)
   complete_ = false;
 }
 
-/* The views, by number of their image, that look against the viewer while another one does not. */
+/* The views, by number of their image, that look against the viewer or past them while another one
+ * looks as the viewer does. */
 std::uint64_t
 SurfaceScene::views_against (
     std::span<const RangeImage> images, const SurfaceSettings &settings, const Orbit &orbit) const
 {
-  constexpr double kAgainst = -0.2; /* cosine between both directions */
+  constexpr double kAgainst = 0.1, kAlong = 0.5; /* cosine between both directions */
   if (settings.strips.mode != StripMode::kBlend)
     return 0;
   const auto matrix = orbit_matrices (frame_, orbit, 1, false).clip_from_world;
@@ -34,7 +35,7 @@ SurfaceScene::views_against (
   for (std::size_t i = 0; i < images.size (); i++) {
     const double along = view_alignment (matrix, *rig_->find (images[i].view_id));
     against |= std::uint64_t (along < kAgainst) << i;
-    any_along = any_along || along > -kAgainst;
+    any_along = any_along || along > kAlong;
   }
   return any_along ? against : 0;
 }

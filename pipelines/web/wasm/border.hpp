@@ -26,7 +26,7 @@
 namespace web {
 
 inline constexpr std::size_t kMaxMemory = std::size_t{512} << 20;
-/** Greatest number of views of a rig: pictures are added up in half floats. */
+/** Greatest number of views of a rig. */
 inline constexpr std::size_t kMaxViews = 16;
 /** Greatest width and height of a view, pixels: that of rangecast::build_strips(). */
 inline constexpr int kMaxSide = 8192;

@@ -136,27 +136,23 @@ write (std::vector<float> &to, const rangecast::LayerPlace &place)
   to.insert (to.end (), std::begin (place.behind), std::end (place.behind));
 }
 
-/* In mode blend: places of both passes, angles. In mode strips: places of fronts and backs, whose
- * depths share the depth buffer if backs are drawn. */
+/* Places of a layer in mode strips: of fronts and of backs, whose depths share the depth buffer if
+ * backs are drawn. */
 void
-write_layer (std::vector<float> &to, const Layer &layer, const Mat4 &clip_from_world, bool blends,
-    bool backs)
+write_strip_places (
+    std::vector<float> &to, const Layer &layer, const Mat4 &clip_from_world, bool backs)
+{
+  const Mat4 matrix = rangecast::clip_from_pixel (clip_from_world, layer.view, layer.roi);
+  const double gap_m = rangecast::strip_gap (clip_from_world, layer.view, rangecast::kViewGap_m);
+  for (const bool back : {false, true})
+    write (to, rangecast::place_layer (backs ? rangecast::in_half_of_depths (matrix, back) : matrix,
+                   clip_from_world, gap_m));
+}
+
+void
+write_angles (std::vector<float> &to, const Layer &layer, const Mat4 &clip_from_world)
 {
   const View &view = layer.view;
-  const Mat4 matrix = rangecast::clip_from_pixel (clip_from_world, view, layer.roi);
-  if (blends) {
-    const double depth_gap_m =
-        rangecast::depth_pass_gap (clip_from_world, view, rangecast::kBlendRange_m);
-    write (to, rangecast::place_layer (matrix, clip_from_world, depth_gap_m));
-    write (to, rangecast::place_layer (
-                   matrix, clip_from_world, rangecast::sum_pass_gap (clip_from_world, view)));
-  } else {
-    const double gap_m = rangecast::strip_gap (clip_from_world, view, rangecast::kViewGap_m);
-    for (const bool back : {false, true})
-      write (
-          to, rangecast::place_layer (backs ? rangecast::in_half_of_depths (matrix, back) : matrix,
-                  clip_from_world, gap_m));
-  }
   const rangecast::LayerAngles angles = rangecast::layer_angles (clip_from_world, view, layer.roi);
   to.insert (to.end (), std::begin (angles.lens), std::end (angles.lens));
   to.insert (to.end (), std::begin (angles.viewer), std::end (angles.viewer));
@@ -164,31 +160,53 @@ write_layer (std::vector<float> &to, const Layer &layer, const Mat4 &clip_from_w
                  double (view.id)});
 }
 
-/** An array of floats: background R, G, B, A; weights max, min, inside, outside; the part of the
+/** An array of floats: background R, G, B, A; the atlas: cells, width, height, 0; the part of the
  *  framebuffer that may be covered (x, y, width, height); depth shift a, b, g; reach; whether it
- *  mirrors; whether backs are drawn; mode; depth step; number of layers. For each layer two places
- *  (matrix 16, behind 2), lens (4), viewer (3), unit, fx, ROI width and height, view-id */
+ *  mirrors; whether backs are drawn; mode; depth step; number of layers. For each layer: in mode
+ *  strips two places (matrix 16, behind 2); in mode blend one, number of the cell, what leads to it
+ *  from a pixel of the picture (x, y), 15 zeros; then lens (4), viewer (3), unit, fx, ROI width and
+ *  height, view-id
+ *  @param max_side  of a texture, pixels */
 void
 write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from_world, int width,
-    int height, const Roi &part, bool precise)
+    int height, const Roi &part, int max_side)
 {
+  static rangecast::BlendAtlas atlas;
+  static std::vector<double> alignments;
   const bool blends = scene.mode == rangecast::StripMode::kBlend;
-  const auto weights = rangecast::blend_weights (scene.rig_views, precise);
   const Roi covered = rangecast::covered_part (clip_from_world, scene.hull, width, height, part);
   const auto shift =
       rangecast::depth_shift (clip_from_world, clip_from_world, rangecast::kBlendRange_m);
   const bool backs = !blends && scene.rig_views == 1;
   constexpr unsigned colour = rangecast::kBackgroundColour;
+  alignments.clear ();
+  for (const Layer &layer : scene.layers)
+    alignments.push_back (rangecast::view_alignment (clip_from_world, layer.view));
+  const bool any = blends && !covered.empty () && !alignments.empty ();
+  if (any)
+    rangecast::make_blend_atlas (alignments, covered, std::max ({max_side, width, height}), atlas);
   to.clear ();
   write (to, {(colour >> 16) / 255.0, (colour >> 8 & 255) / 255.0, (colour & 255) / 255.0, 1});
-  write (to, {weights.max, weights.min, weights.inside, weights.outside ()});
+  write (to, {any ? double (atlas.cells) : 0, double (atlas.width), double (atlas.height), 0});
   write (to,
       {double (covered.x), double (covered.y), double (covered.width), double (covered.height)});
   write (to, {shift.a, shift.b, shift.g, double (rangecast::fill_reach (part.height)),
                  double (rangecast::mirrors (clip_from_world)), double (backs), double (scene.mode),
                  rangecast::StripSettings ().depth_step, double (scene.layers.size ())});
-  for (const Layer &layer : scene.layers)
-    write_layer (to, layer, clip_from_world, blends, backs);
+  for (std::size_t i = 0; i < scene.layers.size (); i++) {
+    const Layer &layer = scene.layers[i];
+    if (blends) {
+      const Mat4 matrix = rangecast::clip_from_pixel (clip_from_world, layer.view, layer.roi);
+      write (to, rangecast::place_layer (
+                     matrix, clip_from_world, rangecast::inside_gap (clip_from_world, layer.view)));
+      const std::size_t cell = any ? atlas.cell_of[i] : 0;
+      write (to, {double (cell), double (atlas.from_picture[cell][0]),
+                     double (atlas.from_picture[cell][1])});
+      to.insert (to.end (), 15, 0.f);
+    } else
+      write_strip_places (to, layer, clip_from_world, backs);
+    write_angles (to, layer, clip_from_world);
+  }
 }
 
 /* ---- headsets ---- */
@@ -243,11 +261,11 @@ RC_EXPORT (rc_camera_scene) std::int32_t rc_camera_scene (std::uint32_t size)
 
 /** The camera's numbers for a picture of the scene, in OpenGL's coordinates (first row at the
  *  bottom). Drags count in pixels of the last such picture.
- *  @param precise  1: sums are floats of 32 bits
+ *  @param max_side  of a texture, pixels
  *  @return as write_picture() */
 RC_EXPORT (rc_camera_picture)
 const float *
-rc_camera_picture (std::int32_t width, std::int32_t height, std::int32_t precise)
+rc_camera_picture (std::int32_t width, std::int32_t height, std::int32_t max_side)
 {
   Camera &c = camera ();
   const double room_m = std::max (2 * rangecast::kViewGap_m, rangecast::kBlendRange_m);
@@ -255,7 +273,7 @@ rc_camera_picture (std::int32_t width, std::int32_t height, std::int32_t precise
       c.scene.home, c.motion.orbit, double (width) / height, false, {}, c.scene.hull, room_m);
   c.motion.set_shown (matrices, c.scene.home, width, height);
   write_picture (
-      c.picture, c.scene, matrices.clip_from_world, width, height, {0, 0, width, height}, precise);
+      c.picture, c.scene, matrices.clip_from_world, width, height, {0, 0, width, height}, max_side);
   return c.picture.data ();
 }
 
@@ -267,7 +285,7 @@ rc_camera_picture (std::int32_t width, std::int32_t height, std::int32_t precise
 RC_EXPORT (rc_camera_eye)
 const float *
 rc_camera_eye (std::int32_t width, std::int32_t height, std::int32_t x, std::int32_t y,
-    std::int32_t part_width, std::int32_t part_height, std::int32_t precise)
+    std::int32_t part_width, std::int32_t part_height, std::int32_t max_side)
 {
   Mat4 clip_from_local;
   const auto bytes = web::input (sizeof clip_from_local);
@@ -281,7 +299,7 @@ rc_camera_eye (std::int32_t width, std::int32_t height, std::int32_t x, std::int
   const Mat4 clip_from_world =
       rangecast::in_part (product (clip_from_local, local_from_world (c.scene.home)), part);
   write_picture (c.picture, c.scene, clip_from_world, width, height,
-      {x, y, part_width, part_height}, precise);
+      {x, y, part_width, part_height}, max_side);
   return c.picture.data ();
 }
 

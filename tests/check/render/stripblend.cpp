@@ -113,7 +113,7 @@ GST_START_TEST (test_surface_beyond_the_blend_range_is_hidden)
 }
 GST_END_TEST;
 
-/* Half floats hold the sums of as many views as there can be. */
+/* More views than cells share the last one. */
 GST_START_TEST (test_64_views_of_one_colour_keep_it_to_a_level)
 {
   Rig rig = ring_rig (64, 64, 48);
@@ -247,7 +247,7 @@ GST_START_TEST (test_draws_in_a_locale_with_a_decimal_comma)
 }
 GST_END_TEST;
 
-/* The three passes leave OpenGL as the other modes expect it, and the other way round. */
+/* The passes leave OpenGL as the other modes expect it, and the other way round. */
 GST_START_TEST (test_modes_may_take_turns)
 {
   const Rig rig = two_of_nine ();

@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <rangecast/surface/painting.hpp>
 #include <rangecast/surface/reduced_view.hpp>
 #include <rangecast/surface/scene_hull.hpp>
 #include <rangecast/surface/strips.hpp>
 #include <rangecast/surface/view_matrices.hpp>
+#include <set>
 #include <vector>
 
 using namespace rangecast;
@@ -143,6 +145,34 @@ TEST (CoveredPart, holds_every_point_and_little_more)
   EXPECT_TRUE (covered_part (m, {}, 400, 300, whole).empty ());
   hull.push_back (viewer_position (m) + Vec3{-m[3], -m[7], -m[11]});
   EXPECT_EQ (covered_part (m, hull, 400, 300, part), part) << "some of it is behind the camera";
+}
+
+TEST (BlendAtlas, cells_lie_beside_each_other_and_views_of_the_viewers_direction_have_their_own)
+{
+  const Roi covered{30, 20, 100, 80};
+  for (const int max_side : {100, 250, 2048})
+    for (const std::size_t views : {std::size_t{1}, std::size_t{3}, std::size_t{12}}) {
+      std::vector<double> alignments;
+      for (std::size_t i = 0; i < views; i++)
+        alignments.push_back (0.1 * double (i)); /* the last one looks most as the viewer does */
+      BlendAtlas atlas;
+      make_blend_atlas (alignments, covered, max_side, atlas);
+      ASSERT_GE (atlas.cells, 1u);
+      ASSERT_LE (atlas.cells, std::min (views, kMaxBlendCells));
+      EXPECT_LE (std::max (atlas.width, atlas.height), std::max (max_side, covered.width));
+      std::set<std::pair<int, int>> places;
+      for (std::size_t i = 0; i < atlas.cells; i++) {
+        const auto [right, down] = atlas.from_picture[i];
+        const int x = covered.x + right, y = covered.y + down;
+        EXPECT_TRUE (x >= 0 && y >= 0 && x % covered.width == 0 && y % covered.height == 0);
+        EXPECT_TRUE (x + covered.width <= atlas.width && y + covered.height <= atlas.height);
+        places.insert ({x, y});
+      }
+      EXPECT_EQ (places.size (), atlas.cells);
+      ASSERT_EQ (atlas.cell_of.size (), views);
+      for (std::size_t i = 0; i < views; i++)
+        EXPECT_EQ (atlas.cell_of[i], std::min (views - 1 - i, atlas.cells - 1));
+    }
 }
 
 TEST (ReducedView, every_second_pixel_stays_where_it_was)
