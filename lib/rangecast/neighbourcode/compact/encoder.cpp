@@ -221,7 +221,7 @@ CompactEncoder::best_choice (
     const float cost = before + kPriceOfBit * bits[i];
     if (bits[i] >= kImpossible || cost >= min)
       continue;
-    const PixelKey other = upper_.shown ()[x + i - kTakeUpper];
+    const PixelKey other = upper_.shown ()[static_cast<std::ptrdiff_t> (x + i) - kTakeUpper];
     if (near_bits (own, other, bias_) != kNearMask)
       continue;
     if (const float sum = cost + error (other); sum < min) {
