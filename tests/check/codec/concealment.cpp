@@ -9,7 +9,7 @@ static constexpr GstClockTime kStep = 100 * GST_MSECOND;
 using Units = std::vector<std::vector<guint8>>;
 
 /* A unit of a type that decoders pass over. */
-static const Units kNothing = {{0x29, 0, 8, 0, 1, 2, 3, 4}};
+static const Units kNothing = {{kBitstreamVersion << 4 | 9, 0, 8, 0, 1, 2, 3, 4}};
 
 static GstHarness *
 decoder (const Rig &rig)

@@ -11,8 +11,7 @@
 using namespace rangecast;
 using namespace rangecast::testing;
 
-static constexpr const char *kStreamCaps =
-    "video/x-neighbour-code,version=3,alignment=byte-stream";
+static constexpr const char *kStreamCaps = "video/x-neighbour-code,version=3,alignment=byte-stream";
 
 static std::string
 read_data (const std::string &name)

@@ -442,10 +442,9 @@ GST_START_TEST (test_slices_and_access_units_decode_to_the_same)
   const Rig rig = ring_rig (3);
   std::vector<GstBuffer *> outputs[2];
   for (const bool slices : {false, true}) {
-    GstHarness *h = harness (rig,
-        slices
-            ? "neighbourcodeenc ! video/x-neighbour-code,alignment=slice ! neighbourcodedec"
-            : "neighbourcodeenc ! neighbourcodedec");
+    GstHarness *h = harness (
+        rig, slices ? "neighbourcodeenc ! video/x-neighbour-code,alignment=slice ! neighbourcodedec"
+                    : "neighbourcodeenc ! neighbourcodedec");
     for (GstClockTime time = 0; time < 3; time++)
       gst_harness_push (h, make_frame_set (rig, time));
     outputs[slices] = pull_all (h);
@@ -465,7 +464,7 @@ GST_START_TEST (test_endless_frame_set_of_slices_stays_below_32_MiB)
 {
   const Rig rig = ring_rig (1);
   GstHarness *h = slice_decoder (rig);
-  const std::vector<guint8> chunk (1 << 20, 0x29);
+  const std::vector<guint8> chunk (1 << 20, kBitstreamVersion << 4 | 9);
   for (int i = 0; i < 40; i++)
     push_slices (h, {chunk}, 0, false);
   push_slices (h, {chunk}, 0, true);
@@ -714,9 +713,12 @@ GST_START_TEST (test_damage_in_memories_costs_what_it_costs_in_one)
     bytes.insert (bytes.end (), unit.begin (), unit.end ());
   const std::size_t end = units[0].size () + units[1].size ();
   const Decoded sound = decoded (rig, in_memories (bytes, {}));
-  for (const guint8 first_byte : {0x21, 0x31}) { /* another version; a size beyond the memory */
+  constexpr guint8 kThisVersion = kBitstreamVersion << 4 | 1,
+                   kPreviousVersion = (kBitstreamVersion - 1) << 4 | 1;
+  for (const guint8 first_byte :
+      {kPreviousVersion, kThisVersion}) { /* the latter with a size beyond the memory */
     bytes[units[0].size ()] = first_byte;
-    bytes[units[0].size () + 3] = first_byte == 0x31 ? 0xff : bytes[units[0].size () + 3];
+    bytes[units[0].size () + 3] = first_byte == kThisVersion ? 0xff : bytes[units[0].size () + 3];
     const Decoded whole = decoded (rig, in_memories (bytes, {}));
     ck_assert_int_lt (whole.slices, sound.slices);
     ck_assert_int_gt (whole.bad_slices, 0);

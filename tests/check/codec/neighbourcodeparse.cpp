@@ -381,8 +381,8 @@ GST_START_TEST (test_typefinder_leaves_what_it_does_not_know)
   for (const std::span<const guint8> bytes :
       {std::span (recording.bytes).first (27), std::span<const guint8> (future)}) {
     GstCaps *caps = gst_type_find_helper_for_data (nullptr, bytes.data (), bytes.size (), nullptr);
-    fail_if (caps && gst_structure_has_name (
-                         gst_caps_get_structure (caps, 0), "video/x-neighbour-code"));
+    fail_if (caps &&
+             gst_structure_has_name (gst_caps_get_structure (caps, 0), "video/x-neighbour-code"));
     gst_clear_caps (&caps);
   }
 }
@@ -395,8 +395,7 @@ GST_START_TEST (test_typefinder_knows_the_stream)
   GstCaps *caps = gst_type_find_helper_for_data (
       nullptr, recording.bytes.data (), recording.bytes.size (), &probability);
   fail_unless (caps != nullptr);
-  fail_unless (
-      gst_structure_has_name (gst_caps_get_structure (caps, 0), "video/x-neighbour-code"));
+  fail_unless (gst_structure_has_name (gst_caps_get_structure (caps, 0), "video/x-neighbour-code"));
   fail_unless_equals_int (probability, GST_TYPE_FIND_MAXIMUM);
   gst_caps_unref (caps);
 }

@@ -13,8 +13,7 @@ using namespace rangecast::testing;
 static constexpr int kWidth = 320, kHeight = 240;
 static const char *const kProfiles[] = {"plain", "packed", "entropy"};
 static const std::string kLossless = "depth-bits=16 depth-threshold=0 colour-threshold=0 ";
-static const std::string kBySlices =
-    "! capsfilter caps=video/x-neighbour-code,alignment=slice ";
+static const std::string kBySlices = "! capsfilter caps=video/x-neighbour-code,alignment=slice ";
 
 /* What a chain of elements makes of some buffers. */
 struct Made {

@@ -174,7 +174,7 @@ GST_END_TEST;
 GST_START_TEST (test_caps_beyond_the_templates_are_not_accepted)
 {
   const char *const wrong[] = {"width = (int) 16385", "height = (int) 16385", "views = (int) 65",
-      "width = (int) 0", "views = (int) 0", "version = (int) 3"};
+      "width = (int) 0", "views = (int) 0", "version = (int) 2", "version = (int) 4"};
   for (const char *field : wrong) {
     GstCaps *caps = coded_caps (ring_rig (1));
     GstStructure *one = gst_structure_from_string ((std::string ("x, ") + field).c_str (), nullptr);
@@ -316,7 +316,7 @@ static std::vector<guint8>
 long_unit ()
 {
   std::vector<guint8> unit (60000, 0);
-  unit[0] = 0x29;
+  unit[0] = kBitstreamVersion << 4 | 9;
   unit[2] = 60000 & 0xff;
   unit[3] = 60000 >> 8;
   return unit;

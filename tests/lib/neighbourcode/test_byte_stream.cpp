@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Access units in byte streams, sound, damaged and hostile; and in files, by time. */
 #include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
+#include <rangecast/neighbourcode/bitstream/unit.hpp>
 
 #include <gtest/gtest.h>
 
@@ -18,7 +19,7 @@ append_unit (std::vector<std::uint8_t> &to, std::uint8_t type, std::size_t size)
 {
   const std::size_t begin = to.size ();
   to.resize (begin + size, 0xab);
-  to[begin] = std::uint8_t (0x20 | type);
+  to[begin] = std::uint8_t (kBitstreamVersion << 4 | type);
   to[begin + 1] = 0;
   to[begin + 2] = std::uint8_t (size & 255);
   to[begin + 3] = std::uint8_t (size >> 8);
