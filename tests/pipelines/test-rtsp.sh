@@ -22,7 +22,7 @@ test_sdp_carries_the_rig_and_the_version () {
 import base64, re
 [line] = re.findall(r"a=fmtp:96 (.*)", open("sdp.txt").read())
 fields = dict(field.strip().split("=", 1) for field in line.split(";"))
-assert fields["version"] == "2" and fields["views"] == "4", fields
+assert fields["version"] == "3" and fields["views"] == "4", fields
 assert (fields["width"], fields["height"], fields["framerate"]) == ("160", "120", "15/1"), fields
 blob = base64.b64decode(fields["rig"], validate=True)
 assert blob[:4] == b"RCRG" and b"avatar 3" in blob, blob
