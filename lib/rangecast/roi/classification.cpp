@@ -299,7 +299,7 @@ public:
              kCount / 2;
     };
     for (std::uint32_t i = 0; i < kPrefixes; i++) {
-      const std::uint32_t begin = (kLeast + i) << kShift, end = begin + (1U << kShift);
+      const std::uint32_t begin = (kFirstBin + i) << kShift, end = begin + (1U << kShift);
       const int bin = bin_of (begin);
       std::uint32_t low = begin, high = end; /* searches for the next bin's first number */
       while (low < high)
@@ -314,7 +314,7 @@ public:
   [[nodiscard]] int find (float ratio) const
   {
     const auto bits = std::bit_cast<std::uint32_t> (ratio);
-    const std::uint32_t i = (bits >> kShift) - kLeast;
+    const std::uint32_t i = (bits >> kShift) - kFirstBin;
     return i < kPrefixes ? bins_[i].first + (bits >= bins_[i].next) : -1;
   }
 
@@ -322,7 +322,7 @@ private:
   /* Numbers with the same first bits, so many that they are in two bins at most. */
   static constexpr int kBits = 6, kShift = 23 - kBits;
   static_assert (1 << kBits > 1.5 * kPerOctave);
-  static constexpr std::uint32_t kLeast = std::bit_cast<std::uint32_t> (0.25f) >> kShift,
+  static constexpr std::uint32_t kFirstBin = std::bit_cast<std::uint32_t> (0.25f) >> kShift,
                                  kPrefixes = 4 << kBits;
   struct Bins {
     int first;
