@@ -68,5 +68,4 @@ fi
 # If nothing arrives, an existing recording must not be lost.
 [ ! -s "$file" ] || mv -f -- "$file" "$file~"
 drop_empty "$file" "${listen:+nothing came to port $listen (no coded frame set); $file was not written}"
-launch "${source[@]}" ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream \
-  ! filesink "location=$file"
+launch "${source[@]}" ! neighbourcodeparse ! filesink "location=$file"

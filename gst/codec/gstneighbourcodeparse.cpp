@@ -4,15 +4,15 @@
  * @title: neighbourcodeparse
  *
  * Converts between the byte stream of coded frame sets, as in files, and access units, as
- * downstream requires; to access units where its caps name no alignment. Parsing resumes at the
- * next start code after damage. Files can be sought by time. Comes with a typefinder.
+ * downstream requires. Where downstream takes anything, as filesink does, the output is what the
+ * input is not. Parsing resumes at the next start code after damage. Files can be sought by time.
+ * Comes with a typefinder.
  *
  * ## Example launch lines
  * |[
  * gst-launch-1.0 udpsrc port=5100
  * caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
- * rtpneighbourcodedepay ! neighbourcodeparse !
- * video/x-neighbour-code,alignment=byte-stream ! filesink location=head.rcnc
+ * rtpneighbourcodedepay ! neighbourcodeparse ! filesink location=head.rcnc
  * ]|
  * Writes a file.
  * |[
@@ -158,7 +158,8 @@ set_source_caps (GstBaseParse *base)
   Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)); /* clears the flag */
   /* Decoders that decodebin plugs later take access units. */
-  const char *alignment = preferred_alignment (GST_BASE_PARSE_SRC_PAD (base), "access-unit");
+  const char *alignment = preferred_alignment (
+      GST_BASE_PARSE_SRC_PAD (base), stream.reads_stream ? "access-unit" : "byte-stream");
   stream.writes_stream = g_str_equal (alignment, "byte-stream");
   GstCaps *caps = gstrange::make_neighbour_code_caps (stream.info, alignment);
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);

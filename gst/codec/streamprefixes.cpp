@@ -48,7 +48,8 @@ preferred_alignment (GstPad *source, const char *otherwise)
   if (!gst_pad_is_linked (source))
     return "access-unit";
   GstCaps *caps = gst_pad_peer_query_caps (source, nullptr);
-  const char *preferred = otherwise;
+  /* Nothing fits where an application's decodebin says so before it plugs a decoder. */
+  const char *preferred = gst_caps_is_empty (caps) ? "access-unit" : otherwise;
   for (const char *alignment :
       {"byte-stream", "slice", "access-unit"}) { /* the last match counts */
     GstStructure *wanted = gst_structure_new (

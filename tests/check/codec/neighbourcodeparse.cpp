@@ -355,12 +355,19 @@ GST_START_TEST (test_downstream_may_change_its_mind)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_access_units_pass_as_they_are)
+static GstHarness *
+parser_of_access_units (const Recording &recording)
 {
-  const Recording recording;
   GstHarness *h = harness_of ("neighbourcodeparse");
   gst_harness_set_src_caps (h, gstrange::make_neighbour_code_caps (
                                    gstrange::make_info (recording.rig, 25, 1), "access-unit"));
+  return h;
+}
+
+GST_START_TEST (test_access_units_pass_as_they_are_where_they_are_wanted)
+{
+  const Recording recording;
+  GstHarness *h = parser_of_access_units (recording);
   for (GstBuffer *coded : recording.access_units) {
     GstBuffer *passed = gst_harness_push_and_pull (h, gst_buffer_ref (coded));
     fail_unless (same_bytes (passed, coded));
@@ -369,6 +376,38 @@ GST_START_TEST (test_access_units_pass_as_they_are)
         gst_range_buffer_get_capture_time (passed), gst_range_buffer_get_capture_time (coded));
     gst_buffer_unref (passed);
   }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_access_units_become_a_byte_stream_where_anything_will_do)
+{
+  const Recording recording;
+  GstHarness *h = parser_of_access_units (recording);
+  gst_harness_set_sink_caps_str (h, "ANY");
+  std::vector<guint8> written;
+  for (GstBuffer *coded : recording.access_units) {
+    GstBuffer *buffer = gst_harness_push_and_pull (h, gst_buffer_ref (coded));
+    const auto bytes = bytes_of (buffer);
+    written.insert (written.end (), bytes.begin (), bytes.end ());
+    gst_buffer_unref (buffer);
+  }
+  fail_unless (written == recording.bytes);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+/* As in a decodebin whose application names the caps of its sinks before a decoder is plugged. */
+GST_START_TEST (test_access_units_pass_where_nothing_fits)
+{
+  const Recording recording (1);
+  GstHarness *h = parser_of_access_units (recording);
+  gst_harness_set_sink_caps_str (h, "EMPTY");
+  gst_harness_push (h, gst_buffer_ref (recording.access_units[0]));
+  GstCaps *caps = gst_pad_get_current_caps (GST_PAD_PEER (h->sinkpad));
+  fail_unless_equals_string (
+      gst_structure_get_string (gst_caps_get_structure (caps, 0), "alignment"), "access-unit");
+  gst_caps_unref (caps);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -425,7 +464,9 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_times_that_are_missing_are_counted);
   tcase_add_test (tc, test_file_plays_again_after_all_state_changes);
   tcase_add_test (tc, test_downstream_may_change_its_mind);
-  tcase_add_test (tc, test_access_units_pass_as_they_are);
+  tcase_add_test (tc, test_access_units_pass_as_they_are_where_they_are_wanted);
+  tcase_add_test (tc, test_access_units_become_a_byte_stream_where_anything_will_do);
+  tcase_add_test (tc, test_access_units_pass_where_nothing_fits);
   tcase_add_test (tc, test_typefinder_leaves_what_it_does_not_know);
   tcase_add_test (tc, test_typefinder_knows_the_stream);
   return suite;
