@@ -533,7 +533,8 @@ gst_range_split_class_init (GstRangeSplitClass *klass)
       {&sink_template, &depth_template, &colour_template, &depth_of_template, &colour_of_template})
     gst_element_class_add_static_pad_template (element_class, pad_template);
   gst_element_class_set_static_metadata (element_class, "Range image splitter", "Filter/Video",
-      "Converts single views of range frame sets to depth and colour video", "gst-rangecast");
+      "Converts single views of range frame sets to depth and colour video; each pad needs a queue",
+      "gst-rangecast");
 
   element_class->request_new_pad = GST_DEBUG_FUNCPTR (gst_range_split_request_new_pad);
   element_class->release_pad = GST_DEBUG_FUNCPTR (gst_range_split_release_pad);

@@ -72,7 +72,9 @@ constexpr int kRequestMargin = 16;
 /* Number of frames since learning that are foreground on so much of the picture before that is
  * reported. Nobody fills as much of it from the first frame on. */
 constexpr int kSuspectFrames = 60;
-constexpr double kSuspectShare = 0.8;
+/* Shares of the picture, and of its pixels with depth: where the background has no texture, only a
+ * person may have depth. */
+constexpr double kSuspectShare = 0.65, kSuspectShareOfDepth = 0.9;
 
 /* One view of the stream. */
 struct ViewState {
@@ -414,7 +416,9 @@ check_foreground (GstRoiExtract *self, ViewState &state, int view_id)
   if (state.suspect < 0)
     return;
   const double pixels = double (state.background.width ()) * double (state.background.height ());
-  if (double (state.points_out) < kSuspectShare * pixels) {
+  const auto foreground = double (state.points_out);
+  if (foreground < kSuspectShare * pixels ||
+      foreground < kSuspectShareOfDepth * double (state.points_in)) {
     state.suspect = -1;
     return;
   }

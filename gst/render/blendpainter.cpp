@@ -117,7 +117,7 @@ BlendPainter::upload (std::span<const RenderLayer> layers)
   return uploaded;
 }
 
-bool
+const char *
 BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> layers)
 {
   const GstGLFuncs *gl = context_->gl_vtable;
@@ -125,8 +125,8 @@ BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> l
   const float *background = picture.background;
   const bool any = !covered.empty () && !layers.empty ();
   if (any) {
-    if (!start_picture (picture, layers))
-      return false;
+    if (const char *reason = start_picture (picture, layers))
+      return reason;
     gl->GetIntegerv (GL_DRAW_FRAMEBUFFER_BINDING, &output_);
     gl->Enable (GL_DEPTH_TEST);
     gl->Disable (GL_BLEND);
@@ -150,21 +150,23 @@ BlendPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> l
   gl->DepthFunc (GL_LESS);
   gl->Disable (GL_DEPTH_TEST);
   gst_gl_context_clear_shader (context_);
-  return true;
+  return nullptr;
 }
 
-/* Makes all that the passes need. @return false if OpenGL cannot have it */
-bool
+/* Makes all that the passes need. @return why OpenGL cannot have it */
+const char *
 BlendPainter::start_picture (const RenderPicture &picture, std::span<const RenderLayer> layers)
 {
   alignments_.clear ();
   for (const RenderLayer &layer : layers)
     alignments_.push_back (rangecast::view_alignment (picture.clip_from_world, *layer.view));
   rangecast::make_blend_atlas (alignments_, picture.covered, largest_, atlas_);
-  return prepare (cells_, atlas_.width, atlas_.height) &&
-         prepare (sums_, picture.width, picture.height) &&
-         sum_shaders_[atlas_.cells - 1].make (
-             context_, rangecast::sum_shader (atlas_.cells), "mode blend");
+  if (!prepare (cells_, atlas_.width, atlas_.height) ||
+      !prepare (sums_, picture.width, picture.height))
+    return "OpenGL has no framebuffer of the size that mode blend takes";
+  const bool compiled = sum_shaders_[atlas_.cells - 1].make (
+      context_, rangecast::sum_shader (atlas_.cells), "mode blend");
+  return compiled ? nullptr : "a shader of mode blend does not compile (see the log)";
 }
 
 /* Pass 1. Both sides of all surfaces: weights leave next to nothing of what is seen from behind. */
@@ -280,7 +282,8 @@ BlendPainter::unbind_textures () const
 }
 
 /* Enlarges a target, in steps, so that a person who moves does not need new textures in each
- * picture. @return false if OpenGL cannot have it */
+ * picture. It keeps the larger of old and new sides unless that doubles its pixels.
+ * @return false if OpenGL cannot have it */
 bool
 BlendPainter::prepare (Target &target, int width, int height) const
 {
@@ -288,13 +291,18 @@ BlendPainter::prepare (Target &target, int width, int height) const
     return !target.failed;
   const GstGLFuncs *gl = context_->gl_vtable;
   constexpr int kStep = 128;
-  const auto side = [&] (int pixels, int before) {
-    return std::max (before, std::min ((pixels + kStep - 1) / kStep * kStep, largest_));
+  const auto side = [&] (int pixels) {
+    return std::min ((pixels + kStep - 1) / kStep * kStep, largest_);
   };
   gint bound = 0;
   gl->GetIntegerv (GL_DRAW_FRAMEBUFFER_BINDING, &bound);
-  width = side (width, target.width);
-  height = side (height, target.height);
+  width = side (width);
+  height = side (height);
+  const int widest = std::max (width, target.width), highest = std::max (height, target.height);
+  if (gint64{widest} * highest <= 2 * gint64{width} * height) {
+    width = widest;
+    height = highest;
+  }
   delete_target (target);
   target.width = width;
   target.height = height;

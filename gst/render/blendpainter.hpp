@@ -34,8 +34,8 @@ public:
   /** Draws one picture of what was uploaded last into the bound framebuffer, whose depth has been
    *  cleared if the picture keeps depth. If the picture does not fill the framebuffer, scissors
    *  keep to its part afterwards.
-   *  @return false if OpenGL has no framebuffer of the size that it takes; nothing is drawn */
-  bool draw (const RenderPicture &picture, std::span<const RenderLayer> layers);
+   *  @return why OpenGL cannot draw it, and nothing is drawn; nullptr if it is drawn */
+  const char *draw (const RenderPicture &picture, std::span<const RenderLayer> layers);
 
 private:
   struct ViewObjects { /* OpenGL names of one view */
@@ -49,7 +49,7 @@ private:
     int width = 0, height = 0;
     bool failed = false; /* with that size */
   };
-  bool start_picture (const RenderPicture &picture, std::span<const RenderLayer> layers);
+  const char *start_picture (const RenderPicture &picture, std::span<const RenderLayer> layers);
   bool prepare (Target &target, int width, int height) const;
   void delete_target (Target &target) const;
   void bind_textures (GstGLShader *shader, const Target &target, const char *colours) const;

@@ -15,7 +15,6 @@ struct RenderPicture {
   rangecast::StripMode mode;
   double depth_step;
   bool back_faces = false;     ///< mode strips: where no front is; mode blend shows all
-  std::size_t rig_views = 1;   ///< that a frame set may have
   bool keeps_depth = false;    ///< mode blend: writes the surfaces' depth, for what is drawn later
   rangecast::Roi covered = {}; ///< mode blend: all pixels that may show something, and a margin of
                                ///< one pixel

@@ -89,8 +89,8 @@ struct Renderer::Call {
   const RenderJob *job;
   GstBuffer *out;
   bool panel_changed;
-  guint memory = 0; /* that is drawn into now */
-  bool has_targets = true;
+  guint memory = 0;              /* that is drawn into now */
+  const char *failure = nullptr; /* of a painter */
   Result result = {};
   std::exception_ptr exception = {}; /* must not pass through C, nor end the OpenGL thread */
 
@@ -154,8 +154,8 @@ Renderer::draw_buffer (Call &call)
         framebuffer_, GST_GL_MEMORY_CAST (gst_buffer_peek_memory (call.out, i)), draw_bound, &call);
   }
   call.result.reason = drawn ? fatal_error (context_->gl_vtable) : "there is no framebuffer for it";
-  if (!call.result.reason && !call.has_targets)
-    call.result.reason = "it has no framebuffer of the size that mode blend takes";
+  if (!call.result.reason)
+    call.result.reason = call.failure;
   call.result.drawn = drawn && !call.result.reason;
   GstGLSyncMeta *sync = gst_buffer_get_gl_sync_meta (call.out);
   if (call.result.drawn && sync) /* other contexts wait there for our commands */
@@ -215,7 +215,8 @@ Renderer::draw_eye (Call &call, const EyeViewport &viewport, bool antialiased)
     gl->Clear (GL_DEPTH_BUFFER_BIT);
   if (blends) /* is drawn over the background; other modes leave the background's depth */
     draw_shade ();
-  call.has_targets = painter_.draw (picture, job.scene->layers ()) && call.has_targets;
+  if (const char *failure = painter_.draw (picture, job.scene->layers ()))
+    call.failure = failure;
   if (!blends)
     draw_shade ();
   if (job.settings->show_cameras)
@@ -262,7 +263,6 @@ Renderer::make_picture (const RenderJob &job, const EyeViewport &viewport, Resul
                        picture.mode != rangecast::StripMode::kBlend;
   picture.view_gap_m = settings.view_gap_m;
   picture.blend_range_m = settings.blend_range_m;
-  picture.rig_views = job.scene->rig_views ();
   picture.keeps_depth = settings.show_cameras;
   picture.width = width_;
   picture.height = height_;

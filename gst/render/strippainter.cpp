@@ -205,7 +205,7 @@ StripPainter::draw_side (
       draw_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, back);
 }
 
-bool
+const char *
 StripPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> layers)
 {
   if (picture.mode == StripMode::kBlend)
@@ -237,5 +237,5 @@ StripPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> l
   if (!gles)
     gl->Disable (GL_PROGRAM_POINT_SIZE);
   gst_gl_context_clear_shader (context_);
-  return true;
+  return nullptr;
 }

@@ -23,8 +23,8 @@ public:
   /** Draws one picture of what was uploaded last into the bound framebuffer. May be called as often
    *  as there are pictures of it: of two eyes, or of a camera that moves.
    *  @param layers  those that were uploaded; of images only the ROI's place and size are read
-   *  @return false if OpenGL has no framebuffer of the size that mode blend takes */
-  bool draw (const RenderPicture &picture, std::span<const RenderLayer> layers);
+   *  @return why OpenGL cannot draw it; nullptr if it is drawn */
+  const char *draw (const RenderPicture &picture, std::span<const RenderLayer> layers);
 
 private:
   struct ViewObjects { /* OpenGL names of one view */

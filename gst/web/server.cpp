@@ -93,11 +93,22 @@ try_handshake (GMainContext *context, GTlsCertificate *certificate)
   if (socketpair (AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, descriptors) != 0)
     return g_strerror (errno);
   for (const bool is_server : {true, false}) {
-    g_autoptr (GSocket) socket = g_socket_new_from_fd (descriptors[is_server], nullptr);
-    g_autoptr (GSocketConnection) stream = g_socket_connection_factory_create_connection (socket);
-    g_autoptr (GIOStream) side =
-        is_server ? g_tls_server_connection_new (G_IO_STREAM (stream), certificate, nullptr)
-                  : g_tls_client_connection_new (G_IO_STREAM (stream), nullptr, nullptr);
+    g_autoptr (GError) error = nullptr;
+    g_autoptr (GSocket) socket = g_socket_new_from_fd (descriptors[is_server], &error);
+    if (!socket)
+      close (descriptors[is_server]);
+    g_autoptr (GSocketConnection) stream =
+        socket ? g_socket_connection_factory_create_connection (socket) : nullptr;
+    g_autoptr (GIOStream) side = nullptr;
+    if (stream)
+      side = is_server ? g_tls_server_connection_new (G_IO_STREAM (stream), certificate, &error)
+                       : g_tls_client_connection_new (G_IO_STREAM (stream), nullptr, &error);
+    if (!side) {
+      outcome.error = error->message;
+      outcome.sides++;
+      g_cancellable_cancel (failed);
+      continue;
+    }
     /* Whoever signed it: clients decide whom they trust. */
     const auto accept = [] (GTlsConnection *, GTlsCertificate *, GTlsCertificateFlags,
                             gpointer) -> gboolean { return TRUE; };

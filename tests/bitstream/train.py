@@ -3,11 +3,11 @@
 """Trains the models that entropy slices begin with, and writes them where they are kept.
 
 Reads byte streams of profile entropy, whose symbols it counts. Every second view (those of odd ids) is held out: only its size is
-printed. A model is what its symbols' counts say, with half a symbol more of each.
+printed. The probability of a symbol is its share of the counts, to each of which half a symbol is added. Other models are another bitstream
+version: existing streams do not decode with them, and golden streams must be made again.
 
 usage: train.py FILE...         prints the bytes of slices, trained on and held out, by set of models
        train.py --write FILE... also writes the models into docs/formats/bitstream.md and entropy_tables.cpp
-Streams that begin with other models serve as well: choices and residuals do not depend on models, unless choice=best.
 """
 
 from __future__ import annotations
@@ -75,7 +75,9 @@ def write() -> None:
             rows = lines(words(name, kind), PER_LINE[kind])
             text = "".join("    " + " ".join(row) + "\n" for row in rows)
             found = rf"(<!-- table: {kind}, {name} -->\n\n).*?(\n<!-- end -->)"
-            page = re.sub(found, lambda match: match[1] + text + match[2], page, flags=re.DOTALL)
+            page, replaced = re.subn(found, lambda match: match[1] + text + match[2], page, flags=re.DOTALL)
+            if replaced != 1:
+                sys.exit(f"train.py: {compact.PAGE.name} has {replaced} tables of {kind}, {name}; expected one")
             source += "\n".join('    "' + "".join(row) + '"' for row in rows) + ",\n"
         source += "};\n"
     compact.PAGE.write_text(page, encoding="utf-8")
@@ -88,7 +90,10 @@ decode_compact_slice = decode.decode_compact_slice
 def decode_part(part: decode.Slice, *arguments) -> list:
     global is_trained
     is_trained = part.view % 2 == 0
-    return decode_compact_slice(part, *arguments)
+    try:
+        return decode_compact_slice(part, *arguments)
+    except decode.Damaged as damage:
+        sys.exit(f"train.py: damaged slice of view {part.view}: {damage}")
 
 
 def main() -> int:

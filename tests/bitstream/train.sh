@@ -16,7 +16,7 @@ exact=("16 0 0" "12 0 0")
 fine=("12 8 5" "16 13 6" "14 20 3")
 coarse=("16 13 9" "12 8 10" "16 36 22")
 
-encode () { # file, source, key-interval, settings; then elements between source and encoder
+encode () { # file, source, properties of the encoder, thresholds
   local bits depth colour
   read -r bits depth colour <<<"$4"
   # shellcheck disable=SC2086

@@ -15,6 +15,7 @@ namespace rangecast {
 namespace {
 
 constexpr int kBlock = 8;
+constexpr int kMaxFrames = 64;
 constexpr int kScale = 128; /* of sums to levels */
 /* Maximum noise, grey levels; more is motion. */
 constexpr float kMaxNoise = 6;
@@ -31,10 +32,11 @@ luma_of (const Pixels::I &pixels)
 }
 
 /* In 16 bits, which vectors hold twice as many of. The sums of one picture are not kept, but follow
- * from its mean.
- * @param frames  number of them in the mean with this one */
+ * from its mean. The first one leaves no sums.
+ * @param pictures  since the restart, with this one
+ * @param frames    number of them in the mean */
 inline void
-add_to_mean (const std::uint8_t *__restrict picture, int n, int frames,
+add_to_mean (const std::uint8_t *__restrict picture, int n, int pictures, int frames,
     std::int16_t *__restrict sums, std::uint8_t *__restrict means)
 {
   const auto share = std::int16_t (std::min (65536 / frames, 32767));
@@ -43,9 +45,9 @@ add_to_mean (const std::uint8_t *__restrict picture, int n, int frames,
     sums[i] = std::int16_t (before + std::int16_t (step * share >> 16));
     means[i] = std::uint8_t (std::uint16_t (sums[i] + kScale / 2) / kScale);
   };
-  if (frames == 1)
+  if (pictures == 1)
     std::copy_n (picture, n, means);
-  else if (frames == 2)
+  else if (pictures == 2)
     for (int i = 0; i < n; i++)
       add (i, std::int16_t (kScale * means[i]));
   else
@@ -58,7 +60,7 @@ add_to_mean (const std::uint8_t *__restrict picture, int n, int frames,
 void
 StillAverage::set (int frames)
 {
-  frames_ = std::clamp (frames, 2, 64);
+  frames_ = std::clamp (frames, 2, kMaxFrames);
   reset ();
 }
 
@@ -119,7 +121,7 @@ StillAverage::find_motion (const cv::Rect &part)
   for (int by = part.y; by < part.br ().y; by++)
     for (int bx = part.x; bx < part.br ().x; bx++) {
       Block &block = blocks_[std::size_t (by * columns_ + bx)];
-      block.frames = moves (bx, by) ? 1 : std::min (block.frames + 1, frames_);
+      block.pictures = moves (bx, by) ? 1 : std::min (block.pictures + 1, kMaxFrames);
     }
 }
 
@@ -133,11 +135,12 @@ StillAverage::average (const cv::Mat &picture, const cv::Rect &part)
       const std::uint8_t *p = picture.ptr<std::uint8_t> (y) + begin;
       std::int16_t *sum = sum_.ptr<std::int16_t> (y) + begin;
       std::uint8_t *mean = mean_.ptr<std::uint8_t> (y) + begin;
-      const int frames = blocks_[std::size_t (y / kBlock * columns_ + bx)].frames;
+      const int pictures = blocks_[std::size_t (y / kBlock * columns_ + bx)].pictures;
+      const int frames = std::min (pictures, frames_);
       if (n < 4 * kBlock)
-        add_to_mean (p, n, frames, sum, mean);
+        add_to_mean (p, n, pictures, frames, sum, mean);
       else
-        add_to_mean (p, 4 * kBlock, frames, sum, mean);
+        add_to_mean (p, 4 * kBlock, pictures, frames, sum, mean);
     }
 }
 
@@ -152,7 +155,7 @@ StillAverage::add (const cv::Mat &picture, const cv::Rect &part)
     mean_.create (picture.size (), CV_8UC4);
     sum_.create (picture.size (), CV_16SC4);
     for (Block &block : blocks_)
-      block.frames = 1;
+      block.pictures = 1;
   }
   const int x = part.x / kBlock, y = part.y / kBlock;
   const cv::Rect all (0, 0, columns_, rows_),

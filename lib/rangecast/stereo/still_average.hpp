@@ -28,7 +28,7 @@ public:
 private:
   struct Block {
     float drift = 0, change = 0; /* grey levels: change of the block's mean, and of its pixels */
-    int frames = 0;              /* averaged */
+    int pictures = 0;            /* since the restart */
     bool moves = false;
   };
   /* Rectangles of blocks. */

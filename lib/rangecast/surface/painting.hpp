@@ -61,7 +61,7 @@ struct LayerAngles {
 };
 LayerAngles layer_angles (const Mat4 &clip_from_world, const View &view, const Roi &roi);
 
-/** Longest gap that pass 3 fills, pixels: gaps up to half of it take the colours around them, wider
+/** Longest gap that pass 4 fills, pixels: gaps up to half of it take the colours around them, wider
  *  ones a share of those. */
 int fill_reach (int picture_height);
 

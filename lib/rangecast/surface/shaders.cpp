@@ -217,15 +217,20 @@ out vec4 fragment;
 /* Minimum of an outside of which no cell but one of eight has anything, less rounding. */
 const float kOutside = 0.5 * kMinOutside;
 #if FILL
+/* Nothing is drawn outside of the part; what textures hold there is of other pictures. */
+ivec2 within (ivec2 at)
+{
+  return clamp (at, u_part.xy, u_part.zw);
+}
 float distance_at (ivec2 at)
 {
-  return u_shift.y / (2.0 * texelFetch (u_depths, at, 0).r - 1.0 - u_shift.x);
+  return u_shift.y / (2.0 * texelFetch (u_depths, within (at), 0).r - 1.0 - u_shift.x);
 }
 /* How many steps away the first outside in a direction is; 0: none within reach. */
 int trace (ivec2 at, ivec2 step)
 {
   for (int r = 1; r <= u_reach; r++)
-    if (texelFetch (u_sum, clamp (at + r * step, u_part.xy, u_part.zw), 0).a >= kOutside)
+    if (texelFetch (u_sum, within (at + r * step), 0).a >= kOutside)
       return r;
   return 0;
 }
@@ -258,7 +263,7 @@ vec4 fill (ivec2 at)
   for (int k = 0; k < 8; k++) {
     ivec2 way = (k < 4 ? there[k] : opposite[7 - k]) * direction (k);
     if (distance_at (at + way) > farthest - kSameSurface)
-      sum += vec4 (texelFetch (u_sum, at + way, 0).rgb, 1.0) / float (way.x * way.x + way.y * way.y);
+      sum += vec4 (texelFetch (u_sum, within (at + way), 0).rgb, 1.0) / float (way.x * way.x + way.y * way.y);
   }
   return vec4 (sum.rgb / sum.a, share);
 }

@@ -140,7 +140,6 @@ make_picture (const FrameSet &set, double azimuth_deg, double view_gap_m)
   picture.width = kWidth;
   picture.height = kHeight;
   picture.part = {0, 0, kWidth, kHeight};
-  picture.rig_views = set.rig.views.size ();
   picture.covered = covered_part (picture.clip_from_world, hull, kWidth, kHeight, picture.part);
   return picture;
 }

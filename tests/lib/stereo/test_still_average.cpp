@@ -60,6 +60,19 @@ TEST (StillAverage, noise_of_a_still_scene_is_less_than_half_after_ten_frames)
   EXPECT_LT (difference (last, truth, kAll), 0.45 * kNoise);
 }
 
+TEST (StillAverage, mean_of_two_frames_has_no_offset)
+{
+  StillAverage still;
+  still.set (2);
+  cv::RNG random (1);
+  const cv::Mat truth = scene ();
+  cv::Mat last;
+  for (int i = 0; i < 12; i++)
+    last = still.add (shot (truth, random));
+  EXPECT_LT (difference (last, truth, kAll), 0.65 * kNoise);
+  EXPECT_NEAR (cv::sum (cv::mean (last) - cv::mean (truth))[0] / 4, 0, 0.1);
+}
+
 TEST (StillAverage, first_picture_comes_out_as_it_is)
 {
   StillAverage still;

@@ -92,17 +92,17 @@ write_row (const std::uint64_t *row, std::size_t columns, std::uint16_t *depth, 
     write_pixel (row[x], depth[x], colour[x]);
 }
 
-constexpr PixelState kLeftState = state_of (Origin::kLeft), kUpperState = state_of (Origin::kUpper);
-
 } // namespace
 
+/* ---- packed, slices without key ---- */
+
 /* A pixel that equals no neighbour. */
-template <class Code, bool Delta>
 inline bool
-CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel)
+CompactDecoder::decode_full (
+    PackedReader &code, const Neighbours &n, bool corrected, CodedPixel &pixel)
 {
   const Components expected = predict (n, last_, limits_.max);
-  const bool known = !Delta || can_predict (n, last_);
+  const bool known = can_predict (n, last_);
   if (!corrected) {
     pixel = {known ? pack_components (expected) : kNoPixel, state_of (Origin::kPredicted)};
     return true;
@@ -111,17 +111,15 @@ CompactDecoder::decode_full (Code &code, const Neighbours &n, bool corrected, Co
   if (!code.residual (n, n.any (), residual))
     return false;
   const Components made = correct (expected, residual, steps_, limits_);
-  pixel = {known ? pack_components (made) : kNoPixel,
-      state_of (Origin::kCorrected, Code::kUsesActivity ? activity_of (residual) : 0)};
+  pixel = {known ? pack_components (made) : kNoPixel, state_of (Origin::kCorrected)};
   return true;
 }
 
 /* Decodes a run of valid pixels, which follows an invalid one. The loop keeps what it needs of this
  * object in local variables, the code too, so that it stays in registers. */
-template <class Code, bool Delta>
 inline bool
-CompactDecoder::decode_run (
-    Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end)
+CompactDecoder::decode_run (PackedReader &slice_code, const CompactQuantisers &quantisers,
+    std::size_t begin, std::size_t end)
 {
   PixelCode *const codes = row_.codes ();
   PixelState *const states = row_.states ();
@@ -131,36 +129,30 @@ CompactDecoder::decode_run (
   const std::uint64_t *const upper_shown = upper_.shown ();
   CodedPixel left;
   std::uint64_t left_shown = 0;
-  Code code = slice_code;
+  PackedReader code = slice_code;
   for (std::size_t x = begin; x < end; x++) {
     const Neighbours n = {left, upper_codes + x, upper_states + x};
-    if constexpr (Delta) {
-      if (row_.earlier ()[x]) {
-        codes[x] = left.code = earlier_codes_[x];
-        states[x] = left.state = copy_state (kTakeEarlier);
-        shown[x] = left_shown =
-            left.code == kNoPixel ? 0 : shown_as (left.code, quantisers, limits_);
-        continue;
-      }
+    if (row_.earlier ()[x]) {
+      codes[x] = left.code = earlier_codes_[x];
+      states[x] = left.state = copy_state (kTakeEarlier);
+      shown[x] = left_shown = left.code == kNoPixel ? 0 : shown_as (left.code, quantisers, limits_);
+      continue;
     }
-    const auto chosen = static_cast<unsigned> (
-        x > begin || n.any () ? code.template choice<Delta> (n) : int{kCorrect});
+    const auto chosen =
+        static_cast<unsigned> (x > begin || n.any () ? code.choice<true> (n) : int{kCorrect});
     if (chosen < kPredict) [[likely]] {
       const auto from = static_cast<std::ptrdiff_t> (x + chosen) - kTakeUpper;
       const std::uint64_t take_left = zero_mask (chosen);
       left_shown = select (take_left, left_shown, upper_shown[from]);
-      if constexpr (Delta) /* codes do not tell unknown pixels from invalid ones */
-        if ((take_left ? left.state : upper_states[from]) == 0)
-          return false;
-      left = {select (take_left, left.code, upper_codes[from]),
-          Delta ? copy_state (chosen) : select (take_left, kLeftState, kUpperState)};
-    } else {
-      if (chosen > kCorrect || !decode_full<Code, Delta> (code, n, chosen == kCorrect, left))
+      /* codes do not tell unknown pixels from invalid ones */
+      if ((take_left ? left.state : upper_states[from]) == 0)
         return false;
-      left_shown = Delta && left.code == kNoPixel ? 0 : shown_as (left.code, quantisers, limits_);
+      left = {select (take_left, left.code, upper_codes[from]), copy_state (chosen)};
+    } else {
+      if (chosen > kCorrect || !decode_full (code, n, chosen == kCorrect, left))
+        return false;
+      left_shown = left.code == kNoPixel ? 0 : shown_as (left.code, quantisers, limits_);
     }
-    if (!Delta && left.code == kNoPixel) /* equals an invalid one */
-      return false;
     codes[x] = left.code;
     states[x] = left.state;
     shown[x] = left_shown;
@@ -391,9 +383,8 @@ CompactDecoder::decode_entropy_row (EntropyReader &code, const CompactQuantisers
 /* ---- packed, slices without key ---- */
 
 /* Reads which pixels of a row are valid, and the ends of its runs. */
-template <class Code>
 bool
-CompactDecoder::decode_runs (Code &code, int columns)
+CompactDecoder::decode_runs (PackedReader &code, int columns)
 {
   const std::vector<std::uint8_t> &upper = upper_.valid ();
   std::vector<std::uint8_t> &valid = row_.valid ();
@@ -414,9 +405,8 @@ CompactDecoder::decode_runs (Code &code, int columns)
 }
 
 /* Reads which pixels of a run of valid ones equal those of the earlier frame set. */
-template <class Code>
 bool
-CompactDecoder::decode_earlier_runs (Code &code, std::size_t begin, std::size_t end)
+CompactDecoder::decode_earlier_runs (PackedReader &code, std::size_t begin, std::size_t end)
 {
   const std::span<const std::uint8_t> upper (upper_.earlier ().data (), end);
   const int first = static_cast<int> (begin), last = static_cast<int> (end);
@@ -434,10 +424,9 @@ CompactDecoder::decode_earlier_runs (Code &code, std::size_t begin, std::size_t 
   return true;
 }
 
-template <class Code, bool Delta>
 bool
 CompactDecoder::decode_row (
-    Code &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points)
+    PackedReader &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points)
 {
   if (!decode_runs (code, columns))
     return false;
@@ -445,12 +434,10 @@ CompactDecoder::decode_row (
   bool valid = false;
   for (int run : runs_) {
     const auto end = static_cast<std::size_t> (run);
-    if constexpr (Delta)
-      if (valid && !decode_earlier_runs (code, begin, end))
-        return false;
     if (!valid)
       row_.invalidate (begin, end, 0);
-    else if (!for_this_cpu ([&] { return decode_run<Code, Delta> (code, quantisers, begin, end); }))
+    else if (!decode_earlier_runs (code, begin, end) ||
+             !for_this_cpu ([&] { return decode_run (code, quantisers, begin, end); }))
       return false;
     points += valid ? end - begin : 0;
     begin = end;
@@ -532,7 +519,7 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
       if (!decode_packed_row (code, quantisers, header.columns, depth, colour, points))
         return false;
     } else {
-      if (!decode_row<Code, Delta> (code, quantisers, header.columns, points))
+      if (!decode_row (code, quantisers, header.columns, points))
         return false;
       write_row (row_.shown (), columns, depth, colour);
     }

@@ -31,14 +31,12 @@ private:
   template <class Code>
   bool load_earlier (
       Code &code, const SliceHeader &header, const DecoderReference &reference, int y);
-  template <class Code> bool decode_earlier_runs (Code &code, std::size_t begin, std::size_t end);
-  template <class Code> bool decode_runs (Code &code, int columns);
-  template <class Code, bool Delta>
+  bool decode_earlier_runs (PackedReader &code, std::size_t begin, std::size_t end);
+  bool decode_runs (PackedReader &code, int columns);
   bool decode_row (
-      Code &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points);
-  template <class Code, bool Delta>
-  [[gnu::always_inline]] bool decode_run (
-      Code &slice_code, const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
+      PackedReader &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points);
+  [[gnu::always_inline]] bool decode_run (PackedReader &slice_code,
+      const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
   [[gnu::always_inline]] bool decode_packed_run (
       PackedReader &slice_code, std::size_t begin, std::size_t end);
   template <class Code> bool decode_run_ends (Code &code, int columns);
@@ -50,9 +48,8 @@ private:
   template <bool Delta>
   bool decode_entropy_row (EntropyReader &code, const CompactQuantisers &quantisers, int columns,
       std::uint16_t *depth, Rgbx *colour, std::uint64_t &points);
-  template <class Code, bool Delta>
   [[gnu::always_inline]] bool decode_full (
-      Code &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
+      PackedReader &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
 
   CompactRow row_, upper_;
   std::vector<std::uint8_t> kinds_;      /* of the row and, before it is decoded, the one above: see

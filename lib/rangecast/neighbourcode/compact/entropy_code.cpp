@@ -11,7 +11,8 @@ const std::array<std::uint16_t, (kFrequencySum >> RansEncoder::kCostShift)> Rans
       for (std::size_t i = 0; i < costs.size (); i++) {
         const std::size_t least = std::max<std::size_t> (i << kCostShift, kMinFrequency);
         const double p = double (least) / kFrequencySum;
-        costs[i] = static_cast<std::uint16_t> (std::ceil (kCostOfBit * (0.0113 - std::log2 (p))));
+        costs[i] =
+            static_cast<std::uint16_t> (std::ceil (kCostOfBit * (max_excess (p) - std::log2 (p))));
       }
       return costs;
     }();

@@ -391,9 +391,6 @@ private:
  *  overrun(). */
 class PackedReader {
 public:
-  static constexpr bool kUsesActivity = false;
-  static constexpr bool kEarlierInRuns = true;
-
   /** Zero bytes that must follow the data in memory. */
   static constexpr std::size_t kPadding = 16;
 

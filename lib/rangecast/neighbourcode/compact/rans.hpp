@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <numbers>
 
 #include "symbol_model.hpp"
 
@@ -52,10 +53,11 @@ public:
       return;
     const int rest = kFrequencyBits - bits;
     *to_++ = value << rest | 1u << rest << kFrequencyBits | state << 2 * kFrequencyBits;
-    cost_ += static_cast<std::uint32_t> (bits * kCostOfBit + kCostOfBit / 64);
+    cost_ += static_cast<std::uint32_t> (bits * kCostOfBit + kCostOfRaw);
   }
 
-  /** Upper bound of the bytes that finish() would leave. */
+  /** Upper bound of the bytes that finish() would leave: of each state, 36 bits more than its
+   *  symbols cost, rounded up. */
   [[nodiscard]] std::size_t bound () const
   {
     return kRansHeaderSize + 3 + static_cast<std::size_t> (cost_ / (8 * kCostOfBit));
@@ -106,9 +108,14 @@ public:
 
 private:
   static constexpr int kCostOfBit = 1024, kCostShift = 6;
-  /* Upper bounds, by frequency. Coding a symbol of probability p multiplies a state x by at most
-   * 1 / p + (1 - p) 2^15 / x, see finish(): that is up to p (1 - p) 2^15 / kMinRansState / ln 2
-   * bits more than it is worth, at most 0.0113. */
+  static constexpr int kCostOfRaw = 47; /* max_excess (0) */
+  /* Upper bounds, by frequency. Coding a symbol of probability p turns a state x, which is at least
+   * p kMinRansState after a word has been written, into at most x / p + (1 - p) 2^15, see finish().
+   * So it costs at most max_excess() more than -log2 (p) bits. */
+  static constexpr double max_excess (double p)
+  {
+    return (1 - p) * kFrequencySum / kMinRansState / std::numbers::ln2;
+  }
   static const std::array<std::uint16_t, (kFrequencySum >> kCostShift)> kCosts;
 
   std::uint32_t *begin_, *to_;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Several rows of the profile packed at once, each behind the one above it, where the processor
- * can. They give what CompactEncoder's and CompactDecoder's own loops give, which do one row at a
- * time. */
+/* Several rows of the compact profiles at once, each some columns behind the one above it, where
+ * the processor can. The result is that of the row-by-row loops of CompactEncoder and
+ * CompactDecoder. */
 #pragma once
 
 #include "../plain/functions.hpp"
