@@ -412,10 +412,10 @@ GST_END_TEST;
 GST_START_TEST (test_process_has_one_pool_of_threads)
 {
   Dl_info found{};
-  ck_assert_int_ne (dladdr (reinterpret_cast<void *> (&rangecast::run_workers), &found), 0);
+  ck_assert_int_ne (dladdr (reinterpret_cast<void *> (&rangecast_run_workers), &found), 0);
   fail_unless (found.dli_sname != nullptr);
   ck_assert_ptr_eq (dlsym (RTLD_DEFAULT, found.dli_sname), found.dli_saddr);
-  ck_assert_ptr_eq (found.dli_saddr, reinterpret_cast<void *> (&rangecast::run_workers));
+  ck_assert_ptr_eq (found.dli_saddr, reinterpret_cast<void *> (&rangecast_run_workers));
 }
 GST_END_TEST;
 
