@@ -89,7 +89,7 @@ gst_range_camera_free (GstRangeCamera *camera)
 
 /**
  * gst_range_camera_init:
- * @camera: (out caller-allocates): the camera
+ * @camera: the camera
  * @view_id: 0 to 63
  * @width: width of the full image, pixels
  * @height: height of the full image, pixels
