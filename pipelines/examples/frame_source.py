@@ -70,7 +70,8 @@ def main():
     message = bus.timed_pop_filtered(Gst.CLOCK_TIME_NONE, Gst.MessageType.EOS | Gst.MessageType.ERROR)
     pipeline.set_state(Gst.State.NULL)
     if message.type == Gst.MessageType.ERROR:
-        sys.exit(f"frame_source.py: {message.parse_error().gerror.message}")
+        error, details = message.parse_error()
+        sys.exit(f"frame_source.py: {error.message} {details or ''}")
 
 
 if __name__ == "__main__":

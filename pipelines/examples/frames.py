@@ -72,7 +72,8 @@ def main():
         count += 1
     pipeline.set_state(Gst.State.NULL)
     if message:
-        sys.exit(f"frames.py: {message.parse_error().gerror.message}")
+        error, details = message.parse_error()
+        sys.exit(f"frames.py: {error.message} {details or ''}")
     if options.save and count:
         save(options.save, points, colours)
 
