@@ -65,7 +65,19 @@ typedef struct {
   gdouble near, far;
 } GstRangeCamera;
 
+#define GST_TYPE_RANGE_CAMERA (gst_range_camera_get_type ())
+GST_RANGE_API GType gst_range_camera_get_type (void);
+GST_RANGE_API GstRangeCamera *gst_range_camera_copy (const GstRangeCamera *camera);
+GST_RANGE_API void gst_range_camera_free (GstRangeCamera *camera);
+GST_RANGE_API void gst_range_camera_init (
+    GstRangeCamera *camera, guint view_id, gint width, gint height, gdouble focal_length);
+GST_RANGE_API void gst_range_camera_set_pose (
+    GstRangeCamera *camera, const gdouble *world_from_view);
+
+GST_RANGE_API GstCaps *gst_range_caps_new (
+    const GstRangeCamera *cameras, guint n_cameras, gint fps_n, gint fps_d, GError **error);
 GST_RANGE_API gboolean gst_range_caps_get_camera (
     const GstCaps *caps, guint view_id, GstRangeCamera *camera);
+GST_RANGE_API guint64 gst_range_caps_get_view_ids (const GstCaps *caps);
 
 G_END_DECLS

@@ -49,6 +49,32 @@ add_view (GstBuffer *buffer, int view_id, const Roi &roi, GstClockTime capture_t
                                     std::to_string (roi.height) + " pixels"};
 }
 
+void
+copy_layout (GstRangeMeta *to, const GstRangeMeta *from)
+{
+  const GstMeta meta = to->meta;
+  *to = *from;
+  to->meta = meta;
+}
+
+bool
+append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base)
+{
+  gpointer state = nullptr;
+  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state))
+    if (gst_buffer_get_range_meta (frame_set, meta->view_id))
+      return false;
+  state = nullptr;
+  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state)) {
+    auto added = reinterpret_cast<GstRangeMeta *> (
+        gst_buffer_add_meta (frame_set, GST_RANGE_META_INFO, nullptr));
+    copy_layout (added, meta);
+    added->depth_offset += base;
+    added->colour_offset += base;
+  }
+  return true;
+}
+
 static RangeImage
 image_of (const GstRangeView &view, GstClockTime capture_time)
 {

@@ -13,23 +13,26 @@ namespace gstrange {
 /** Creates an active pool for frame sets of these caps.
  *  @param[out] pool  transfer full; null on failure
  *  @return kNoSpace when out of memory, or if the caps exceed the limits of a rig */
-GST_RANGE_API rangecast::Status make_pool (GstCaps *caps, GstBufferPool *&pool);
+rangecast::Status make_pool (GstCaps *caps, GstBufferPool *&pool);
 
 /** Acquires a buffer. Posts an error when out of memory. */
-GST_RANGE_API GstFlowReturn acquire (GstElement *element, GstBufferPool *pool, GstBuffer **buffer);
+GstFlowReturn acquire (GstElement *element, GstBufferPool *pool, GstBuffer **buffer);
 
 /** gst_range_buffer_add_view() with a Status. @return kNoSpace if the view does not fit */
-GST_RANGE_API rangecast::Status add_view (
+rangecast::Status add_view (
     GstBuffer *buffer, int view_id, const rangecast::Roi &roi, GstClockTime capture_time);
+
+/** Copies all fields but the parent. */
+void copy_layout (GstRangeMeta *to, const GstRangeMeta *from);
 
 /** Adds the metas of `views` to a frame set like gst_range_buffer_append(), without its memories.
  *  @param base  offset in `frame_set` of the bytes of `views`
  *  @return false, and nothing is added, if both contain the same view-id */
-GST_RANGE_API bool append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base);
+bool append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base);
 
 /** Maps all views of a frame set during its lifetime, without allocations. After a failure views()
  *  is empty and status() names the view. */
-class GST_RANGE_API RangeFrameMap {
+class RangeFrameMap {
 public:
   RangeFrameMap (GstBuffer *buffer, GstMapFlags flags);
   ~RangeFrameMap ();

@@ -159,33 +159,3 @@ recode_caps (const GstCaps *caps, bool coded, GstCaps *filter)
 }
 
 } // namespace gstrange
-
-/**
- * gst_range_caps_get_camera:
- * @caps: fixed video/x-range or video/x-neighbour-code caps
- * @view_id: 0 to 63
- * @camera: (out caller-allocates): the view's calibration
- *
- * Returns: %FALSE if the caps have no valid rig, or the rig lacks the view
- */
-gboolean
-gst_range_caps_get_camera (const GstCaps *caps, guint view_id, GstRangeCamera *camera)
-{
-  gstrange::RangeInfo info;
-  if (!gstrange::parse_caps (caps, info).ok () || view_id >= guint (rangecast::kMaxViews))
-    return FALSE;
-  const View *view = info.rig.find (static_cast<int> (view_id));
-  if (!view)
-    return FALSE;
-  *camera = GstRangeCamera{view_id, view->width, view->height, view->intrinsics.fx,
-      view->intrinsics.fy, view->intrinsics.cx, view->intrinsics.cy, {}, view->depth_unit_m,
-      view->near_m, view->far_m};
-  const double t[] = {view->world_from_view.translation.x, view->world_from_view.translation.y,
-      view->world_from_view.translation.z};
-  for (int row = 0; row < 3; row++) {
-    for (int column = 0; column < 3; column++)
-      camera->world_from_view[4 * row + column] = view->world_from_view.rotation[3 * row + column];
-    camera->world_from_view[4 * row + 3] = t[row];
-  }
-  return TRUE;
-}

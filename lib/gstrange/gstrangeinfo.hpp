@@ -17,7 +17,7 @@ struct RangeInfo {
 
   [[nodiscard]] int views () const { return static_cast<int> (rig.views.size ()); }
   /** ns, or GST_CLOCK_TIME_NONE if the frame rate is unknown */
-  [[nodiscard]] GST_RANGE_API GstClockTime frame_duration () const;
+  [[nodiscard]] GstClockTime frame_duration () const;
 };
 
 /** Parses fixed caps. The rig is required; it must have as many views as the caps, all of them
@@ -25,23 +25,23 @@ struct RangeInfo {
  *  @param[out] info  unchanged on failure
  *  @return kNotFound, kBadValue, kBadSize, or the error of decode_rig(); the message names the
  *  field */
-GST_RANGE_API rangecast::Status parse_caps (const GstCaps *caps, RangeInfo &info);
+rangecast::Status parse_caps (const GstCaps *caps, RangeInfo &info);
 
 /** Width and height are those of the rig's largest views. */
-GST_RANGE_API RangeInfo make_info (rangecast::Rig rig, int fps_n, int fps_d);
+RangeInfo make_info (rangecast::Rig rig, int fps_n, int fps_d);
 
 /** video/x-range. Returns: (transfer full) */
-GST_RANGE_API GstCaps *make_range_caps (const RangeInfo &info);
+GstCaps *make_range_caps (const RangeInfo &info);
 
 /** Copies caps and replaces their rig. Returns: (transfer full) */
-GST_RANGE_API GstCaps *with_rig (const GstCaps *caps, const rangecast::Rig &rig);
+GstCaps *with_rig (const GstCaps *caps, const rangecast::Rig &rig);
 
 /** video/x-neighbour-code with alignment "access-unit" or "slice". Returns: (transfer full)
  */
-GST_RANGE_API GstCaps *make_neighbour_code_caps (const RangeInfo &info, const char *alignment);
+GstCaps *make_neighbour_code_caps (const RangeInfo &info, const char *alignment);
 
 /** transform_caps() of encoder and decoder: the same fields as video/x-range or, if `coded`, as
  *  video/x-neighbour-code with any alignment but byte-stream. Returns: (transfer full) */
-GST_RANGE_API GstCaps *recode_caps (const GstCaps *caps, bool coded, GstCaps *filter);
+GstCaps *recode_caps (const GstCaps *caps, bool coded, GstCaps *filter);
 
 } // namespace gstrange

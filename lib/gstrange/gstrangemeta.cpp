@@ -22,14 +22,6 @@ gst_range_meta_init (GstMeta *meta, gpointer, GstBuffer *)
   return TRUE;
 }
 
-static void
-gst_range_meta_copy_fields (GstRangeMeta *to, const GstRangeMeta *from)
-{
-  const GstMeta meta = to->meta;
-  *to = *from;
-  to->meta = meta;
-}
-
 /* Offsets are valid only in copies of the whole buffer. */
 static gboolean
 gst_range_meta_transform (GstBuffer *dest, GstMeta *meta, GstBuffer *, GQuark type, gpointer data)
@@ -40,7 +32,7 @@ gst_range_meta_transform (GstBuffer *dest, GstMeta *meta, GstBuffer *, GQuark ty
     return TRUE;
   auto copy =
       reinterpret_cast<GstRangeMeta *> (gst_buffer_add_meta (dest, GST_RANGE_META_INFO, nullptr));
-  gst_range_meta_copy_fields (copy, reinterpret_cast<GstRangeMeta *> (meta));
+  gstrange::copy_layout (copy, reinterpret_cast<GstRangeMeta *> (meta));
   return TRUE;
 }
 
@@ -104,24 +96,6 @@ guint
 gst_buffer_n_range_metas (GstBuffer *buffer)
 {
   return gst_buffer_get_n_meta (buffer, GST_RANGE_META_API_TYPE);
-}
-
-bool
-gstrange::append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base)
-{
-  gpointer state = nullptr;
-  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state))
-    if (gst_buffer_get_range_meta (frame_set, meta->view_id))
-      return false;
-  state = nullptr;
-  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state)) {
-    auto added = reinterpret_cast<GstRangeMeta *> (
-        gst_buffer_add_meta (frame_set, GST_RANGE_META_INFO, nullptr));
-    gst_range_meta_copy_fields (added, meta);
-    added->depth_offset += base;
-    added->colour_offset += base;
-  }
-  return true;
 }
 
 /**
@@ -202,7 +176,7 @@ gst_range_buffer_copy_view (GstBuffer *frame_set, const GstRangeMeta *meta)
   }
   auto added =
       reinterpret_cast<GstRangeMeta *> (gst_buffer_add_meta (view, GST_RANGE_META_INFO, nullptr));
-  gst_range_meta_copy_fields (added, meta);
+  gstrange::copy_layout (added, meta);
   added->depth_offset = empty ? 0 : meta->depth_offset - begin;
   added->colour_offset = empty ? 0 : meta->colour_offset - begin;
   return view;

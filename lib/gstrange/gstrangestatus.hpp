@@ -12,14 +12,13 @@
  *  RESOURCE/NO_SPACE_LEFT, kUnsupported STREAM/WRONG_TYPE, kInternal LIBRARY/FAILED, all others
  *  STREAM/DECODE.
  *  @param caller  source location for the message */
-GST_RANGE_API GstFlowReturn gst_range_flow_return (GstElement *element,
-    const rangecast::Status &status,
+GstFlowReturn gst_range_flow_return (GstElement *element, const rangecast::Status &status,
     std::source_location caller = std::source_location::current ());
 
 /** Posts and logs a warning for a status that is not kOk. Call without locks held. */
-GST_RANGE_API void gst_range_post_warning (GstElement *element, const rangecast::Status &status,
+void gst_range_post_warning (GstElement *element, const rangecast::Status &status,
     std::source_location caller = std::source_location::current ());
 
 /** The debug category with the name of the element's factory, for code that several elements share;
  *  GStreamer's default category if there is none. */
-GST_RANGE_API GstDebugCategory *gst_range_debug_category (GstElement *element);
+GstDebugCategory *gst_range_debug_category (GstElement *element);

@@ -36,6 +36,23 @@ test_python_reads_the_same_points_as_c () {
     /usr/bin/python3 "$pipelines/examples/count-points.py" "$source_dir/tests/data/default.rcnc" >python.txt
   grep -q "view 1: [1-9][0-9]* points" c.txt || fail "no points: $(cat c.txt)"
   cmp c.txt python.txt || fail "C: $(cat c.txt) Python: $(cat python.txt)"
+  [ -f "$(dirname "$typelib")/../../../share/gir-1.0/GstRange-1.0.gir" ] || fail "no GstRange-1.0.gir below $prefix"
+  local overrides
+  overrides=$(find "$prefix" -path '*/gi/overrides/GstRange.py')
+  [ -n "$overrides" ] || fail "no gi/overrides/GstRange.py below $prefix"
+  GI_TYPELIB_PATH=$(dirname "$typelib") LD_LIBRARY_PATH=$(dirname "$(find "$prefix" -name 'libgstrange-1.0.so')") \
+    PYTHONPATH=${overrides%/gi/overrides/GstRange.py} PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 "$pipelines/examples/frames.py" \
+    --source "filesrc location=$source_dir/tests/data/default.rcnc ! neighbourcodeparse ! neighbourcodedec" >frames.txt
+  grep -q " [1-9][0-9]* points" frames.txt || fail "$(cat frames.txt)"
+}
+
+# The C API of the installed headers, and the one function that plugins share.
+test_library_exports_what_its_headers_declare () {
+  install_below_here
+  nm -D --defined-only "$(find "$prefix" -name 'libgstrange-1.0.so')" | awk '{ print $3 }' | grep -v '^rangecast_run_workers$' | sort >exported.txt
+  grep -oh 'gst_[a-z_]* (' "$prefix"/include/gst-rangecast-1.0/gstrange/*.h | tr -d ' (' | grep -v 'get_type$\|get_info$' | sort -u >declared.txt
+  ! grep -v '^gst_\(range_\|buffer_[a-z_]*range_meta\)' exported.txt || fail "exported, too: $(cat exported.txt)"
+  grep -v 'get_type$\|get_info$' exported.txt | diff - declared.txt || fail "exported and declared symbols differ"
 }
 
 test_elements_are_found_where_they_were_installed () {

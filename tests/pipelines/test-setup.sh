@@ -82,14 +82,16 @@ test_env_says_that_the_build_is_missing_or_incomplete () {
   [ ! -s said.txt ] || fail "a complete build: $(cat said.txt)"
 }
 
-test_python_example_says_what_it_needs () {
+test_python_examples_say_what_they_need () {
   mkdir gi # a PyGObject without typelibs, then none
   echo 'def require_version (name, version): raise ValueError ("Namespace %s not available" % name)' >gi/__init__.py
-  local text
+  local text example
   for text in "Namespace Gst not available" "No module named"; do
-    PYTHONPATH=$PWD expect_error "$text" /usr/bin/python3 "$pipelines/examples/count-points.py" recording.rcnc
-    ! PYTHONPATH=$PWD /usr/bin/python3 "$pipelines/examples/count-points.py" recording.rcnc 2>said.txt || fail "no error"
-    [ "$(wc -l <said.txt)" = 1 ] && grep -q "setup.sh" said.txt || fail "$(cat said.txt)"
+    for example in count-points frames frame_source; do
+      PYTHONPATH=$PWD expect_error "$text" /usr/bin/python3 "$pipelines/examples/$example.py" recording.rcnc
+      ! PYTHONPATH=$PWD /usr/bin/python3 "$pipelines/examples/$example.py" recording.rcnc 2>said.txt || fail "no error"
+      [ "$(wc -l <said.txt)" = 1 ] && grep -q "setup.sh" said.txt || fail "$(cat said.txt)"
+    done
     echo 'raise ModuleNotFoundError ("No module named gi")' >gi/__init__.py
   done
 }

@@ -3,7 +3,7 @@
 #include "parallel.hpp"
 
 void
-rangecast::run_workers (std::size_t, void (*work) (void *, std::size_t), void *context)
+rangecast_run_workers (std::size_t, void (*work) (void *, std::size_t), void *context)
 {
   work (context, 0);
 }

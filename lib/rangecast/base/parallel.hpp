@@ -11,18 +11,19 @@
 
 #include "cpu.hpp"
 
-namespace rangecast {
-
 /** Calls work (context, worker) on this thread with worker 0 and on free threads of the pool with
  *  other numbers below `workers`, each number at most once; returns when all these calls have
  *  returned. One such call at a time uses the pool: a nested one, and one from another thread
  *  meanwhile, gets worker 0 alone. Allocates only when the pool has to grow.
  *
  *  The pool is the process's only one, so its definition is not part of the core, which several
- *  plugins link: libgstrange exports it, programs without libgstrange link rangecast_threads.
+ *  plugins link: libgstrange exports it, programs without libgstrange link rangecast_threads. As a
+ *  C symbol, it is the same to all compilers.
  *  @param work  must not throw */
-[[gnu::visibility ("default")]] void run_workers (
+extern "C" [[gnu::visibility ("default")]] void rangecast_run_workers (
     std::size_t workers, void (*work) (void *context, std::size_t worker), void *context);
+
+namespace rangecast {
 
 /** Greatest number of n jobs that in_parallel() runs concurrently.
  *  @param threads  limit; 0 = core_count() */
@@ -73,7 +74,7 @@ in_parallel (std::size_t n, int threads, const Work &work)
     }
   };
   Loop loop{call, n};
-  run_workers (
+  rangecast_run_workers (
       workers,
       [] (void *context, std::size_t worker) { static_cast<Loop *> (context)->run (worker); },
       &loop);

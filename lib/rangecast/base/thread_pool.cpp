@@ -85,14 +85,13 @@ private:
 };
 
 } // namespace
+} // namespace rangecast
 
 /* The pool is never destroyed: its threads wait until the process ends. In a child of fork() there
  * are none, and the caller does all of the work. */
 void
-run_workers (std::size_t workers, void (*work) (void *, std::size_t), void *context)
+rangecast_run_workers (std::size_t workers, void (*work) (void *, std::size_t), void *context)
 {
-  static ThreadPool &pool = *new ThreadPool;
+  static rangecast::ThreadPool &pool = *new rangecast::ThreadPool;
   pool.run (workers, work, context);
 }
-
-} // namespace rangecast

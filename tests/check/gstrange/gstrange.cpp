@@ -52,6 +52,71 @@ GST_START_TEST (test_application_reads_camera_from_caps)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_caps_of_cameras_give_the_same_cameras)
+{
+  GstRangeCamera cameras[2], read;
+  const gdouble pose[12] = {0, 0, -1, 1, 0, -1, 0, 2, -1, 0, 0, 3};
+  gst_range_camera_init (&cameras[0], 63, 320, 240, 300);
+  gst_range_camera_init (&cameras[1], 0, 640, 200, 500);
+  gst_range_camera_set_pose (&cameras[1], pose);
+  cameras[1].depth_unit = 0.001;
+  GError *error = nullptr;
+  GstCaps *caps = gst_range_caps_new (cameras, 2, 30, 1, &error);
+  g_assert_no_error (error);
+  gstrange::RangeInfo info;
+  fail_unless_ok (gstrange::parse_caps (caps, info));
+  fail_unless_equals_int (info.width, 640);
+  fail_unless_equals_int (info.height, 240);
+  fail_unless_equals_uint64 (gst_range_caps_get_view_ids (caps), (guint64{1} << 63) + 1);
+  for (const GstRangeCamera &camera : cameras) {
+    GstRangeCamera *copy = gst_range_camera_copy (&camera);
+    fail_unless (gst_range_caps_get_camera (caps, camera.view_id, &read));
+    fail_unless_equals_int (read.width, copy->width);
+    fail_unless_equals_float (read.fx, copy->fx);
+    fail_unless_equals_float (read.cy, copy->cy);
+    fail_unless_equals_float (read.depth_unit, copy->depth_unit);
+    for (int i = 0; i < 12; i++)
+      fail_unless_equals_float (read.world_from_view[i], copy->world_from_view[i]);
+    gst_range_camera_free (copy);
+  }
+  gst_caps_unref (caps);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_cameras_out_of_range_are_an_error)
+{
+  GstRangeCamera good, bad;
+  gst_range_camera_init (&good, 0, 320, 240, 300);
+  auto refused = [] (const GstRangeCamera *cameras, guint n, gint fps_n, const char *text) {
+    GError *error = nullptr;
+    fail_if (gst_range_caps_new (cameras, n, fps_n, 1, &error));
+    g_assert_error (error, GST_LIBRARY_ERROR, GST_LIBRARY_ERROR_SETTINGS);
+    fail_unless_contains (std::string (error->message), text);
+    g_error_free (error);
+    fail_if (gst_range_caps_new (cameras, n, fps_n, 1, nullptr));
+  };
+  refused (&good, 0, 30, "at least one camera");
+  refused (&good, 1, -1, "frame rate");
+  const GstRangeCamera twice[] = {good, good};
+  refused (twice, 2, 30, "twice");
+  for (const guint id : {64u, G_MAXUINT}) {
+    gst_range_camera_init (&bad, id, 320, 240, 300);
+    refused (&bad, 1, 30, "expected 0 to 63");
+  }
+  bad = good;
+  bad.world_from_view[0] = 2;
+  refused (&bad, 1, 30, "rotation");
+  bad = good;
+  bad.near = 0;
+  refused (&bad, 1, 30, "near");
+  gst_range_camera_init (&bad, 0, 0, G_MAXINT, 300);
+  refused (&bad, 1, 30, "image size");
+  GstCaps *none = gst_caps_new_empty_simple ("video/x-raw");
+  fail_unless_equals_uint64 (gst_range_caps_get_view_ids (none), 0);
+  gst_caps_unref (none);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_append_shares_memory_and_shifts_offsets)
 {
   Rig all = ring_rig (2), first, second;
@@ -412,10 +477,10 @@ GST_END_TEST;
 GST_START_TEST (test_process_has_one_pool_of_threads)
 {
   Dl_info found{};
-  ck_assert_int_ne (dladdr (reinterpret_cast<void *> (&rangecast::run_workers), &found), 0);
+  ck_assert_int_ne (dladdr (reinterpret_cast<void *> (&rangecast_run_workers), &found), 0);
   fail_unless (found.dli_sname != nullptr);
   ck_assert_ptr_eq (dlsym (RTLD_DEFAULT, found.dli_sname), found.dli_saddr);
-  ck_assert_ptr_eq (found.dli_saddr, reinterpret_cast<void *> (&rangecast::run_workers));
+  ck_assert_ptr_eq (found.dli_saddr, reinterpret_cast<void *> (&rangecast_run_workers));
 }
 GST_END_TEST;
 
@@ -428,6 +493,8 @@ gstrange_suite ()
   tcase_add_test (tc, test_caps_carry_the_rig_and_come_back_equal);
   tcase_add_test (tc, test_bad_caps_are_refused_by_field);
   tcase_add_test (tc, test_application_reads_camera_from_caps);
+  tcase_add_test (tc, test_caps_of_cameras_give_the_same_cameras);
+  tcase_add_test (tc, test_cameras_out_of_range_are_an_error);
   tcase_add_test (tc, test_append_shares_memory_and_shifts_offsets);
   tcase_add_test (tc, test_append_refuses_the_same_view_twice);
   tcase_add_test (tc, test_merged_memory_keeps_the_views_where_they_are);
