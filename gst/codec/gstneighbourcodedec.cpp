@@ -41,6 +41,7 @@
 #include "common/bufferpools.hpp"
 #include "common/codedunits.hpp"
 #include "common/elementproperties.hpp"
+#include "common/requirecaps.hpp"
 #include "common/streamlock.hpp"
 #include "concealment.hpp"
 
@@ -523,6 +524,7 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
       "Decodes neighbour-coded range images", "gst-rangecast");
 
   transform_class->src_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_src_event);
+  transform_class->submit_input_buffer = GST_DEBUG_FUNCPTR (submit_with_caps);
   transform_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_stop);
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_transform_caps);

@@ -42,6 +42,7 @@
 #include "common/capserrors.hpp"
 #include "common/controlledvalues.hpp"
 #include "common/recycledmemories.hpp"
+#include "common/requirecaps.hpp"
 #include "common/statsreporter.hpp"
 #include "common/streamlock.hpp"
 #include "encsettings.hpp"
@@ -631,6 +632,7 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
 
   transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_sink_event);
   transform_class->src_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_src_event);
+  transform_class->submit_input_buffer = GST_DEBUG_FUNCPTR (submit_with_caps);
   transform_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_stop);
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform_caps);

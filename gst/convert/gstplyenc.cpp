@@ -17,6 +17,7 @@
 
 #include "common/capserrors.hpp"
 #include "common/elementproperties.hpp"
+#include "common/requirecaps.hpp"
 #include "common/streamlock.hpp"
 
 #include <gstrange/gstrangeframe.hpp>
@@ -55,6 +56,7 @@ struct GstPlyEncPrivate {
   PointCloudFormat::Kind kind = PointCloudFormat::kPly; /* of the output caps */
   gstrange::RangeInfo info;
   CapsErrors caps_errors;
+  guint64 frames = 0; /* since start */
 };
 
 struct _GstPlyEnc {
@@ -141,11 +143,37 @@ write_file (GstPlyEnc *self, GstBuffer *input, GstBuffer *&output)
   return writer.write (frame.views (), self->priv->info.rig, {map.data, map.size});
 }
 
+/* Whether downstream, a filesink for example, puts all buffers into one file. */
+static bool
+is_one_file (GstBaseTransform *base)
+{
+  bool bytes = false;
+  GstQuery *query = gst_query_new_formats ();
+  guint count = 0;
+  if (gst_pad_peer_query (base->srcpad, query))
+    gst_query_parse_n_formats (query, &count);
+  for (guint i = 0; i < count; i++) {
+    GstFormat format = GST_FORMAT_UNDEFINED;
+    gst_query_parse_nth_format (query, i, &format);
+    bytes |= format == GST_FORMAT_BYTES;
+  }
+  gst_query_unref (query);
+  return bytes;
+}
+
 /* Writes the file, too: the buffer's size depends on the number of points. */
 static GstFlowReturn
 gst_ply_enc_prepare_output_buffer (GstBaseTransform *base, GstBuffer *input, GstBuffer **output)
 {
   auto self = GST_PLY_ENC (base);
+  GstPlyEncPrivate *priv = self->priv;
+  if (priv->frames++ == 1 && is_one_file (base)) {
+    GST_ELEMENT_ERROR (self, STREAM, WRONG_TYPE,
+        ("a second point cloud would go into the file of the first; expected multifilesink "
+         "location=cloud-%%05d.ply, or num-buffers=1 at the source"),
+        (nullptr));
+    return GST_FLOW_ERROR;
+  }
   GstBuffer *buffer = nullptr;
   const rangecast::Status status =
       rangecast::guarded ("plyenc", [&] { return write_file (self, input, buffer); });
@@ -178,6 +206,7 @@ gst_ply_enc_start (GstBaseTransform *base)
 {
   GstPlyEncPrivate *priv = GST_PLY_ENC (base)->priv;
   priv->caps_errors.reset ();
+  priv->frames = 0;
   std::lock_guard guard (priv->lock);
   priv->choice = priv->settings.choice;
   priv->started = true;
@@ -259,6 +288,7 @@ gst_ply_enc_class_init (GstPlyEncClass *klass)
   gst_element_class_set_static_metadata (element_class, "PLY encoder", "Encoder/Image",
       "Encodes each range frame set as a binary PLY or PCD point cloud", "gst-rangecast");
 
+  transform_class->submit_input_buffer = GST_DEBUG_FUNCPTR (submit_with_caps);
   transform_class->start = GST_DEBUG_FUNCPTR (gst_ply_enc_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_ply_enc_stop);
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_ply_enc_transform_caps);

@@ -21,6 +21,7 @@
 #include "common/bufferpools.hpp"
 #include "common/capserrors.hpp"
 #include "common/elementproperties.hpp"
+#include "common/requirecaps.hpp"
 
 #include <gst/base/gstflowcombiner.h>
 #include <gst/video/gstvideopool.h>
@@ -187,6 +188,8 @@ push_caps (GstRangeSplit *self, SplitPad &pad, const View &view, DepthMap map)
   pad.video.fps_n = info.fps_n;
   pad.video.fps_d = info.fps_d;
   GstCaps *caps = gst_video_info_to_caps (&pad.video);
+  if (!pad.depth || map == DepthMap::kNone)
+    gstrange::set_view (caps, view);
   GST_INFO_OBJECT (pad.pad, "view %d, caps %" GST_PTR_FORMAT, view.id, caps);
   /* Asked first, because pushing a sticky event succeeds even if the peer refuses it. */
   const bool refused = gst_pad_is_linked (pad.pad) && !GST_PAD_IS_FLUSHING (pad.pad) &&
@@ -311,15 +314,17 @@ push_view (GstRangeSplit *self, SplitPad &pad, const SplitSettings &settings,
 }
 
 static GstFlowReturn
-gst_range_split_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
+gst_range_split_chain (GstPad *sink, GstObject *parent, GstBuffer *buffer)
 {
   auto self = GST_RANGE_SPLIT (parent);
   GstFlowReturn flow = GST_FLOW_OK;
+  if (!require_caps (GST_ELEMENT (self), sink) || self->priv->info.views () == 0) {
+    gst_buffer_unref (buffer);
+    return GST_FLOW_NOT_NEGOTIATED;
+  }
   {
     gstrange::RangeFrameMap frame (buffer, GST_MAP_READ);
     flow = gst_range_flow_return (GST_ELEMENT (self), frame.status ());
-    if (flow == GST_FLOW_OK && self->priv->info.views () == 0)
-      flow = GST_FLOW_NOT_NEGOTIATED;
     const SplitSettings settings = current_settings (self);
     for (const auto &pad : flow == GST_FLOW_OK ? current_pads (self) : SplitPads{}) {
       const GstFlowReturn pushed = push_view (self, *pad, settings, frame, buffer);

@@ -86,6 +86,7 @@ struct GstRangeCombinePrivate {
   GstAggregatorPad *colour_pad, *depth_pad; /* owned by the element */
   std::optional<PairMatcher> matcher;
   std::optional<GstVideoInfo> colour, depth; /* caps */
+  std::optional<View> depth_view;            /* of the depth camera, from the caps */
   bool negotiate = true;                     /* there are new caps */
   View view;                                 /* of the output */
   bool registered = true;                    /* colour and depth are registered pixel to pixel */
@@ -117,6 +118,19 @@ GST_ELEMENT_REGISTER_DEFINE (rangecombine, "rangecombine", GST_RANK_NONE, GST_TY
 
 /* ---- sink caps ---- */
 
+/* Those of rangesplit have the calibration. @return false after an error */
+static bool
+read_depth_view (GstRangeCombine *self, GstEvent *event)
+{
+  GstCaps *caps = nullptr;
+  gst_event_parse_caps (event, &caps);
+  self->priv->depth_view.reset ();
+  if (!gst_structure_has_field (gst_caps_get_structure (caps, 0), "rig"))
+    return true;
+  const Status status = gstrange::parse_view (caps, self->priv->depth_view.emplace ());
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+}
+
 static gboolean
 gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
 {
@@ -129,6 +143,10 @@ gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, 
     }
     priv->pad_links.begin (GST_ELEMENT (aggregator));
     (pad == priv->colour_pad ? priv->colour : priv->depth) = *info;
+    if (pad == priv->depth_pad && !read_depth_view (GST_RANGE_COMBINE (aggregator), event)) {
+      gst_event_unref (event);
+      return FALSE;
+    }
     priv->negotiate = true;
   }
   return GST_AGGREGATOR_CLASS (gst_range_combine_parent_class)->sink_event (aggregator, pad, event);
@@ -136,11 +154,26 @@ gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, 
 
 /* ---- negotiation ---- */
 
+/* Whether the calibration is that of the caps: properties take precedence. */
+static bool
+uses_caps_view (const GstRangeCombinePrivate *priv, const ViewSettings &settings)
+{
+  return priv->depth_view && settings.rig.empty () && settings.focal_length <= 0;
+}
+
 /* The view of the depth camera. */
 static Status
-make_depth_view (const ViewSettings &settings, int width, int height, View &view)
+make_depth_view (const GstRangeCombinePrivate *priv, const ViewSettings &settings, View &view)
 {
-  if (settings.rig.empty ()) {
+  const int width = priv->depth->width, height = priv->depth->height;
+  if (uses_caps_view (priv, settings)) {
+    view = *priv->depth_view;
+    if (const Status s = rangecast::scale_view (view, width, height); !s.ok ())
+      return {s.code (), "pad depth is " + size_text (width, height) +
+                             " but its calibration is for " +
+                             size_text (priv->depth_view->width, priv->depth_view->height) +
+                             "; expected the same shape"};
+  } else if (settings.rig.empty ()) {
     const double focal_length =
         settings.focal_length > 0 ? settings.focal_length : kDefaultFocalLength * width;
     view = make_pinhole_view (settings, focal_length, width, height);
@@ -186,9 +219,10 @@ static Status
 configure_views (GstRangeCombinePrivate *priv, const CombineSettings &settings)
 {
   View depth, colour;
-  if (Status s = make_depth_view (settings.view, priv->depth->width, priv->depth->height, depth);
-      !s.ok ())
+  if (Status s = make_depth_view (priv, settings.view, depth); !s.ok ())
     return s;
+  priv->depth_scale =
+      uses_caps_view (priv, settings.view) ? priv->depth_view->depth_unit_m : settings.depth_scale;
   if (Status s =
           make_colour_view (settings, depth, priv->colour->width, priv->colour->height, colour);
       !s.ok ())
@@ -248,7 +282,6 @@ negotiate (GstRangeCombine *self)
           gst_range_flow_return (GST_ELEMENT (self), configure_views (priv, settings));
       flow != GST_FLOW_OK)
     return flow;
-  priv->depth_scale = settings.depth_scale;
 
   /* There are as many pairs as the slower stream has frames. */
   const GstClockTime colour = frame_duration (priv->colour), depth = frame_duration (priv->depth);
@@ -482,6 +515,7 @@ gst_range_combine_start (GstAggregator *aggregator)
   GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
   priv->colour.reset ();
   priv->depth.reset ();
+  priv->depth_view.reset ();
   priv->negotiate = true;
   priv->frames_to_check = kCheckedFrames;
   priv->matcher->reset ();
@@ -552,7 +586,8 @@ combine_properties ()
           "Vertical principal point in pixels, without a rig (-1 = centre)", -1, 1e6,
           kMutableReady),
       P::number<&S::depth_scale> ("depth-scale", "Depth scale",
-          "Metres per unit of the input depth", 1e-7, 1, kMutableReady),
+          "Metres per unit of the input depth; caps with a calibration say it themselves", 1e-7, 1,
+          kMutableReady),
       P::number<&S::view, &V::depth_unit> ("depth-unit", "Depth unit",
           "Metres per depth unit of the output (0 = from the rig, or 0.0001)", 0, 1, kMutableReady),
       P::number<&S::view, &V::near> ("near", "Near",

@@ -24,6 +24,7 @@
 #include "common/capserrors.hpp"
 #include "common/controlledvalues.hpp"
 #include "common/elementproperties.hpp"
+#include "common/requirecaps.hpp"
 #include "common/streamlock.hpp"
 #include "roisettings.hpp"
 
@@ -601,6 +602,7 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
       "Removes the background of range images by depth and colour and crops them to the rest",
       "gst-rangecast");
 
+  transform_class->submit_input_buffer = GST_DEBUG_FUNCPTR (submit_with_caps);
   transform_class->start = GST_DEBUG_FUNCPTR (gst_roi_extract_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_roi_extract_stop);
   transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_roi_extract_sink_event);

@@ -35,6 +35,7 @@
 #include "codedviews.hpp"
 #include "common/capserrors.hpp"
 #include "common/properties.hpp"
+#include "common/requirecaps.hpp"
 #include "common/statsreporter.hpp"
 
 using gstrange::RangeInfo;
@@ -217,11 +218,12 @@ push_views (GstRangeDemux *self, GstBuffer *frame_set)
 }
 
 static GstFlowReturn
-gst_range_demux_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
+gst_range_demux_chain (GstPad *sink, GstObject *parent, GstBuffer *buffer)
 {
   auto self = GST_RANGE_DEMUX (parent);
   GstRangeDemuxPrivate *priv = self->priv;
-  GstFlowReturn flow = priv->info.views () > 0 ? GST_FLOW_OK : GST_FLOW_NOT_NEGOTIATED;
+  const bool has_caps = require_caps (GST_ELEMENT (self), sink) && priv->info.views () > 0;
+  GstFlowReturn flow = has_caps ? GST_FLOW_OK : GST_FLOW_NOT_NEGOTIATED;
   if (flow == GST_FLOW_OK && priv->coded) {
     flow = gst_range_flow_return (GST_ELEMENT (self), priv->units.read (buffer));
     if (priv->units.dropped () > 0)

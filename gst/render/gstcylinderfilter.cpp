@@ -30,6 +30,7 @@
 #include "common/capserrors.hpp"
 #include "common/controlledvalues.hpp"
 #include "common/elementproperties.hpp"
+#include "common/requirecaps.hpp"
 #include "common/streamlock.hpp"
 #include "cylindersettings.hpp"
 
@@ -339,8 +340,7 @@ gst_cylinder_filter_submit_input_buffer (
         GST_TIME_ARGS (last), GST_TIME_ARGS (now));
     reset_scene (priv);
   }
-  return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)
-      ->submit_input_buffer (base, is_discont, buffer);
+  return submit_with_caps (base, is_discont, buffer);
 }
 
 /* Controlled properties take their values of this buffer's time; the mode may be one of them. */

@@ -167,10 +167,18 @@ AvatarStream::output_frame (const AvatarPads &pads)
       std::lock_guard guard (lock_);
       linked = any_linked ();
     }
-    return !linked || any_needs_negotiation (pads) ? kAgain : flow;
+    if (!linked || any_needs_negotiation (pads))
+      return kAgain;
+    if (flow == GST_FLOW_NOT_LINKED || renegotiated_)
+      return flow;
+    for (const auto &pad : pads) /* a new peer may have had no time to send RECONFIGURE */
+      gst_pad_mark_reconfigure (pad->pad ());
+    renegotiated_ = true;
+    return kAgain;
   }
   if (flow != GST_FLOW_OK)
     return flow;
+  renegotiated_ = false;
   segment_.position = time.pts + time.duration;
   sent_++;
   std::lock_guard guard (lock_);

@@ -100,4 +100,5 @@ private:
   guint32 segment_seqnum_ = 0;
   guint group_id_ = 0;
   guint64 sent_ = 0;
+  bool renegotiated_ = false; /* because a peer refused a frame; none has been sent since */
 };

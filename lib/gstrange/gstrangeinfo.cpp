@@ -93,6 +93,24 @@ set_rig (GstCaps *caps, const rangecast::Rig &rig)
   gst_buffer_unref (buffer);
 }
 
+void
+set_view (GstCaps *caps, const View &view)
+{
+  set_rig (caps, {{view}});
+}
+
+Status
+parse_view (const GstCaps *caps, View &view)
+{
+  Rig rig;
+  if (Status s = parse_rig (gst_caps_get_structure (caps, 0), rig); !s.ok ())
+    return s;
+  if (rig.views.size () != 1 || !rig.views[0].is_range_view ())
+    return {StatusCode::kBadValue, "caps: field \"rig\" is not one rectified view"};
+  view = rig.views[0];
+  return {};
+}
+
 static GstCaps *
 with_common_fields (GstCaps *caps, const RangeInfo &info)
 {

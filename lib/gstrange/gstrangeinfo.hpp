@@ -33,6 +33,14 @@ RangeInfo make_info (rangecast::Rig rig, int fps_n, int fps_d);
 /** video/x-range. Returns: (transfer full) */
 GstCaps *make_range_caps (const RangeInfo &info);
 
+/** Adds the field "rig", with one view, to the video/x-raw caps of its colour or depth image. */
+void set_view (GstCaps *caps, const rangecast::View &view);
+
+/** Reads what set_view() added.
+ *  @return kNotFound if there is no such field; kBadValue if it is not one range view, or the error
+ *  of decode_rig() */
+rangecast::Status parse_view (const GstCaps *caps, rangecast::View &view);
+
 /** Copies caps and replaces their rig. Returns: (transfer full) */
 GstCaps *with_rig (const GstCaps *caps, const rangecast::Rig &rig);
 

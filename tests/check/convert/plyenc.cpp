@@ -7,6 +7,7 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <glib/gstdio.h>
 #include <map>
 #include <random>
 #include <string>
@@ -158,6 +159,53 @@ GST_START_TEST (test_works_again_after_null)
         gst_element_set_state (pipeline, GST_STATE_NULL), GST_STATE_CHANGE_SUCCESS);
   }
   gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_second_cloud_for_one_file_is_one_error)
+{
+  gchar *file = g_build_filename (g_get_tmp_dir (), "rangecast-two-clouds.ply", nullptr);
+  gchar *launch = g_strdup_printf ("avatartestsrc num-buffers=2 ! video/x-range,width=32,height=24 "
+                                   "! plyenc ! filesink location=%s",
+      file);
+  GstElement *pipeline = gst_parse_launch (launch, nullptr);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  GstMessage *message = gst_bus_timed_pop_filtered (
+      bus, 30 * GST_SECOND, GstMessageType (GST_MESSAGE_ERROR | GST_MESSAGE_EOS));
+  fail_unless_equals_int (GST_MESSAGE_TYPE (message), GST_MESSAGE_ERROR);
+  GError *error = nullptr;
+  gst_message_parse_error (message, &error, nullptr);
+  fail_unless_contains (error->message, "multifilesink");
+  g_error_free (error);
+  gst_message_unref (message);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (bus);
+  gst_object_unref (pipeline);
+  g_remove (file);
+  g_free (launch);
+  g_free (file);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_several_clouds_go_into_numbered_files)
+{
+  gchar *folder = g_dir_make_tmp ("rangecast-clouds-XXXXXX", nullptr);
+  gchar *launch = g_strdup_printf ("avatartestsrc num-buffers=3 ! video/x-range,width=32,height=24 "
+                                   "! plyenc ! multifilesink location=%s/%%d.ply",
+      folder);
+  GstElement *pipeline = gst_parse_launch (launch, nullptr);
+  play_to_the_end (pipeline);
+  gst_object_unref (pipeline);
+  for (int i = 0; i < 3; i++) {
+    gchar *file = g_strdup_printf ("%s/%d.ply", folder, i);
+    fail_unless (g_file_test (file, G_FILE_TEST_IS_REGULAR), "%s", file);
+    g_remove (file);
+    g_free (file);
+  }
+  g_rmdir (folder);
+  g_free (launch);
+  g_free (folder);
 }
 GST_END_TEST;
 
@@ -546,6 +594,8 @@ plyenc_suite ()
   tcase_add_test (tc, test_empty_frame_set_is_a_file_without_points);
   tcase_add_test (tc, test_view_that_the_rig_lacks_is_one_error);
   tcase_add_test (tc, test_works_again_after_null);
+  tcase_add_test (tc, test_second_cloud_for_one_file_is_one_error);
+  tcase_add_test (tc, test_several_clouds_go_into_numbered_files);
   tcase_add_test (tc, test_normals_of_a_slanted_plane_are_the_planes);
   tcase_add_test (tc, test_normals_do_not_mix_two_surfaces);
   tcase_add_test (tc, test_normal_of_a_lone_point_or_line_is_towards_the_camera);

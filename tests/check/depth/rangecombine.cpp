@@ -5,6 +5,7 @@
 
 #include <glib/gstdio.h>
 #include <gst/video/video.h>
+#include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/rigfile/rig_file.hpp>
 #include <unistd.h>
 
@@ -547,6 +548,71 @@ GST_START_TEST (test_changes_states_twice)
 }
 GST_END_TEST;
 
+/* The first buffer of an appsink, and its caps. */
+static GstSample *
+pull_preroll (GstElement *pipeline, const char *name)
+{
+  GstElement *sink = gst_bin_get_by_name (GST_BIN (pipeline), name);
+  GstSample *sample = nullptr;
+  g_signal_emit_by_name (sink, "pull-preroll", &sample);
+  gst_object_unref (sink);
+  fail_unless (sample != nullptr, "%s", name);
+  return sample;
+}
+
+/* Through an element that keeps what it does not know of caps, too. */
+GST_START_TEST (test_takes_back_what_rangesplit_gave_without_properties)
+{
+  GstElement *pipeline = gst_parse_launch (
+      "avatartestsrc num-buffers=1 views=3 arc=90 ! tee name=t  t. ! queue ! appsink name=whole "
+      "t. ! queue ! rangesplit name=s  s.colour_2 ! queue ! videoconvert ! c.colour "
+      "s.depth_2 ! queue ! videorate ! c.depth  rangecombine name=c ! appsink name=combined",
+      nullptr);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  GstSample *whole = pull_preroll (pipeline, "whole"),
+            *combined = pull_preroll (pipeline, "combined");
+  GstRangeCamera before, after;
+  fail_unless (gst_range_caps_get_camera (gst_sample_get_caps (whole), 2, &before));
+  fail_unless (gst_range_caps_get_camera (gst_sample_get_caps (combined), 2, &after));
+  fail_unless_equals_float (after.fx, before.fx);
+  fail_unless_equals_float (after.depth_unit, before.depth_unit);
+  fail_unless_equals_float (after.near, before.near);
+  fail_unless_equals_float (after.far, before.far);
+  for (int i = 0; i < 12; i++)
+    fail_unless_equals_float (after.world_from_view[i], before.world_from_view[i]);
+  {
+    gstrange::RangeFrameMap from (gst_sample_get_buffer (whole), GST_MAP_READ);
+    gstrange::RangeFrameMap to (gst_sample_get_buffer (combined), GST_MAP_READ);
+    const auto &image = from.views ()[2], &made = to.views ()[0];
+    fail_unless_equals_int (made.view_id, 2);
+    fail_unless (count_points (image) > 1000);
+    fail_unless_equals_uint64 (count_points (made), count_points (image));
+    for (int y = 0; y < image.roi.height; y++)
+      for (int x = 0; x < image.roi.width; x++)
+        fail_unless_equals_int (
+            made.depth.row (image.roi.y + y)[image.roi.x + x], image.depth.row (y)[x]);
+  }
+  gst_sample_unref (whole);
+  gst_sample_unref (combined);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_calibration_that_is_none_is_one_error_that_names_the_field)
+{
+  Combine combine;
+  GstCaps *caps =
+      gst_caps_from_string ("video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1");
+  GstBuffer *rubbish = gst_buffer_new_memdup ("rubbish", 7);
+  gst_caps_set_simple (caps, "rig", GST_TYPE_BUFFER, rubbish, nullptr);
+  gst_buffer_unref (rubbish);
+  gst_harness_push_event (combine.depth, gst_event_new_caps (caps));
+  gst_caps_unref (caps);
+  fail_unless_contains (next_message_text (combine.bus, GST_MESSAGE_ERROR), "field \"rig\"");
+}
+GST_END_TEST;
+
 static Suite *
 rangecombine_suite ()
 {
@@ -575,6 +641,8 @@ rangecombine_suite ()
   tcase_add_test (tc, test_end_of_one_pad_ends_the_stream);
   tcase_add_test (tc, test_new_size_in_the_stream_is_taken);
   tcase_add_test (tc, test_changes_states_twice);
+  tcase_add_test (tc, test_takes_back_what_rangesplit_gave_without_properties);
+  tcase_add_test (tc, test_calibration_that_is_none_is_one_error_that_names_the_field);
   return suite;
 }
 
