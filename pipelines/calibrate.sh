@@ -10,6 +10,7 @@ usage: calibrate.sh --left WHAT [--right WHAT] [--third WHAT] [--left WHAT ...] 
   --left WHAT     the camera of a view, or the left camera of its stereo pair; each --left begins a view: 0, 1, ...
   --right WHAT    the right camera of that stereo pair
   --third WHAT    the third camera of that view
+  --side-by-side WHAT, --top-bottom WHAT  a stereo camera that packs both pictures of a view into one, instead of --left and --right
   --out FILE      rig file to write: .yaml or .json
 WHAT is one of
   'left%02d.jpg'  numbered pictures (.jpg, .png, .bmp); only numbers that all cameras have are used
@@ -69,13 +70,13 @@ roles=() views=() whats=() out= properties=() stills= window=
 view=-1
 while [ $# -gt 0 ]; do
   case "$1" in
-    --left | --right | --third | --out | --board | --columns | --rows | --dictionary | --distortion | --world | --near | --far | \
+    --left | --right | --third | --side-by-side | --top-bottom | --out | --board | --columns | --rows | --dictionary | --distortion | --world | --near | --far | \
       --min-frames | --square | --marker | --stills)
       [ $# -ge 2 ] && [[ -n "$2" && "$2" != --* ]] || die "option $1 needs a value" ;;
   esac
   case "$1" in
-    --left | --right | --third)
-      [ "$1" != --left ] || view=$((view + 1))
+    --left | --right | --third | --side-by-side | --top-bottom)
+      [ "$1" = --right ] || [ "$1" = --third ] || view=$((view + 1))
       [ $view -ge 0 ] || die "$1: expected after the --left of its view"
       roles+=("${1#--}") views+=("$view") whats+=("$2"); shift ;;
     --out) out=$2; shift ;;
@@ -90,7 +91,7 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-[ ${#whats[@]} -gt 0 ] && [ -n "$out" ] || { usage >&2; die "expected at least --left and --out"; }
+[ ${#whats[@]} -gt 0 ] && [ -n "$out" ] || { usage >&2; die "expected at least --left or a packed camera, and --out"; }
 
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
@@ -170,11 +171,34 @@ describe_source () { # camera's number, WHAT
   fi
 }
 
+# Prints width and height of the pictures of `source`.
+size_of_source () {
+  LC_ALL=C timeout 30 gst-launch-1.0 -v "${source[@]}" ! identity eos-after=2 ! fakesink name=measured 2>/dev/null |
+    sed -nE 's/.*measured\.GstPad:sink: caps = .*width=\(int\)([0-9]+), height=\(int\)([0-9]+).*/\1 \2/p' | head -n 1
+}
+
 pads=() sources=()
+add_camera () { # view, role, then the elements of its source
+  local number=$((${#pads[@]} / 2)) view=$1 role=$2
+  shift 2
+  pads+=("sink_$number::view=$view" "sink_$number::role=$role")
+  sources+=("$@" ! "c.sink_$number")
+}
 for i in "${!whats[@]}"; do
   describe_source "$i" "${whats[i]}"
-  pads+=("sink_$i::view=${views[i]}" "sink_$i::role=${roles[i]}")
-  sources+=("${source[@]}" ! "c.sink_$i")
+  case "${roles[i]}" in
+    left | right | third) add_camera "${views[i]}" "${roles[i]}" "${source[@]}" ;;
+    *)
+      read -r width height < <(size_of_source) || die "--${roles[i]}: no picture comes from '${whats[i]}'"
+      if [ "${roles[i]}" = side-by-side ]; then
+        left=(videocrop "right=$((width / 2))") right=(videocrop "left=$((width / 2))")
+      else
+        left=(videocrop "bottom=$((height / 2))") right=(videocrop "top=$((height / 2))")
+      fi
+      sources+=("${source[@]}" ! tee "name=packed_$i")
+      add_camera "${views[i]}" left "packed_$i." ! queue ! "${left[@]}"
+      add_camera "${views[i]}" right "packed_$i." ! queue ! "${right[@]}" ;;
+  esac
 done
 sink=(fakesink sync=false)
 [ -z "$window" ] || sink=(videoconvert ! autovideosink sync=false)

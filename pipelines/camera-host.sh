@@ -16,6 +16,8 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
                   sequences viewN-left-%05d.png from 0), which begin with the empty scene;
                   range: exact range images of the built-in figure, without cameras and stereo
                   matching, to test everything downstream of them;
+                  side-by-side=SOURCE, top-bottom=SOURCE: a stereo camera that packs both pictures into one, in
+                  gst-launch-1.0 syntax, e.g. "side-by-side=v4l2src ! image/jpeg,width=1280,height=480 ! jpegdec";
                   cameras: the cameras that the rig names; cameras=LEFT,RIGHT[,THIRD]: cameras by
                   name, serial number or address
   --views N       number of simulated views, for avatar and range: as many as the rig has (the default)
@@ -176,8 +178,13 @@ case "$input" in
     [ "$input" = avatar ] || cameras+=("location=${input#avatar=}")
     cameras+=(cameras.left ! "$caps" ! queue max-size-buffers=2 ! depth.left
       cameras.right ! "$caps" ! queue max-size-buffers=2 ! depth.right) ;;
+  side-by-side=* | top-bottom=*)
+    eval "cameras=(${input#*=})"
+    [ ${#cameras[@]} -gt 0 ] || die "--input: expected a source after ${input%%=*}="
+    depth=("${depth[@]:0:2}" "packing=${input%%=*}" "${depth[@]:2}")
+    cameras+=(! queue max-size-buffers=2 ! depth.left) ;;
   *)
-    [ -d "$input" ] || die "--input: '$input' is not avatar, avatar=MODEL, range, cameras, cameras=LEFT,RIGHT or a folder of recorded pairs"
+    [ -d "$input" ] || die "--input: '$input' is not avatar, avatar=MODEL, range, cameras, cameras=LEFT,RIGHT, side-by-side=SOURCE, top-bottom=SOURCE or a folder of recorded pairs"
     read_side left
     cameras=("${side[@]}" ! queue ! depth.left)
     read_side right

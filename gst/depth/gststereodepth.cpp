@@ -14,6 +14,9 @@
  * A third camera on the request pad `third`, beside or above the left one, adds depth that the
  * right camera cannot see. It needs a rig file that contains it.
  *
+ * A stereo camera that packs both views into one image is linked to pad `left` alone, see
+ * #GstStereoDepth:packing.
+ *
  * ## Example launch line
  * |[
  * gst-launch-1.0 avatartestsrc name=c num-buffers=50 c.left ! queue ! d.left c.right ! queue !
@@ -29,6 +32,7 @@
 #include "common/elementproperties.hpp"
 #include "common/videoframereader.hpp"
 #include "framepairing.hpp"
+#include "packedinput.hpp"
 #include "padlinkwatch.hpp"
 #include "roischedule.hpp"
 #include "stereosettings.hpp"
@@ -62,6 +66,7 @@ GST_DEBUG_CATEGORY_STATIC (gst_stereo_depth_debug);
 /* Data flow, in the order of this file. All of it runs on GstAggregator's streaming thread, the
  * source pad's task:
  *
+ *   packed           divides images at pad left that contain both views (PackedInput)
  *   sink_event       records the caps of each pad
  *   aggregate
  *     dequeue_pair   takes a left and a right image of one running time off their pads. A left
@@ -118,6 +123,7 @@ struct GstStereoDepthPrivate {
   StatsReporter reporter;
   PadLinkWatch pad_links;
   RoiSchedule rois;
+  PackedInput packed;                       /* of pad left */
   std::atomic<bool> third_released = false; /* cleared by the streaming thread */
 
   /* streaming thread */
@@ -677,6 +683,7 @@ gst_stereo_depth_start (GstAggregator *aggregator)
   priv->rois.reset ();
   priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
+  priv->packed.start (priv->settings.packing);
   priv->counters = {};
   priv->earliest = GST_CLOCK_TIME_NONE;
   return TRUE;
@@ -709,6 +716,14 @@ gst_stereo_depth_stop (GstAggregator *aggregator)
   return TRUE;
 }
 
+static GstStateChangeReturn
+gst_stereo_depth_change_state (GstElement *element, GstStateChange transition)
+{
+  if (transition == GST_STATE_CHANGE_PAUSED_TO_READY)
+    GST_STEREO_DEPTH (element)->priv->packed.stop ();
+  return GST_ELEMENT_CLASS (gst_stereo_depth_parent_class)->change_state (element, transition);
+}
+
 static GstStructure *
 make_stats (const GstStereoDepthPrivate *priv)
 {
@@ -738,6 +753,7 @@ gst_stereo_depth_init (GstStereoDepth *self)
   priv->left = add_sink_pad (GST_ELEMENT (self), kPadNames[kLeft]);
   priv->right = add_sink_pad (GST_ELEMENT (self), kPadNames[kRight]);
   priv->matcher.emplace (priv->left, priv->right, GST_CAT_DEFAULT);
+  priv->packed.watch (GST_ELEMENT (self), GST_PAD (priv->left), GST_PAD (priv->right));
 }
 
 static void
@@ -762,6 +778,7 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
       "Computes range images from a stereo pair of cameras, or from three cameras",
       "gst-rangecast");
 
+  element_class->change_state = GST_DEBUG_FUNCPTR (gst_stereo_depth_change_state);
   element_class->release_pad = GST_DEBUG_FUNCPTR (gst_stereo_depth_release_pad);
   aggregator_class->start = GST_DEBUG_FUNCPTR (gst_stereo_depth_start);
   aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_stereo_depth_stop);

@@ -11,7 +11,7 @@ unlinked_sink_pads (GstElement *element)
   std::string names;
   const auto add = [] (GstElement *, GstPad *pad, gpointer to) -> gboolean {
     auto &list = *static_cast<std::string *> (to);
-    if (!gst_pad_is_linked (pad))
+    if (!gst_pad_is_linked (pad) && !gst_pad_has_current_caps (pad)) /* PackedInput feeds one */
       list += std::string (list.empty () ? "" : ", ") + GST_PAD_NAME (pad);
     return TRUE;
   };

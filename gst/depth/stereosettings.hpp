@@ -7,6 +7,7 @@
 #include <rangecast/stereo/disparity_finder.hpp>
 
 #include "common/properties.hpp"
+#include "packedinput.hpp"
 #include "viewsettings.hpp"
 
 /** stereodepth's properties. Guarded by the element's lock. */
@@ -16,6 +17,7 @@ struct StereoDepthSettings {
   double principal_offset = 0; ///< pixels, without a rig
   rangecast::StereoSettings core;
   int refresh_interval = 30; ///< frames
+  Packing packing = Packing::kAuto;
   bool qos = true;
 };
 

@@ -27,6 +27,35 @@ test_pictures_in_order_do_as_well_as_numbered_ones () {
   grep -q "all: 8 frames" report.txt || fail "$(tail -n 5 report.txt)"
 }
 
+# Writes packed-01.png, ...: left and right pictures side by side.
+pack_boards () {
+  local number
+  for number in $(seq -w 1 14); do
+    [ -f "$boards/left$number.jpg" ] || continue
+    gst-launch-1.0 -q compositor name=m sink_1::xpos=640 ! videoconvert ! pngenc ! filesink "location=packed-$number.png" \
+      filesrc location="$boards/left$number.jpg" ! jpegdec ! m.sink_0 filesrc location="$boards/right$number.jpg" ! jpegdec ! m.sink_1
+  done
+}
+
+test_packed_pictures_give_the_rig_of_separate_ones () {
+  need_boards
+  pack_boards
+  "$pipelines/calibrate.sh" --side-by-side 'packed-%02d.png' --near 0.2 --far 1 --out rig.yaml >report.txt
+  grep -q "all: 13 frames, reprojection error 0.2" report.txt || fail "$(tail -n 5 report.txt)"
+  "$pipelines/webcam.sh" --rig rig.yaml --input "filesrc location=packed-01.png ! pngdec ! videoconvert" --png view.png
+  expect_file view.png 20000
+  expect_error "no picture comes from 'filesrc location=nothing%d'" "$pipelines/calibrate.sh" --top-bottom 'filesrc location=nothing%d' --out other.yaml
+}
+
+test_webcam_calibrates_first () {
+  need_boards
+  pack_boards
+  "$pipelines/webcam.sh" --rig rig.yaml --calibrate 'packed-%02d.png' \
+    --input "filesrc location=packed-01.png ! pngdec ! videoconvert" --png view.png -- --square 0.03 >report.txt
+  grep -q "all: 13 frames" report.txt || fail "$(tail -n 5 report.txt)"
+  expect_file view.png 20000
+}
+
 test_swapped_pictures_are_one_error () {
   need_boards
   expect_error "left and right cameras are swapped" \
@@ -43,7 +72,7 @@ test_bad_arguments_are_named () {
   expect_error "no pictures 'nothing%d.png'" "$pipelines/calibrate.sh" --left nothing%d.png --out rig.yaml
   expect_error "no file, pictures or source 'nothing.mp4'" "$pipelines/calibrate.sh" --left nothing.mp4 --out rig.yaml
   expect_error "--right: expected after the --left of its view" "$pipelines/calibrate.sh" --right a%d.png --out rig.yaml
-  expect_error "expected at least --left and --out" "$pipelines/calibrate.sh" --left a%d.png
+  expect_error "expected at least --left or a packed camera, and --out" "$pipelines/calibrate.sh" --left a%d.png
   expect_error "its folder does not exist" "$pipelines/calibrate.sh" --left videotestsrc --out nowhere/rig.yaml
 }
 
