@@ -1,25 +1,30 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Renders one rectified stereo pair of image files from a slightly different viewpoint.
+# Renders one stereo pair of image files from a slightly different viewpoint.
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 
 usage () {
   cat <<'END'
-usage: stereo-to-png.sh LEFT RIGHT PNG --focal-length PX --baseline M --near M --far M [options]
+usage: stereo-to-png.sh LEFT RIGHT PNG --rig FILE [options]
+       stereo-to-png.sh LEFT RIGHT PNG --focal-length PX --baseline M --near M --far M [options]
+  --rig FILE         calibration of both pictures, which need not be rectified
+  --view N           view-id of the pair in the rig (default 0)
   --focal-length PX  focal length of both (rectified) pictures
   --baseline M       distance of the cameras, metres
-  --near M --far M   depth range, metres
+  --near M --far M   depth range, metres (with --rig: default the rig's)
   --turn DEG         azimuth of the rendered view from the camera's (default 20)
   --size WxH         size of the rendered picture (default 960x720)
   --algorithm NAME   bm, sgbm, sgbm-3way, sgm (default: stereodepth's)
 END
 }
 
-files=() focal= baseline= near= far= turn=20 size=960x720 algorithm=()
+files=() rig= view=0 focal= baseline= near= far= turn=20 size=960x720 algorithm=()
 while [ $# -gt 0 ]; do
   option=$1
   case "$1" in
+    --rig) rig=${2:-}; shift ;;
+    --view) view=${2:-}; shift ;;
     --focal-length) focal=${2:-}; shift ;;
     --baseline) baseline=${2:-}; shift ;;
     --near) near=${2:-}; shift ;;
@@ -33,14 +38,26 @@ while [ $# -gt 0 ]; do
   esac
   shift || die "option $option needs a value"
 done
-[ ${#files[@]} = 3 ] && [ -n "$focal" ] && [ -n "$baseline" ] && [ -n "$near" ] && [ -n "$far" ] ||
-  { usage >&2; die "expected LEFT RIGHT PNG, --focal-length, --baseline, --near and --far"; }
+calibration=()
+[ -z "$near" ] || calibration+=("near=$near")
+[ -z "$far" ] || calibration+=("far=$far")
+if [ -n "$rig" ]; then
+  [ -f "$rig" ] || die "--rig: no file '$rig'"
+  need_number "$view" --view 0 63
+  [ -z "$focal$baseline" ] || die "--rig: expected without --focal-length and --baseline, which it contains"
+  calibration+=("rig=$rig" "view-id=$view")
+else
+  [ -n "$focal" ] && [ -n "$baseline" ] && [ ${#calibration[@]} = 2 ] ||
+    { usage >&2; die "expected LEFT RIGHT PNG and --rig, or --focal-length, --baseline, --near and --far"; }
+  calibration+=("focal-length=$focal" "baseline=$baseline")
+fi
+[ ${#files[@]} = 3 ] || { usage >&2; die "expected LEFT RIGHT PNG"; }
 [ -f "${files[0]}" ] || die "no file '${files[0]}'"
 [ -f "${files[1]}" ] || die "no file '${files[1]}'"
 need_size "$size" --size
 
 launch filesrc "location=${files[0]}" ! decodebin ! videoconvert ! depth.left \
   filesrc "location=${files[1]}" ! decodebin ! videoconvert ! depth.right \
-  stereodepth name=depth "focal-length=$focal" "baseline=$baseline" "near=$near" "far=$far" "${algorithm[@]}" \
+  stereodepth name=depth "${calibration[@]}" "${algorithm[@]}" \
   ! striprender "azimuth=$turn" ! "video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}" \
   ! gldownload ! videoconvert ! pngenc ! filesink "location=${files[2]}"

@@ -13,6 +13,9 @@ test_thirteen_pairs_become_a_rig_that_stereodepth_reads () {
   gst-launch-1.0 -q stereodepth name=d rig=rig.yaml ! plyenc ! filesink location=cloud.ply \
     filesrc location="$boards/left01.jpg" ! jpegdec ! d.left filesrc location="$boards/right01.jpg" ! jpegdec ! d.right
   expect_file cloud.ply 100000
+  "$pipelines/stereo-to-png.sh" "$boards/left01.jpg" "$boards/right01.jpg" view.png --rig rig.yaml
+  expect_file view.png 100000
+  expect_error "--rig: no file 'none'" "$pipelines/stereo-to-png.sh" a b c --rig none
 }
 
 test_pictures_in_order_do_as_well_as_numbered_ones () {

@@ -272,9 +272,9 @@ GST_END_TEST
 
 GST_START_TEST (test_missing_permission_is_told_with_the_rule_to_add)
 {
-  if (geteuid () == 0)
-    ck_assert_int_eq (
-        setuid (65534), 0); // root may open everything; the test has a process of its own
+  // Root may open everything; the test has a process of its own.
+  if (geteuid () == 0 && setuid (65534) != 0)
+    RANGECAST_SKIP ("this container does not let root become another user");
   TestBed bed;
   bed.add (usb_camera (1, "SN1"));
   std::filesystem::permissions (bed.node (1), std::filesystem::perms::none);
