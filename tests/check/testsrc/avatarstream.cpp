@@ -332,10 +332,12 @@ make_sink_pad (const char *caps = nullptr)
 {
   GstPad *sink;
   if (caps) {
-    GstStaticPadTemplate pad_template =
-        GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (nullptr));
-    pad_template.static_caps.string = caps;
-    sink = gst_pad_new_from_static_template (&pad_template, "sink");
+    GstCaps *taken = gst_caps_from_string (caps);
+    GstPadTemplate *pad_template =
+        gst_pad_template_new ("sink", GST_PAD_SINK, GST_PAD_ALWAYS, taken);
+    sink = gst_pad_new_from_template (pad_template, "sink");
+    gst_object_unref (pad_template);
+    gst_caps_unref (taken);
   } else {
     sink = gst_pad_new ("sink", GST_PAD_SINK);
   }
