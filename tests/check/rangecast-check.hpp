@@ -89,9 +89,9 @@ inline constexpr const char *kAccessUnitsOrSlices =
 
 /** Waits for the bus's next error (or warning) and gives its text; empty if none came in 5 s. */
 inline std::string
-next_message_text (GstBus *bus, GstMessageType type)
+next_message_text (GstBus *bus, GstMessageType type, GstClockTime timeout = 5 * GST_SECOND)
 {
-  GstMessage *message = gst_bus_timed_pop_filtered (bus, 5 * GST_SECOND, type);
+  GstMessage *message = gst_bus_timed_pop_filtered (bus, timeout, type);
   if (!message)
     return "";
   GError *error = nullptr;

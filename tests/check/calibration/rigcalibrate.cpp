@@ -164,7 +164,7 @@ struct Calibrate {
   }
   void expect_error (const char *text)
   {
-    const std::string said = next_message_text (bus, GST_MESSAGE_ERROR);
+    const std::string said = next_message_text (bus, GST_MESSAGE_ERROR, 90 * GST_SECOND);
     fail_unless (
         said.find (text) != std::string::npos, "expected '%s', got '%s'", text, said.c_str ());
     fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr, "a second error");
