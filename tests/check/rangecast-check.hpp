@@ -87,7 +87,7 @@ make_frame_set (const Rig &rig, GstClockTime time = 0, Roi roi = {})
 inline constexpr const char *kAccessUnitsOrSlices =
     "video/x-neighbour-code,alignment={access-unit,slice}";
 
-/** Waits for the bus's next error (or warning) and gives its text; empty if none came in 5 s. */
+/** Waits for the bus's next error (or warning) and gives its text; empty if none comes in time. */
 inline std::string
 next_message_text (GstBus *bus, GstMessageType type, GstClockTime timeout = 5 * GST_SECOND)
 {
