@@ -292,8 +292,9 @@ test_server_ends_at_once_and_leaves_nothing () {
   local signal
   for signal in INT TERM; do
     serve
+    rm -f watched.txt # of the signal before
     watch "${links[0]}" "" 1000000 >watched.txt 2>&1 &
-    until_true 20 grep -q welcome watched.txt
+    until_true 20 grep -qs welcome watched.txt
     stop_server $signal
     wait $! || fail "the client failed: $(cat watched.txt)"
     grep -q '^CLOSED 1001\|"end"' watched.txt || fail "$signal: $(cat watched.txt)"
