@@ -80,7 +80,7 @@ error_of (const std::string &launch)
   GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
   GstBus *bus = gst_element_get_bus (pipeline);
   gst_element_set_state (pipeline, GST_STATE_PLAYING);
-  const std::string text = next_message_text (bus, GST_MESSAGE_ERROR);
+  const std::string text = next_message_text (bus, GST_MESSAGE_ERROR, 60 * GST_SECOND);
   gst_element_set_state (pipeline, GST_STATE_NULL);
   gst_object_unref (bus);
   gst_object_unref (pipeline);
