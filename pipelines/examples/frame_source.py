@@ -54,20 +54,25 @@ def main():
     options = parser.parse_args()
 
     Gst.init(None)
-    pipeline = Gst.parse_launch(f"appsrc name=source format=time block=true max-buffers=2 ! {options.sink}")
+    pipeline = Gst.parse_launch(f"appsrc name=source format=time ! {options.sink}")
     source, bus = pipeline.get_by_name("source"), pipeline.get_bus()
     caps = GstRange.new_caps(cameras(), options.fps)
     for name, value in ("caps", caps), ("is-live", options.live), ("do-timestamp", options.live):
         source.set_property(name, value)
-    pipeline.set_state(Gst.State.PLAYING)
+    failed = pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE
     duration = int(Gst.SECOND / options.fps) if options.fps else Gst.CLOCK_TIME_NONE
+    message = None
     for number in range(options.frames):
+        while not (failed or message) and source.get_property("current-level-buffers") >= 2:
+            message = bus.timed_pop_filtered(Gst.SECOND // 100, Gst.MessageType.ERROR)  # waits for room, or an error
+        if failed or message:
+            break
         pts = Gst.CLOCK_TIME_NONE if options.live else int(number * Gst.SECOND / options.fps)
         buffer = GstRange.new_buffer(caps, capture(number), pts, duration)
         if source.emit("push-buffer", buffer) != Gst.FlowReturn.OK:
             break  # the error is on the bus
     source.emit("end-of-stream")
-    message = bus.timed_pop_filtered(Gst.CLOCK_TIME_NONE, Gst.MessageType.EOS | Gst.MessageType.ERROR)
+    message = message or bus.timed_pop_filtered(Gst.CLOCK_TIME_NONE, Gst.MessageType.EOS | Gst.MessageType.ERROR)
     pipeline.set_state(Gst.State.NULL)
     if message.type == Gst.MessageType.ERROR:
         error, details = message.parse_error()
