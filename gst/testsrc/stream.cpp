@@ -245,9 +245,11 @@ AvatarStream::negotiate_pad (AvatarPad &pad, const AvatarFormat &format)
     return GST_FLOW_FLUSHING;
   if (GST_PAD_NEEDS_RECONFIGURE (pad.pad ()))
     return kAgain;
+  const bool is_range = pad.kind () == AvatarPadKind::kRange;
   GST_ELEMENT_ERROR (element_, CORE, NEGOTIATION,
-      ("pad %s: the peer accepts none of the formats { RGBx, BGRx, RGB, BGR, GRAY8 }",
-          GST_PAD_NAME (pad.pad ())),
+      ("pad %s: the peer accepts %s", GST_PAD_NAME (pad.pad ()),
+          is_range ? "no video/x-range with as many views as property views says"
+                   : "none of the formats { RGBx, BGRx, RGB, BGR, GRAY8 }"),
       (nullptr));
   return GST_FLOW_ERROR;
 }
