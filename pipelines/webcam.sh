@@ -55,7 +55,7 @@ if [ -z "$input" ]; then
   [ -c "$device" ] || die "--device: no camera '$device'; gst-device-monitor-1.0 Video/Source lists cameras"
   # Most cameras have their larger sizes as JPEG only.
   pixels="width=${size%x*},height=${size#*x},framerate=$fps/1"
-  input="v4l2src device=$device ! image/jpeg,$pixels;video/x-raw,$pixels ! decodebin ! videoconvert"
+  input="v4l2src device=$device ! 'image/jpeg,$pixels;video/x-raw,$pixels' ! decodebin ! videoconvert"
 fi
 if [ ! -e "$rig" ]; then
   need_place "$rig"

@@ -170,7 +170,7 @@ gst_ply_enc_prepare_output_buffer (GstBaseTransform *base, GstBuffer *input, Gst
   if (priv->frames++ == 1 && is_one_file (base)) {
     GST_ELEMENT_ERROR (self, STREAM, WRONG_TYPE,
         ("a second point cloud would go into the file of the first; expected multifilesink "
-         "location=cloud-%%05d.ply, or num-buffers=1 at the source"),
+         "location=cloud-%%05d.ply, or a stream of one frame set"),
         (nullptr));
     return GST_FLOW_ERROR;
   }

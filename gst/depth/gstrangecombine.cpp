@@ -40,6 +40,7 @@
 #include <rangecast/geometry/size_text.hpp>
 #include <rangecast/registration/registration.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 using rangecast::RangeImage;
@@ -94,6 +95,7 @@ struct GstRangeCombinePrivate {
   GstBuffer *unregistered = nullptr;         /* RGBx colour before registration */
   std::vector<guint16> swapped;              /* depth of GRAY16_BE */
   int frames_to_check = kCheckedFrames;      /* 0: depth was found, or a warning was posted */
+  std::optional<rangecast::DepthRange> out_of_range; /* of the last frame that was checked */
   double depth_scale = kDefaultDepthScale;
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE; /* of the output */
   GstBufferPool *pool = nullptr;
@@ -367,8 +369,24 @@ combine_cameras (GstRangeCombinePrivate *priv, GstBuffer *colour,
 }
 
 /* Warns once if the first frames have depth, but none between near and far: most likely
- * depth-scale is wrong.
- * @param depth  of the input */
+ * depth-scale is wrong. */
+static void
+warn_of_range (GstRangeCombine *self)
+{
+  GstRangeCombinePrivate *priv = self->priv;
+  if (!priv->out_of_range)
+    return;
+  const rangecast::DepthRange range = *std::exchange (priv->out_of_range, std::nullopt);
+  priv->frames_to_check = 0;
+  GST_ELEMENT_WARNING (self, STREAM, FORMAT,
+      ("pad depth: no pixel lies between near (%g m) and far (%g m); values are %d to %d, with "
+       "depth-scale=%g %g to %g m; expected another depth-scale, near or far",
+          priv->view.near_m, priv->view.far_m, range.min, range.max, priv->depth_scale,
+          range.min * priv->depth_scale, range.max * priv->depth_scale),
+      (nullptr));
+}
+
+/* @param depth  of the input */
 static void
 check_range (
     GstRangeCombine *self, rangecast::ImageView<const std::uint16_t> depth, const RangeImage &image)
@@ -378,18 +396,15 @@ check_range (
     return;
   if (rangecast::count_points (image) > 0) {
     priv->frames_to_check = 0;
+    priv->out_of_range.reset ();
     return;
   }
   const rangecast::DepthRange range = rangecast::find_depth_range (depth);
-  if (range.max == 0 || --priv->frames_to_check > 0)
+  if (range.max == 0)
     return;
-  const auto metres = [&] (int units) { return units * priv->depth_scale; };
-  GST_ELEMENT_WARNING (self, STREAM, FORMAT,
-      ("pad depth: no pixel lies between near (%g m) and far (%g m); values are %d to %d, with "
-       "depth-scale=%g %g to %g m; expected another depth-scale, near or far",
-          priv->view.near_m, priv->view.far_m, range.min, range.max, priv->depth_scale,
-          metres (range.min), metres (range.max)),
-      (nullptr));
+  priv->out_of_range = range;
+  if (--priv->frames_to_check == 0)
+    warn_of_range (self);
 }
 
 static Status
@@ -485,6 +500,8 @@ gst_range_combine_aggregate (GstAggregator *aggregator, gboolean)
       std::min (frame_duration (priv->colour), frame_duration (priv->depth));
   PairMatcher::Pair pair;
   const GstFlowReturn taken = priv->matcher->pop_pair (duration, pair);
+  if (taken == GST_FLOW_EOS) /* of fewer frames than are looked at */
+    warn_of_range (self);
   GstFlowReturn flow = push_gap (self, pair.first);
   if (taken != GST_FLOW_OK)
     return flow == GST_FLOW_OK ? taken : flow;
@@ -518,6 +535,7 @@ gst_range_combine_start (GstAggregator *aggregator)
   priv->depth_view.reset ();
   priv->negotiate = true;
   priv->frames_to_check = kCheckedFrames;
+  priv->out_of_range.reset ();
   priv->matcher->reset ();
   std::lock_guard guard (priv->lock);
   priv->frames = 0;

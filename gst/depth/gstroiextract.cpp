@@ -368,20 +368,21 @@ save_when_all_learnt (GstRoiExtract *self, const std::string &path)
   gst_range_post_warning (GST_ELEMENT (self), status);
 }
 
-/* For save-background and a stream that was too short to learn a background. */
+/* Of a stream that was too short to learn a background: nothing but empty ROIs was output. */
 static void
 warn_if_not_learnt (GstRoiExtract *self, const RoiSettings &settings)
 {
-  if (settings.save_background.empty () || all_learnt (self->priv))
+  if (all_learnt (self->priv))
     return;
   int seen = 0;
   for (const View &view : self->priv->info.rig.views)
     seen = std::max (seen, self->priv->views[view.id]->background.frames ());
   gst_range_post_warning (GST_ELEMENT (self),
-      {StatusCode::kNotFound, settings.save_background + ": not written: the stream ended after " +
-                                  std::to_string (seen) +
-                                  " frames of the background; expected background-frames, " +
-                                  std::to_string (settings.background_frames)});
+      {StatusCode::kNotFound,
+          (settings.save_background.empty () ? "" : settings.save_background + ": not written: ") +
+              "the stream ended after " + std::to_string (seen) +
+              " frames of the background; expected background-frames, " +
+              std::to_string (settings.background_frames)});
 }
 
 static void

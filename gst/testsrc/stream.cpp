@@ -488,6 +488,7 @@ AvatarStream::start (const AvatarSettings &settings)
   painter_.start (settings);
   num_buffers_ = settings.num_buffers;
   sent_ = 0;
+  renegotiated_ = false;
   group_id_ = gst_util_group_id_next ();
   segment_seqnum_ = gst_util_seqnum_next ();
   gst_segment_init (&segment_, GST_FORMAT_TIME);

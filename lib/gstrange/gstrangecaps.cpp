@@ -148,7 +148,6 @@ GstCaps *
 gst_range_caps_new (
     const GstRangeCamera *cameras, guint n_cameras, gint fps_n, gint fps_d, GError **error)
 {
-  gstrange::RangeInfo info;
   if (n_cameras == 0 || fps_n < 0 || fps_d < 1) {
     g_set_error (error, GST_LIBRARY_ERROR, GST_LIBRARY_ERROR_SETTINGS,
         "expected at least one camera and a frame rate from 0/1, got %u and %d/%d", n_cameras,

@@ -52,6 +52,8 @@ def main():
     parser.add_argument("--fps", type=Fraction, default=Fraction(30))
     parser.add_argument("--live", action="store_true", help="time stamps of arrival instead of N / FPS")
     options = parser.parse_args()
+    if options.fps <= 0 and not options.live:
+        parser.error("--fps: expected more than 0, or --live")
 
     Gst.init(None)
     pipeline = Gst.parse_launch(f"appsrc name=source format=time ! {options.sink}")

@@ -50,6 +50,14 @@ test_packed_pictures_give_the_rig_of_separate_ones () {
   expect_error "no picture comes from 'filesrc location=nothing%d'" "$pipelines/calibrate.sh" --top-bottom 'filesrc location=nothing%d' --out other.yaml
 }
 
+test_webcam_names_the_device () {
+  gst-inspect-1.0 --exists --atleast-version=0.0.0 v4l2src || skip "no v4l2src"
+  gst-launch-1.0 -q avatartestsrc rig-export=rig.yaml num-buffers=1 ! fakesink
+  expect_error "no camera '/dev/nothing'" "$pipelines/webcam.sh" --device /dev/nothing
+  expect_error "capabilities for device '/dev/null'" "$pipelines/webcam.sh" --device /dev/null --rig rig.yaml --png view.png
+  expect_error "no picture comes from 'v4l2src device=/dev/null" "$pipelines/webcam.sh" --device /dev/null --rig new.yaml --png view.png
+}
+
 test_webcam_calibrates_first () {
   need_boards
   pack_boards

@@ -127,6 +127,18 @@ GST_START_TEST (test_wrong_depth_scale_is_one_warning_that_names_it)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_wrong_depth_scale_of_a_single_picture_is_a_warning_at_eos)
+{
+  Combine c;
+  c.push_colour (0, 1);
+  c.push_depth (0, 12000);
+  gst_buffer_unref (gst_harness_pull (c.colour));
+  gst_harness_push_event (c.colour, gst_event_new_eos ());
+  gst_harness_push_event (c.depth, gst_event_new_eos ());
+  fail_unless_contains (next_message_text (c.bus, GST_MESSAGE_WARNING), "depth-scale=0.001");
+}
+GST_END_TEST;
+
 GST_START_TEST (test_empty_frames_and_later_depth_give_no_warning)
 {
   Combine c;
@@ -623,6 +635,7 @@ rangecombine_suite ()
   tcase_add_test (tc, test_big_endian_depth_is_taken);
   tcase_add_test (tc, test_depth_outside_near_and_far_is_invalid);
   tcase_add_test (tc, test_wrong_depth_scale_is_one_warning_that_names_it);
+  tcase_add_test (tc, test_wrong_depth_scale_of_a_single_picture_is_a_warning_at_eos);
   tcase_add_test (tc, test_empty_frames_and_later_depth_give_no_warning);
   tcase_add_test (tc, test_pairs_by_pts_and_drops_what_has_no_partner);
   tcase_add_test (tc, test_gap_costs_its_frame_and_nothing_else);

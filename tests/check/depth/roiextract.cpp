@@ -121,7 +121,8 @@ GST_START_TEST (test_learning_is_reported_view_by_view)
 }
 GST_END_TEST;
 
-/* A wall nearer than the one that was learnt, as after a camera was moved. */
+/* A wall nearer than the one that was learnt, as after a camera was moved; in a quarter of its
+ * pixels stereo finds no depth. */
 GST_START_TEST (test_picture_that_is_all_foreground_is_one_warning)
 {
   const Rig rig = ring_rig (1);
@@ -133,8 +134,10 @@ GST_START_TEST (test_picture_that_is_all_foreground_is_one_warning)
     if (i >= 2) {
       gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
       const RangeImage &image = frame.views ()[0];
-      for (int y = 0; y < image.roi.height; y++)
+      for (int y = 0; y < image.roi.height; y++) {
         std::fill_n (image.depth.row (y), image.roi.width, guint16{8000});
+        std::fill_n (image.depth.row (y), image.roi.width / 4, guint16{0});
+      }
     }
     push (h, buffer);
   }
@@ -318,6 +321,22 @@ GST_START_TEST (test_stream_too_short_for_a_background_to_save_is_a_warning)
   gst_harness_teardown (h);
   g_free (path);
   g_free (save);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_stream_that_ends_while_learning_is_a_warning)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=9");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  push (h, scene (rig, 0, false));
+  fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
+  fail_unless_contains (
+      next_message_text (bus, GST_MESSAGE_WARNING), "the stream ended after 1 frames");
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
 }
 GST_END_TEST;
 
@@ -639,6 +658,7 @@ roiextract_suite ()
   tcase_add_test (tc, test_background_is_saved_and_loaded);
   tcase_add_test (tc, test_place_that_a_background_cannot_be_saved_to_is_one_error_at_start);
   tcase_add_test (tc, test_stream_too_short_for_a_background_to_save_is_a_warning);
+  tcase_add_test (tc, test_stream_that_ends_while_learning_is_a_warning);
   tcase_add_test (tc, test_missing_background_file_is_one_error_that_names_it);
   tcase_add_test (tc, test_tells_upstream_the_roi_once_for_a_person_who_stays);
   tcase_add_test (tc, test_growing_person_is_told_before_the_edge_is_reached);

@@ -413,6 +413,42 @@ GST_START_TEST (test_live_pads_may_be_linked_to_peers_of_another_size)
 }
 GST_END_TEST;
 
+static int refusals; /* that are left */
+
+static GstFlowReturn
+refuse_or_drop (GstPad *, GstObject *, GstBuffer *buffer)
+{
+  gst_buffer_unref (buffer);
+  return refusals-- > 0 ? GST_FLOW_NOT_NEGOTIATED : GST_FLOW_OK;
+}
+
+/* As a peer does that is linked during a push and so gets the caps of the one before. */
+GST_START_TEST (test_frame_refused_once_is_negotiated_again_and_twice_is_an_error)
+{
+  for (const int times : {1, 2}) {
+    GstElement *source = make_source (FALSE);
+    GstBus *bus = gst_bus_new ();
+    gst_element_set_bus (source, bus);
+    GstPad *pad = gst_element_request_pad_simple (source, "left"), *sink = make_sink_pad ();
+    gst_pad_set_chain_function (sink, refuse_or_drop);
+    refusals = times;
+    gst_pad_link (pad, sink);
+    gst_element_set_state (source, GST_STATE_PLAYING);
+    if (times == 1) {
+      fail_unless (wait_for_frames (source, 3));
+      fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
+    } else {
+      fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "Internal data stream");
+      fail_unless_equals_uint64 (stat (source, "frames"), 0);
+    }
+    gst_element_set_state (source, GST_STATE_NULL);
+    gst_element_set_bus (source, nullptr);
+    for (gpointer object : {gpointer (pad), gpointer (bus), gpointer (source), gpointer (sink)})
+      gst_object_unref (object);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_pads_may_come_and_go_while_states_change)
 {
   GstElement *source = make_source (FALSE);
@@ -606,6 +642,7 @@ avatarstream_suite ()
   tcase_add_test (tc, test_pad_requested_after_eos_ends_too);
   tcase_add_test (tc, test_pad_may_be_linked_and_unlinked_at_leisure);
   tcase_add_test (tc, test_live_pads_may_be_linked_to_peers_of_another_size);
+  tcase_add_test (tc, test_frame_refused_once_is_negotiated_again_and_twice_is_an_error);
   tcase_add_test (tc, test_pads_may_come_and_go_while_states_change);
   tcase_add_test (tc, test_flush_events_go_through_and_restart_running_time);
   tcase_add_test (tc, test_flush_seek_gives_the_frames_of_its_segment_once);
