@@ -15,7 +15,7 @@ fi
 export GST_PLUGIN_PATH=$PWD/$build/gst GST_REGISTRY=$PWD/$build/test-registry.bin RANGECAST_SOURCE=$PWD
 export GST_GL_PLATFORM=egl GST_GL_WINDOW=egl-device # without them striprender's tests would skip
 export MESA_SHADER_CACHE_DISABLE=true # its compression reads uninitialised padding
-export CK_FORK=no CK_DEFAULT_TIMEOUT=0 G_SLICE=always-malloc G_DEBUG=gc-friendly GST_REGISTRY_FORK=no
+export CK_FORK=yes CK_DEFAULT_TIMEOUT=900 G_SLICE=always-malloc G_DEBUG=gc-friendly GST_REGISTRY_FORK=no
 gst-inspect-1.0 >/dev/null 2>&1 # fills the registry outside valgrind
 failed=0
 for element in "${elements[@]}"; do
@@ -23,7 +23,7 @@ for element in "${elements[@]}"; do
   [ "$element" != cameradevices ] || wrapper=(umockdev-wrapper) # USB devices
   # fair-sched: else a source that pushes without end can keep all other threads from running;
   # keep-debuginfo: names OpenGL drivers that are unloaded before leaks are counted
-  # a test that fails leaves tasks behind, for which check waits at the end: the results file names it
+  # CK_FORK: each test is its own process, so an error or a leak is counted against the test that made it, in the results file
   rm -f "$build/valgrind-$element.results"
   if CK_LOG_FILE_NAME=$build/valgrind-$element.results timeout 1800 "${wrapper[@]}" valgrind --quiet --fair-sched=try --error-exitcode=9 --keep-debuginfo=yes --leak-check=full --errors-for-leak-kinds=definite \
     --show-leak-kinds=definite --num-callers=30 --suppressions=tests/valgrind.supp \
