@@ -78,6 +78,10 @@ NeighbourCodeRate::settings_for (const EncoderSettings &configured, guint64 pixe
           double (interval_) / GST_SECOND});
   EncoderSettings settings = configured;
   const rangecast::Thresholds thresholds = control_.next (time_, pixels);
+  const bool is_new = !GST_CLOCK_TIME_IS_VALID (below_limits_) || time_ < below_limits_;
+  if (is_new || thresholds.depth < rate_.max_depth_threshold ||
+      thresholds.colour < rate_.max_colour_threshold)
+    below_limits_ = time_;
   settings.depth_threshold = thresholds.depth;
   settings.colour_threshold = thresholds.colour;
   return settings;
@@ -89,6 +93,14 @@ NeighbourCodeRate::record (const rangecast::CodedFrame &frame)
   meter_.add (time_, frame.bytes);
   if (is_on_)
     control_.coded (frame);
+}
+
+bool
+NeighbourCodeRate::misses_target () const
+{
+  constexpr double kTolerance = 1.25;
+  return is_on_ && !rate_.adaptive && time_ >= below_limits_ + 2 * GST_SECOND &&
+         bits_per_s () > kTolerance * rate_.target_bitrate;
 }
 
 GstMessage *

@@ -44,6 +44,9 @@ public:
    *  estimated bit rate has changed by more than a tenth, or the frame rate, since the last one;
    *  else nullptr */
   GstMessage *make_message (GstObject *source);
+  /** Whether the thresholds have been at their upper limits for 2 s and the bit rate is yet a
+   *  quarter above a constant target. */
+  [[nodiscard]] bool misses_target () const;
 
   AdaptiveRate receivers; ///< any thread
 
@@ -56,4 +59,6 @@ private:
   GstClockTime time_ = 0, interval_ = 0; /* of the current frame set */
   double reported_bits_per_s_ = -1;      /* by the last message */
   int reported_one_of_ = 1;              /* one of so many frame sets is coded */
+  /* Time of the latest frame set with a threshold below its limit. */
+  GstClockTime below_limits_ = GST_CLOCK_TIME_NONE;
 };

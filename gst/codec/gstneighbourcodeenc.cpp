@@ -78,6 +78,7 @@ struct GstNeighbourCodeEncPrivate {
   StatsReporter reporter;
 
   /* streaming thread only */
+  bool warned_target = false;
   gstrange::RangeInfo info;
   CapsErrors caps_errors;
   NeighbourCodeRate rate; /* but for its member `receivers`: any thread */
@@ -276,6 +277,22 @@ answer_key_requests (GstNeighbourCodeEnc *self, GstBuffer *input)
     gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), answer);
 }
 
+static void
+warn_missed_target (GstNeighbourCodeEnc *self, const NeighbourCodeRateSettings &rate)
+{
+  GstNeighbourCodeEncPrivate *priv = self->priv;
+  if (priv->warned_target || !priv->rate.misses_target ())
+    return;
+  priv->warned_target = true;
+  GST_ELEMENT_WARNING (self, STREAM, ENCODE,
+      ("target-bitrate=%u cannot be met: with max-depth-threshold=%d and max-colour-threshold=%d "
+       "the stream has %.0f bits per second; expected a larger target, larger limits, or smaller "
+       "or fewer pictures",
+          rate.target_bitrate, rate.max_depth_threshold, rate.max_colour_threshold,
+          priv->rate.bits_per_s ()),
+      (nullptr));
+}
+
 /* Encodes the frame set in priv->input, or clears that if the rate leaves it out. */
 static GstFlowReturn
 encode_input (GstNeighbourCodeEnc *self)
@@ -305,6 +322,7 @@ encode_input (GstNeighbourCodeEnc *self)
   const Status status = encode_frame (self, input, settings, result);
   if (!status.ok ())
     return gst_range_flow_return (GST_ELEMENT (self), status);
+  warn_missed_target (self, settings.rate);
   priv->is_key = result.delta_slices == 0;
   if (priv->is_key)
     answer_key_requests (self, input);
@@ -507,6 +525,7 @@ gst_neighbour_code_enc_start (GstBaseTransform *base)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
   priv->rate.reset ();
+  priv->warned_target = false;
   priv->caps_errors.reset ();
   priv->last_key = GST_CLOCK_TIME_NONE;
   priv->encoder.request_key ();

@@ -117,6 +117,16 @@ vector_spec (const char *name, const char *nick, const char *blurb)
       kMutablePlaying);
 }
 
+/* As GObject warns of a value that is out of a property's range. */
+void
+warn_vector (const char *name, const GValue *value, const char *length)
+{
+  gchar *text = gst_value_serialize (value);
+  g_warning ("cylinderfilter: %s=\"%s\": expected three numbers and %s; not changed", name,
+      text ? text : "", length);
+  g_free (text);
+}
+
 void
 set_axis_position (CylinderFilterSettings &settings, const GValue *value)
 {
@@ -124,7 +134,7 @@ set_axis_position (CylinderFilterSettings &settings, const GValue *value)
   if (get_vector (value, position) && norm (position) < 1e6)
     settings.core.fixed_axis.position = position;
   else
-    GST_WARNING ("axis-position: expected three numbers, a length below 1e6; not changed");
+    warn_vector ("axis-position", value, "a length below 1e6");
 }
 
 void
@@ -134,8 +144,7 @@ set_axis_direction (CylinderFilterSettings &settings, const GValue *value)
   if (get_vector (value, direction) && norm (direction) >= 1e-6 && norm (direction) < 1e6)
     settings.core.fixed_axis.direction = direction;
   else
-    GST_WARNING (
-        "axis-direction: expected three numbers, a length from 1e-6 to below 1e6; not changed");
+    warn_vector ("axis-direction", value, "a length from 1e-6 to below 1e6");
 }
 
 } // namespace

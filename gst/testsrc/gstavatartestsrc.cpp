@@ -51,7 +51,12 @@ struct _GstAvatarTestSrc {
   GstAvatarTestSrcPrivate *priv;
 };
 
-#define RAW_CAPS GST_VIDEO_CAPS_MAKE ("{ RGBx, BGRx, RGB, BGR, GRAY8 }")
+#define SIZE_CAPS                                                                                  \
+  "width = (int) [ 16, 4096 ], height = (int) [ 16, 4096 ], "                                      \
+  "framerate = (fraction) [ 1/1000, 1000/1 ]"
+#define RAW_CAPS "video/x-raw, format = (string) { RGBx, BGRx, RGB, BGR, GRAY8 }, " SIZE_CAPS
+#define AVATAR_RANGE_CAPS                                                                          \
+  GST_RANGE_MEDIA_TYPE ", format = (string) Z16_RGBx, views = (int) [ 1, 64 ], " SIZE_CAPS
 
 static GstStaticPadTemplate left_template =
     GST_STATIC_PAD_TEMPLATE ("left", GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (RAW_CAPS));
@@ -59,8 +64,8 @@ static GstStaticPadTemplate right_template =
     GST_STATIC_PAD_TEMPLATE ("right", GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (RAW_CAPS));
 static GstStaticPadTemplate third_template =
     GST_STATIC_PAD_TEMPLATE ("third", GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (RAW_CAPS));
-static GstStaticPadTemplate src_template =
-    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (GST_RANGE_CAPS));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
+    "src", GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (AVATAR_RANGE_CAPS));
 
 G_DEFINE_TYPE (GstAvatarTestSrc, gst_avatar_test_src, GST_TYPE_ELEMENT)
 GST_ELEMENT_REGISTER_DEFINE (

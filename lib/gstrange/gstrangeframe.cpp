@@ -116,6 +116,10 @@ RangeFrameMap::RangeFrameMap (GstBuffer *buffer, GstMapFlags flags)
     images_[count_] = image_of (maps_[count_], meta->capture_time);
     count_++;
   }
+  if (count_ == 0 && gst_buffer_get_size (buffer) > 0)
+    status_ = {
+        StatusCode::kBadData, "range buffer: " + std::to_string (gst_buffer_get_size (buffer)) +
+                                  " bytes without a GstRangeMeta; expected one for each view"};
 }
 
 RangeFrameMap::~RangeFrameMap ()

@@ -53,6 +53,8 @@ def main():
     parser.add_argument("--frames", type=int, default=1, metavar="N")
     parser.add_argument("--save", metavar="FILE.ply|FILE.npy")
     options = parser.parse_args()
+    if options.frames < 1:
+        parser.error(f"--frames {options.frames}: expected 1 or more")
     if options.save and not options.save.endswith((".ply", ".npy")):
         parser.error(f"--save {options.save}: expected a name that ends in .ply or .npy")
 

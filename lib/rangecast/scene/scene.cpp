@@ -167,6 +167,8 @@ check (const SceneSettings &s)
   if (s.model_top_m != kTopAutomatic && s.model_top_m != kTopAll &&
       !(s.model_top_m >= 0.1 && s.model_top_m <= kPersonHeight))
     return bad_setting ("model-top", "-1, 0, or 0.1 to 1.8 metres");
+  if (s.model.empty () && !s.texture.empty ())
+    return bad_setting ("texture", "a model that it covers: property location");
   return check_room (s);
 }
 

@@ -367,7 +367,7 @@ expect_pairs (CameraPipeline &p, int cameras, std::int64_t apart)
       met++;
       fail_unless_equals_uint64 (other.capture, picture.capture);
       fail_unless_equals_int (other.mark.camera, side);
-      fail_unless (std::llabs (other.mark.taken_ns - picture.mark.taken_ns) < apart,
+      fail_unless (std::llabs (other.mark.taken_ns - picture.mark.taken_ns) < slowdown () * apart,
           "PTS %" GST_TIME_FORMAT ": %s was taken %" G_GINT64_FORMAT " us after left",
           GST_TIME_ARGS (picture.pts), kSides[side],
           (other.mark.taken_ns - picture.mark.taken_ns) / 1000);

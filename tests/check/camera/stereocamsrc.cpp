@@ -360,7 +360,8 @@ GST_START_TEST (test_it_is_live_and_says_its_latency)
   GstClockTime least = 0;
   gst_query_parse_latency (query, &live, &least, nullptr);
   fail_unless (live);
-  fail_unless_equals_uint64 (least, 5 * GST_MSECOND + kPeriod);
+  ck_assert_uint_ge (least, 5 * GST_MSECOND + kPeriod);
+  ck_assert_uint_le (least, slowdown () * (5 * GST_MSECOND + kPeriod));
   gst_query_unref (query);
   gst_object_unref (pad);
 }

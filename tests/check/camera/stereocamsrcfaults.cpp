@@ -164,8 +164,8 @@ expect_comeback (const char *trigger)
   const std::size_t n = std::min (left_pictures.size (), right_pictures.size ());
   for (std::size_t i = 0; i < n; i++) {
     fail_unless_equals_uint64 (left_pictures[i].pts, right_pictures[i].pts);
-    ck_assert_int_lt (
-        std::llabs (left_pictures[i].mark.taken_ns - right_pictures[i].mark.taken_ns), kPeriod / 2);
+    ck_assert_int_lt (std::llabs (left_pictures[i].mark.taken_ns - right_pictures[i].mark.taken_ns),
+        slowdown () * kPeriod / 2);
   }
 }
 

@@ -218,6 +218,42 @@ GST_START_TEST (test_thresholds_stay_within_their_limits)
 }
 GST_END_TEST;
 
+/* Says once that a target cannot be met, after 2 s at the limits; nothing of one that is met. */
+GST_START_TEST (test_target_below_what_the_limits_allow_warns_once)
+{
+  for (const double rate : {500., 4e6}) {
+    const std::string launch = "avatartestsrc views=1 num-buffers=90 ! "
+                               "video/x-range,width=160,height=120,framerate=15/1 ! "
+                               "neighbourcodeenc " +
+                               target (rate) + " ! fakesink";
+    GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
+    GstBus *bus = gst_element_get_bus (pipeline);
+    gst_element_set_state (pipeline, GST_STATE_PLAYING);
+    std::string warnings;
+    int count = 0;
+    for (bool ended = false; !ended;) {
+      GstMessage *message = gst_bus_timed_pop_filtered (bus, GST_CLOCK_TIME_NONE,
+          GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING));
+      ended = GST_MESSAGE_TYPE (message) != GST_MESSAGE_WARNING;
+      if (!ended) {
+        GError *error = nullptr;
+        gst_message_parse_warning (message, &error, nullptr);
+        warnings += error->message;
+        g_error_free (error);
+        count++;
+      }
+      gst_message_unref (message);
+    }
+    ck_assert_int_eq (count, rate < 1e6 ? 1 : 0);
+    if (count)
+      fail_unless_contains (warnings, "target-bitrate=500 cannot be met");
+    gst_element_set_state (pipeline, GST_STATE_NULL);
+    gst_object_unref (bus);
+    gst_object_unref (pipeline);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_limits_change_while_playing)
 {
   const auto coded =
@@ -392,6 +428,7 @@ neighbourcoderate_suite ()
   tcase_add_test (tc, test_target_0_gives_the_bytes_of_the_thresholds_as_they_are);
   tcase_add_test (tc, test_target_changes_while_playing);
   tcase_add_test (tc, test_thresholds_stay_within_their_limits);
+  tcase_add_test (tc, test_target_below_what_the_limits_allow_warns_once);
   tcase_add_test (tc, test_limits_change_while_playing);
   tcase_add_test (tc, test_person_who_comes_back_finds_nothing_saved_up);
   tcase_add_test (tc, test_stats_tell_the_rate_of_the_last_two_seconds);

@@ -536,6 +536,23 @@ GST_START_TEST (test_view_that_is_there_twice_is_one_error)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_bytes_without_a_view_are_one_error)
+{
+  const Rig rig = ring_rig (1);
+  GstHarness *h = roi_harness (rig, "roiextract background-frames=1");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  GstBuffer *buffer = gst_buffer_new_allocate (nullptr, 1000, nullptr);
+  GST_BUFFER_PTS (buffer) = 0;
+  ck_assert_int_eq (gst_harness_push (h, buffer), GST_FLOW_ERROR);
+  fail_unless_contains (
+      next_message_text (bus, GST_MESSAGE_ERROR), "1000 bytes without a GstRangeMeta");
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_several_people_are_in_the_roi_and_max_people_keeps_the_largest)
 {
   const Rig rig = ring_rig (1);
@@ -668,6 +685,7 @@ roiextract_suite ()
   tcase_add_test (tc, test_who_sits_still_stays_and_the_wall_may_change_slowly);
   tcase_add_test (tc, test_wall_that_is_seen_now_and_then_is_followed_too);
   tcase_add_test (tc, test_view_that_is_there_twice_is_one_error);
+  tcase_add_test (tc, test_bytes_without_a_view_are_one_error);
   tcase_add_test (tc, test_several_people_are_in_the_roi_and_max_people_keeps_the_largest);
   tcase_add_test (tc, test_background_at_eos_is_the_one_that_it_has_become);
   tcase_add_test (tc, test_nobody_goes_through_coder_and_splitter_as_a_tiny_frame_set);

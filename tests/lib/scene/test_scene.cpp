@@ -164,6 +164,11 @@ TEST (Scene, test_bad_settings_are_named)
   EXPECT_EQ (status.code (), StatusCode::kBadValue);
   EXPECT_NE (status.message ().find ("distance"), std::string::npos);
   EXPECT_FALSE (scene);
+  settings = {};
+  settings.texture = "skin.png";
+  const Status no_model = Scene::create (settings, scene);
+  EXPECT_EQ (no_model.code (), StatusCode::kBadValue);
+  EXPECT_NE (no_model.message ().find ("texture"), std::string::npos);
 }
 
 TEST (Scene, test_wrong_view_and_size_are_refused)
