@@ -86,6 +86,8 @@ def _view_ids(caps):
 
 
 def _check_raw(caps):
+    if caps is not None and not isinstance(caps, Gst.Caps):
+        raise TypeError(f"caps must be Gst.Caps, not {type(caps).__name__}; Gst.Caps.from_string() parses text")
     name = caps.get_structure(0).get_name() if caps and caps.get_size() else None
     if name != "video/x-range":
         raise ValueError(f"expected video/x-range, got {name}; coded frame sets need neighbourcodedec")
@@ -130,9 +132,12 @@ def new_caps(cameras, fps=0):
 
 
 def _checked(view_id, camera, view):
+    name = f"view {view_id}"
+    if not isinstance(view, (tuple, list)) or len(view) not in (2, 4):
+        what = f"{len(view)} of them" if isinstance(view, (tuple, list)) else type(view).__name__
+        raise TypeError(f"{name}: expected (depth, colour) or (depth, colour, x, y), not {what}")
     depth, colour, *corner = view
     x, y = (operator.index(n) for n in corner or (0, 0))
-    name = f"view {view_id}"
     for array, what, dtype in (depth, "depth", np.uint16), (colour, "colour", np.uint8):
         if not isinstance(array, np.ndarray) or array.dtype != dtype:
             raise TypeError(
@@ -140,8 +145,10 @@ def _checked(view_id, camera, view):
             )
     if depth.ndim != 2:
         raise ValueError(f"{name}: depth must be height x width, not {depth.shape}")
-    if colour.ndim != 3 or colour.shape[:2] != depth.shape or colour.shape[2] not in (3, 4):
-        raise ValueError(f"{name}: colour must be {depth.shape} x 3 or 4, not {colour.shape}")
+    if colour.ndim != 3 or colour.shape[2] not in (3, 4):
+        raise ValueError(f"{name}: colour must be height x width x 3 or 4, not {colour.shape}")
+    if colour.shape[:2] != depth.shape:
+        raise ValueError(f"{name}: depth {depth.shape} and colour {colour.shape} must have the same height and width")
     if not (0 <= x <= camera.width - depth.shape[1] and 0 <= y <= camera.height - depth.shape[0]):
         raise ValueError(
             f"{name}: {depth.shape[1]}x{depth.shape[0]} pixels at ({x}, {y}) are not inside the camera's image of "
@@ -177,9 +184,11 @@ def new_buffer(caps, views, pts=Gst.CLOCK_TIME_NONE, duration=Gst.CLOCK_TIME_NON
     x, y): depth is height x width, uint16, colour height x width x 3 or 4, uint8. The arrays are copied, once. Views of
     the caps that are not in it are empty. capture_time: ns on the clock of all cameras; the PTS by default."""
     _check_raw(caps)
+    if not isinstance(views, dict):
+        raise TypeError(f"views must be a dict of view-ids, not {type(views).__name__}")
     cameras = {i: GstRange.range_caps_get_camera(caps, i)[1] for i in _view_ids(caps)}
     if unknown := set(views) - set(cameras):
-        raise ValueError(f"views {sorted(unknown)} are not in the caps, which have {sorted(cameras)}")
+        raise ValueError(f"views {sorted(unknown, key=str)} are not in the caps, which have {sorted(cameras)}")
     if capture_time is None:
         capture_time = pts
     width, height = (max(getattr(c, side) for c in cameras.values()) for side in ("width", "height"))
