@@ -35,7 +35,9 @@ PanelPainter::draw (GstGLContext *context, const rangecast::ImageView<const rang
   gl->BindTexture (GL_TEXTURE_2D, texture_);
   if (is_new || changed) {
     gl->PixelStorei (GL_UNPACK_ALIGNMENT, 4);
+    gl->PixelStorei (GL_UNPACK_ROW_LENGTH, GLint (panel.stride / sizeof (rangecast::Rgbx)));
     define_texture (gl, GL_RGBA8, panel.width, panel.height, GL_RGBA, GL_UNSIGNED_BYTE, panel.data);
+    gl->PixelStorei (GL_UNPACK_ROW_LENGTH, 0);
     uploaded = guint64 (panel.width) * guint64 (panel.height) * sizeof (rangecast::Rgbx);
   }
   const int left = x + kBorder * scale, top = y + kBorder * scale;

@@ -66,6 +66,12 @@ def state_before(symbols: list[tuple[list[int], int]], state: int) -> int:
     return state
 
 
+def stored(states: list[int]) -> bytes:
+    """States as a slice begins with them: of one of more than 32 bits the last 16 follow as a word."""
+    long = [x for x in states if x >> 32]
+    return struct.pack("<4I", *(x >> 16 if x >> 32 else x for x in states)) + b"".join(struct.pack("<H", x & 0xFFFF) for x in long)
+
+
 def too_large_numbers() -> list[bytes]:
     """Of entropy slices: a motion, a run and a residual of one pixel that say that they have 18 bits."""
     steps = bytes((1, 0, 1, 1))
@@ -79,7 +85,7 @@ def too_large_numbers() -> list[bytes]:
         (KEY_SLICE, 0, one_pixel, state_before([(key[19], 14)], large)),
     ]
     return [
-        bytes((profile, 1, 10, 4, columns, 0, 0, 0, columns, 0, 0, 0, 1, 0)) + steps + struct.pack("<4I", x0, x1, first, first)
+        bytes((profile, 1, 10, 4, columns, 0, 0, 0, columns, 0, 0, 0, 1, 0)) + steps + stored([x0, x1, first, first])
         for profile, columns, x0, x1 in inputs
     ]
 

@@ -17,17 +17,20 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
 SOURCES = (".c", ".cpp", ".h", ".hpp")
 CORE = ("base", "geometry", "neighbourcode", "alignment", "overlap", "surface", "sync")
 RIGFILE = ("rigfile",)
-VISION = ("opencv", "stereo", "roi", "registration", "calibration", "overlay")
+OVERLAY = ("overlay",)
+VISION = ("opencv", "stereo", "roi", "registration", "calibration")
 SCENE = ("scene",)
 
 # What a folder may include besides itself and its own subfolders: the first row whose prefix matches.
 CORE_FOLDERS = tuple(f"lib/rangecast/{name}" for name in CORE)
 RIGFILE_FOLDERS = tuple(f"lib/rangecast/{name}" for name in RIGFILE)
+OVERLAY_FOLDERS = tuple(f"lib/rangecast/{name}" for name in OVERLAY)
 VISION_FOLDERS = tuple(f"lib/rangecast/{name}" for name in VISION)
 SCENE_FOLDERS = tuple(f"lib/rangecast/{name}" for name in SCENE)
 LAYERS = (
     (CORE_FOLDERS, CORE_FOLDERS),
     (RIGFILE_FOLDERS, CORE_FOLDERS + RIGFILE_FOLDERS),
+    (OVERLAY_FOLDERS, CORE_FOLDERS + OVERLAY_FOLDERS),
     (VISION_FOLDERS, CORE_FOLDERS + VISION_FOLDERS),
     (SCENE_FOLDERS, CORE_FOLDERS + VISION_FOLDERS + SCENE_FOLDERS),
     (("lib/rangecast/pch",), ()),
@@ -40,10 +43,11 @@ LAYERS = (
 GSTREAMER = ("gst/", "glib", "gio/", "gobject")
 FOREIGN = (
     (CORE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "assimp/", "zlib.h", "yaml.h") + GSTREAMER),
+    (OVERLAY_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "assimp/", "zlib.h", "yaml.h") + GSTREAMER),
     (RIGFILE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "assimp/") + GSTREAMER),
     (VISION_FOLDERS, ("assimp/",) + GSTREAMER),
     (SCENE_FOLDERS, ("ceres/",) + GSTREAMER),
-    (("lib/gstrange", "gst/common", "gst/codec", "gst/rtp", "gst/mux", "gst/convert"), ("opencv2/", "ceres/", "assimp/", "arv.h")),
+    (("lib/gstrange", "gst/common", "gst/codec", "gst/rtp", "gst/mux", "gst/convert", "gst/render"), ("opencv2/", "ceres/", "assimp/", "arv.h")),
 )
 
 

@@ -84,6 +84,8 @@ test_plugins_for_streams_need_no_heavy_libraries () {
     ! grep -E 'opencv|aravis|ceres|assimp|libGL|libgstgl' <<<"$needed" || fail "$plugin needs them"
     grep -q libgstreamer <<<"$needed" || fail "$plugin: $needed"
   done
+  needed=$(readelf -d "${RANGECAST_BUILD:-$source_dir/build}/gst/render/libgstrangerender.so") # OpenGL, but nothing of the camera hosts
+  ! grep -E 'opencv|aravis|ceres|assimp' <<<"$needed" || fail "libgstrangerender.so needs them"
 }
 
 # Hides libraries from all plugins, as on a host where their packages are missing.
@@ -101,7 +103,7 @@ test_a_missing_library_costs_only_its_own_elements () {
   unshare -m true 2>/dev/null || skip "no right to make mount namespaces"
   export GST_REGISTRY=$PWD/registry.bin GST_REGISTRY_FORK=no
   without libopencv_core libaravis-0.8 libassimp -- gst-inspect-1.0 >inspect.txt 2>/dev/null
-  for element in neighbourcodeenc neighbourcodedec rtpneighbourcodepay rangemux rangesplit; do
+  for element in neighbourcodeenc neighbourcodedec rtpneighbourcodepay rangemux rangesplit cylinderfilter; do
     grep -q " $element: " inspect.txt || fail "no element $element"
   done
   for element in stereodepth stereocamsrc avatartestsrc; do

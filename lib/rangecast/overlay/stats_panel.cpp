@@ -2,34 +2,71 @@
 #include "stats_panel.hpp"
 
 #include <algorithm>
-#include <opencv2/imgproc.hpp>
+#include <cairo.h>
 
 namespace rangecast {
 namespace {
 
 constexpr int kLineHeight = 18, kBorder = 6; /* pixels */
-constexpr double kScale = 0.45;              /* of the font, which is 22 pixels high at 1 */
-constexpr Rgbx kDark{16, 18, 21, 255};
-constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
+constexpr double kFontSize = 13;
+constexpr Rgbx kDark{16, 18, 21, 255}, kLight{236, 240, 244, 255};
+
+/* Cairo's pixels are blue, green, red, alpha in memory, ours red, green, blue: so the two change
+ * places. */
+void
+set_colour (cairo_t *cairo, Rgbx colour)
+{
+  cairo_set_source_rgb (cairo, colour.b / 255., colour.g / 255., colour.r / 255.);
+}
+
+/* A context for `picture`, to be destroyed by the caller. */
+cairo_t *
+begin (const ImageView<Rgbx> &picture)
+{
+  cairo_surface_t *surface =
+      cairo_image_surface_create_for_data (reinterpret_cast<unsigned char *> (picture.data),
+          CAIRO_FORMAT_ARGB32, picture.width, picture.height, static_cast<int> (picture.stride));
+  cairo_t *cairo = cairo_create (surface);
+  cairo_surface_destroy (surface);
+  cairo_select_font_face (cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+  cairo_set_font_size (cairo, kFontSize);
+  cairo_font_options_t *options = cairo_font_options_create ();
+  cairo_font_options_set_antialias (options, CAIRO_ANTIALIAS_GRAY);
+  cairo_set_font_options (cairo, options);
+  cairo_font_options_destroy (options);
+  return cairo;
+}
+
+int
+width_of (cairo_t *cairo, const std::string &line)
+{
+  cairo_text_extents_t extents;
+  cairo_text_extents (cairo, line.c_str (), &extents);
+  return static_cast<int> (extents.x_advance + 1);
+}
 
 } // namespace
 
 void
 StatsPanel::draw (std::span<const std::string> lines)
 {
-  const int count = std::min (int (lines.size ()), kMaxLines);
-  int width = 0;
-  for (int i = 0; i < count; i++)
-    width = std::max (width, cv::getTextSize (lines[i], kFont, kScale, 1, nullptr).width);
-  width = std::min (width + 2 * kBorder, kMaxWidth);
-  const int height = count * kLineHeight + kBorder;
-  memory_.reserve (std::size_t (kMaxWidth) * (kMaxLines * kLineHeight + kBorder));
-  memory_.assign (std::size_t (width) * std::size_t (height), kDark);
-  picture_ = {memory_.data (), width, height, std::ptrdiff_t (width * sizeof (Rgbx))};
-  cv::Mat canvas (height, width, CV_8UC4, memory_.data ());
-  for (int i = 0; i < count; i++)
-    cv::putText (canvas, lines[i], {kBorder, (i + 1) * kLineHeight - 3}, kFont, kScale,
-        {236, 240, 244, 255}, 1, cv::LINE_AA);
+  lines = lines.first (std::min (lines.size (), std::size_t{kMaxLines}));
+  const int height = static_cast<int> (lines.size ()) * kLineHeight + kBorder;
+  memory_.resize (std::size_t (kMaxWidth) * (kMaxLines * kLineHeight + kBorder));
+  picture_ = {memory_.data (), kMaxWidth, height, std::ptrdiff_t (kMaxWidth * sizeof (Rgbx))};
+  cairo_t *cairo = begin (picture_);
+  set_colour (cairo, kDark);
+  cairo_paint (cairo);
+  set_colour (cairo, kLight);
+  int width = 0, y = 0;
+  for (const std::string &line : lines) {
+    cairo_move_to (cairo, kBorder, y += kLineHeight - 1);
+    cairo_show_text (cairo, line.c_str ());
+    width = std::max (width, width_of (cairo, line));
+    y++;
+  }
+  cairo_destroy (cairo);
+  picture_.width = std::min (width + 2 * kBorder, kMaxWidth);
 }
 
 } // namespace rangecast

@@ -202,6 +202,27 @@ compare (const RowView &left, const std::uint8_t *grey, int x, const RowView &ri
   }
 }
 
+/* kJumps at each of `steps`, which are below kSteps. Clang has no shuffle by a variable. */
+template <typename Lanes>
+inline typename Lanes::B
+jumps_of (const typename Lanes::B &steps)
+{
+  using B = typename Lanes::B;
+  static_assert (kSteps == 32);
+#if defined __clang__
+  B found;
+  for (std::size_t i = 0; i < sizeof (B); i++)
+    found[i] = kJumps[steps[i]];
+  return found;
+#else
+  const B low = Lanes::at (kJumps.data ());
+  if constexpr (sizeof (B) == kSteps)
+    return __builtin_shuffle (low, steps);
+  else
+    return __builtin_shuffle (low, Lanes::at (kJumps.data () + sizeof (B)), steps);
+#endif
+}
+
 /* The penalties of jumps between kSide pixels and as many others. */
 template <typename Lanes>
 inline void
@@ -212,13 +233,8 @@ find_jumps (const std::uint8_t *pixels, const std::uint8_t *others, std::uint8_t
   for (int part = 0; part < kSide; part += kBytes) {
     const B a = Lanes::at (pixels + part), b = Lanes::at (others + part),
             step = min_of<Lanes> (
-                max_of<Lanes> (a, b) - min_of<Lanes> (a, b), B{} + std::uint8_t (kSteps - 1)),
-            low = Lanes::at (kJumps.data ());
-    static_assert (kSteps == 32);
-    if constexpr (kBytes == kSteps)
-      Lanes::at (jumps + part) = __builtin_shuffle (low, step);
-    else
-      Lanes::at (jumps + part) = __builtin_shuffle (low, Lanes::at (kJumps.data () + kBytes), step);
+                max_of<Lanes> (a, b) - min_of<Lanes> (a, b), B{} + std::uint8_t (kSteps - 1));
+    Lanes::at (jumps + part) = jumps_of<Lanes> (step);
   }
 }
 
@@ -254,11 +270,10 @@ interleave_low (const typename Lanes::B &a, const typename Lanes::B &b)
 {
   using B = typename Lanes::B;
   if constexpr (sizeof (B) == 32)
-    return __builtin_shuffle (a, b,
-        B{0, 32, 1, 33, 2, 34, 3, 35, 4, 36, 5, 37, 6, 38, 7, 39, 16, 48, 17, 49, 18, 50, 19, 51,
-            20, 52, 21, 53, 22, 54, 23, 55});
+    return __builtin_shufflevector (a, b, 0, 32, 1, 33, 2, 34, 3, 35, 4, 36, 5, 37, 6, 38, 7, 39,
+        16, 48, 17, 49, 18, 50, 19, 51, 20, 52, 21, 53, 22, 54, 23, 55);
   else
-    return __builtin_shuffle (a, b, B{0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23});
+    return __builtin_shufflevector (a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
 }
 
 template <typename Lanes>
@@ -267,12 +282,11 @@ interleave_high (const typename Lanes::B &a, const typename Lanes::B &b)
 {
   using B = typename Lanes::B;
   if constexpr (sizeof (B) == 32)
-    return __builtin_shuffle (a, b,
-        B{8, 40, 9, 41, 10, 42, 11, 43, 12, 44, 13, 45, 14, 46, 15, 47, 24, 56, 25, 57, 26, 58, 27,
-            59, 28, 60, 29, 61, 30, 62, 31, 63});
+    return __builtin_shufflevector (a, b, 8, 40, 9, 41, 10, 42, 11, 43, 12, 44, 13, 45, 14, 46, 15,
+        47, 24, 56, 25, 57, 26, 58, 27, 59, 28, 60, 29, 61, 30, 62, 31, 63);
   else
-    return __builtin_shuffle (
-        a, b, B{8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31});
+    return __builtin_shufflevector (
+        a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
 }
 
 /* Two of four rounds of a transposition of 16 x 16 bytes, for four rows. */

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <rangecast/overlay/stats_panel.hpp>
 #include <rangecast/surface/orbit.hpp>
 #include <rangecast/surface/scene_fit.hpp>
 #include <rangecast/surface/scene_hull.hpp>
@@ -154,20 +153,6 @@ TEST (ViewTint, hue_is_the_colours_and_brightness_follows_the_picture)
   EXPECT_EQ (copy.at (1, 0).b, 50);
   EXPECT_GT (copy.at (2, 0).r, copy.at (0, 0).r);
   EXPECT_LT (copy.at (2, 0).r, copy.at (1, 0).r);
-}
-
-TEST (StatsPanel, is_as_large_as_its_text_and_no_larger_than_said)
-{
-  StatsPanel panel;
-  EXPECT_TRUE (panel.picture ().empty ());
-  panel.draw (std::vector<std::string>{"a", "longer"});
-  const auto two = panel.picture ();
-  EXPECT_GT (two.height, 30);
-  const auto *memory = two.data;
-  panel.draw (std::vector<std::string> (20, std::string (500, 'w')));
-  EXPECT_EQ (panel.picture ().width, StatsPanel::kMaxWidth);
-  EXPECT_LE (panel.picture ().height, (StatsPanel::kMaxLines + 1) * 20);
-  EXPECT_EQ (panel.picture ().data, memory); /* nothing new was allocated */
 }
 
 /* ---- fits ---- */
