@@ -39,6 +39,7 @@ NeighbourCodeRate::reset ()
   time_ = interval_ = 0;
   reported_bits_per_s_ = -1;
   reported_one_of_ = 1;
+  below_limits_ = GST_CLOCK_TIME_NONE;
 }
 
 bool
@@ -68,6 +69,7 @@ NeighbourCodeRate::settings_for (const EncoderSettings &configured, guint64 pixe
     if (is_on_)
       control_.reset ();
     is_on_ = false;
+    below_limits_ = GST_CLOCK_TIME_NONE;
     return configured;
   }
   is_on_ = true;

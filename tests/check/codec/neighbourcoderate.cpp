@@ -254,6 +254,34 @@ GST_START_TEST (test_target_below_what_the_limits_allow_warns_once)
 }
 GST_END_TEST;
 
+/* Frame sets coded without a target do not count against a later one. */
+GST_START_TEST (test_target_that_comes_back_is_judged_by_itself)
+{
+  GstElement *pipeline =
+      gst_parse_launch ("avatartestsrc views=1 num-buffers=180 ! "
+                        "video/x-range,width=160,height=120,framerate=15/1 ! neighbourcodeenc "
+                        "name=e target-bitrate=4000000 ! appsink name=s sync=false max-buffers=1",
+          nullptr);
+  GstElement *encoder = gst_bin_get_by_name (GST_BIN (pipeline), "e");
+  GstElement *sink = gst_bin_get_by_name (GST_BIN (pipeline), "s");
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  for (int frame = 0; frame < 180; frame++) {
+    GstSample *sample = gst_app_sink_pull_sample (GST_APP_SINK (sink));
+    fail_unless (sample != nullptr, "%d", frame);
+    gst_sample_unref (sample);
+    if (frame == 30 || frame == 90)
+      g_object_set (encoder, "target-bitrate", frame == 30 ? 0 : 230000, nullptr);
+  }
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_WARNING) == nullptr);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (bus);
+  gst_object_unref (encoder);
+  gst_object_unref (sink);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_limits_change_while_playing)
 {
   const auto coded =
@@ -429,6 +457,7 @@ neighbourcoderate_suite ()
   tcase_add_test (tc, test_target_changes_while_playing);
   tcase_add_test (tc, test_thresholds_stay_within_their_limits);
   tcase_add_test (tc, test_target_below_what_the_limits_allow_warns_once);
+  tcase_add_test (tc, test_target_that_comes_back_is_judged_by_itself);
   tcase_add_test (tc, test_limits_change_while_playing);
   tcase_add_test (tc, test_person_who_comes_back_finds_nothing_saved_up);
   tcase_add_test (tc, test_stats_tell_the_rate_of_the_last_two_seconds);
