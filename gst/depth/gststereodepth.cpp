@@ -63,10 +63,9 @@ using rangecast::View;
 GST_DEBUG_CATEGORY_STATIC (gst_stereo_depth_debug);
 #define GST_CAT_DEFAULT gst_stereo_depth_debug
 
-/* Data flow, in the order of this file. All of it runs on GstAggregator's streaming thread, the
- * source pad's task:
+/* Data flow, in the order of this file. PackedInput divides images at pad left that contain both
+ * views, in that pad's streaming thread. All else runs on GstAggregator's, the source pad's task:
  *
- *   packed           divides images at pad left that contain both views (PackedInput)
  *   sink_event       records the caps of each pad
  *   aggregate
  *     dequeue_pair   takes a left and a right image of one running time off their pads. A left
@@ -123,8 +122,9 @@ struct GstStereoDepthPrivate {
   StatsReporter reporter;
   PadLinkWatch pad_links;
   RoiSchedule rois;
-  PackedInput packed;                       /* of pad left */
   std::atomic<bool> third_released = false; /* cleared by the streaming thread */
+
+  PackedInput packed; /* of pad left; its streaming thread, started and stopped in READY */
 
   /* streaming thread */
   GstAggregatorPad *left, *right; /* owned by the element */

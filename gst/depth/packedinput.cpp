@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "packedinput.hpp"
 
+#include <algorithm>
+
 namespace {
 
 Packing
@@ -26,15 +28,16 @@ component_of_plane (const GstVideoFormatInfo *format, guint plane)
   return component;
 }
 
-/* Whether planes may begin at the pixel (x, y). */
-bool
-may_begin_at (const GstVideoFormatInfo *format, int x, int y)
+/* What the width (or height) must be a multiple of, so that both halves begin at a pixel of each
+ * plane. */
+int
+unit_of (const GstVideoFormatInfo *format, bool width)
 {
+  int most = 0;
   for (guint c = 0; c < GST_VIDEO_FORMAT_INFO_N_COMPONENTS (format); c++)
-    if (x % (1 << GST_VIDEO_FORMAT_INFO_W_SUB (format, c)) != 0 ||
-        y % (1 << GST_VIDEO_FORMAT_INFO_H_SUB (format, c)) != 0)
-      return false;
-  return true;
+    most = std::max (most, int (width ? GST_VIDEO_FORMAT_INFO_W_SUB (format, c)
+                                      : GST_VIDEO_FORMAT_INFO_H_SUB (format, c)));
+  return 2 << most;
 }
 
 /* Whether pixels are where strides of pixels and lines say. */
@@ -70,14 +73,13 @@ void
 PackedInput::start (Packing packing)
 {
   packing_ = packing;
-  is_packed_ = is_refused_ = false;
+  is_packed_ = is_refused_ = saw_one_view_ = false;
 }
 
 void
 PackedInput::stop ()
 {
-  if (is_packed_)
-    gst_pad_set_active (second_, FALSE);
+  gst_pad_set_active (second_, FALSE);
 }
 
 GstPadProbeReturn
@@ -96,10 +98,11 @@ PackedInput::handle (GstPadProbeInfo *info)
 /* ---- caps ---- */
 
 GstPadProbeReturn
-PackedInput::refuse (GstPadProbeInfo *info, const char *what, const char *expected)
+PackedInput::refuse (GstPadProbeInfo *info, const std::string &what, const std::string &expected)
 {
   GST_ELEMENT_ERROR (element_, STREAM, FORMAT,
-      ("pad %s: %s; expected %s", GST_PAD_NAME (first_), what, expected), (nullptr));
+      ("pad %s: %s; expected %s", GST_PAD_NAME (first_), what.c_str (), expected.c_str ()),
+      (nullptr));
   is_refused_ = true;
   gst_mini_object_unref (GST_MINI_OBJECT (GST_PAD_PROBE_INFO_DATA (info)));
   return GST_PAD_PROBE_HANDLED;
@@ -119,6 +122,8 @@ PackedInput::handle_caps (GstPadProbeInfo *info)
   if (packing == Packing::kNone)
     return is_packed_ ? refuse (info, "images of one view after images of two", "the same packing")
                       : GST_PAD_PROBE_OK;
+  if (saw_one_view_)
+    return refuse (info, "images of two views after images of one", "the same packing");
   if (gst_pad_is_linked (second_))
     return refuse (info, "images of two views, but the other sink pad is linked",
         "both views in one stream, or packing=none");
@@ -126,11 +131,12 @@ PackedInput::handle_caps (GstPadProbeInfo *info)
     return refuse (info, "this format cannot be divided into two views", "I420, NV12, YUY2 or RGB");
   const bool beside = packing == Packing::kSideBySide;
   const int x = beside ? video.width / 2 : 0, y = beside ? 0 : video.height / 2;
-  if ((beside ? video.width : video.height) % 2 != 0 || !may_begin_at (video.finfo, x, y))
+  const int size = beside ? video.width : video.height, unit = unit_of (video.finfo, beside);
+  if (size % unit != 0)
     return refuse (info,
-        beside ? "the width does not divide into two views"
-               : "the height does not divide into two views",
-        "a multiple of 2, or of 4 where colour has half the resolution");
+        (beside ? "width " : "height ") + std::to_string (size) +
+            " does not divide into two views of this format",
+        "a multiple of " + std::to_string (unit));
   packed_ = video;
   offset_x_ = x;
   offset_y_ = y;
@@ -144,11 +150,15 @@ PackedInput::handle_caps (GstPadProbeInfo *info)
   GstEvent *of_view = gst_event_new_caps (caps);
   gst_event_set_seqnum (of_view, gst_event_get_seqnum (event));
   gst_caps_unref (caps);
-  if (!is_packed_)
+  const bool is_new = !is_packed_;
+  if (is_new)
     if (GstEvent *start = gst_pad_get_sticky_event (first_, GST_EVENT_STREAM_START, 0))
       gst_pad_send_event (second_, start);
   is_packed_ = true;
   gst_pad_send_event (second_, gst_event_ref (of_view));
+  if (is_new) /* after caps of one view, which no image followed */
+    if (GstEvent *segment = gst_pad_get_sticky_event (first_, GST_EVENT_SEGMENT, 0))
+      gst_pad_send_event (second_, segment);
   GST_PAD_PROBE_INFO_DATA (info) = of_view;
   gst_event_unref (event);
   return GST_PAD_PROBE_OK;
@@ -185,8 +195,10 @@ PackedInput::make_view (GstBuffer *packed, bool first) const
 GstPadProbeReturn
 PackedInput::handle_buffer (GstPadProbeInfo *info)
 {
-  if (!is_packed_ && !is_refused_)
+  if (!is_packed_ && !is_refused_) {
+    saw_one_view_ = true;
     return GST_PAD_PROBE_OK;
+  }
   GstBuffer *packed = GST_PAD_PROBE_INFO_BUFFER (info);
   GstFlowReturn flow = GST_FLOW_NOT_NEGOTIATED;
   if (!is_refused_)

@@ -4,6 +4,7 @@
 #include <gst/video/video.h>
 
 #include <atomic>
+#include <string>
 
 /** How a stereo camera packs its two views into one image. */
 enum class Packing { kAuto, kNone, kSideBySide, kTopBottom };
@@ -23,7 +24,8 @@ private:
   GstPadProbeReturn handle (GstPadProbeInfo *info);
   GstPadProbeReturn handle_caps (GstPadProbeInfo *info);
   GstPadProbeReturn handle_buffer (GstPadProbeInfo *info);
-  GstPadProbeReturn refuse (GstPadProbeInfo *info, const char *what, const char *expected);
+  GstPadProbeReturn refuse (
+      GstPadProbeInfo *info, const std::string &what, const std::string &expected);
   GstBuffer *make_view (GstBuffer *packed, bool first) const;
 
   GstElement *element_ = nullptr;
@@ -33,7 +35,7 @@ private:
   std::atomic<bool> is_packed_ = false; /* written by the streaming thread of the first pad */
 
   /* that thread only */
-  bool is_refused_ = false, second_view_first_ = false;
+  bool is_refused_ = false, saw_one_view_ = false, second_view_first_ = false;
   GstVideoInfo packed_{};           /* of the caps */
   int offset_x_ = 0, offset_y_ = 0; /* of the later view, pixels */
 };

@@ -5,8 +5,9 @@
 
 #include <mutex>
 
-/** Posts an error if one of an element's sink pads is still not linked a second after another one
- *  received caps: the element would wait for it for ever. Any thread. */
+/** Posts an error if one of an element's sink pads is still neither linked nor fed by PackedInput,
+ *  that is without caps, a second after another one received caps: the element would wait for it
+ *  for ever. Any thread. */
 class PadLinkWatch {
 public:
   PadLinkWatch () = default;

@@ -4,7 +4,9 @@
 
 #include <gst/video/video.h>
 
+#include <algorithm>
 #include <string>
+#include <vector>
 
 using namespace rangecast::testing;
 
@@ -121,6 +123,38 @@ GST_START_TEST (test_caps_say_how_views_are_packed)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_right_view_first_is_told_by_the_caps)
+{
+  const char *swapped = "avatartestsrc name=a num-buffers=1  a.right ! queue ! m.sink_0  a.left ! "
+                        "queue ! m.sink_1  compositor name=m sink_1::xpos=320 ! capssetter "
+                        "caps=video/x-raw,multiview-mode=side-by-side,multiview-flags="
+                        "(GstVideoMultiviewFlagsSet)1:ffffffff ! d.left ";
+  std::vector<guint16> depths[2];
+  for (int i = 0; i < 2; i++) {
+    const std::string source =
+        i ? swapped
+          : packed_source ("RGBx", true) +
+                "capssetter caps=video/x-raw,multiview-mode=side-by-side ! d.left ";
+    GstElement *pipeline = gst_parse_launch (
+        (source + kDepth + "name=d ! appsink sync=false name=s").c_str (), nullptr);
+    gst_element_set_state (pipeline, GST_STATE_PLAYING);
+    GstSample *sample = pull (pipeline, "s");
+    fail_unless (sample != nullptr);
+    {
+      gstrange::RangeFrameMap frame (gst_sample_get_buffer (sample), GST_MAP_READ);
+      const auto &depth = frame.views ()[0].depth;
+      for (int y = 0; y < depth.height; y++)
+        depths[i].insert (depths[i].end (), depth.row (y), depth.row (y) + depth.width);
+    }
+    gst_sample_unref (sample);
+    gst_element_set_state (pipeline, GST_STATE_NULL);
+    gst_object_unref (pipeline);
+  }
+  ck_assert_int_gt (depths[0].size () - std::count (depths[0].begin (), depths[0].end (), 0), 5000);
+  fail_unless (depths[0] == depths[1]);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_ends_and_starts_again)
 {
   GstElement *pipeline = gst_parse_launch (
@@ -165,13 +199,34 @@ GST_START_TEST (test_what_cannot_be_divided_is_one_error)
     return error_of ("videotestsrc num-buffers=2 ! video/x-raw," + caps + " ! d.left " + kDepth +
                      "packing=side-by-side name=d ! fakesink");
   };
-  fail_unless_contains (of ("format=RGBx,width=641,height=48"), "multiple of 2");
-  fail_unless_contains (of ("format=I420,width=642,height=48"), "or of 4");
+  fail_unless_contains (of ("format=RGBx,width=641,height=48"), "width 641 does not divide");
+  fail_unless_contains (of ("format=I420,width=642,height=48"), "multiple of 4");
+  fail_unless_contains (of ("format=Y41B,width=644,height=48"), "multiple of 8");
   fail_unless_contains (of ("format=v210,width=640,height=48"), "cannot be divided");
   fail_unless_contains (
       error_of (packed_source ("I420", true) + "tee name=t ! queue ! d.left t. ! queue ! d.right " +
                 kDepth + "packing=side-by-side name=d ! fakesink"),
       "the other sink pad is linked");
+}
+GST_END_TEST;
+
+/* Two streams, one after the other. */
+GST_START_TEST (test_another_packing_in_the_stream_is_one_error)
+{
+  for (const bool begins_packed : {false, true}) {
+    const auto part = [] (bool packed) {
+      return std::string ("videotestsrc num-buffers=2 ! video/x-raw,width=640,height=240 ! "
+                          "capssetter caps=video/x-raw,multiview-mode=") +
+             (packed ? "side-by-side" : "mono") + " ! c. ";
+    };
+    const std::string launch =
+        "concat name=c ! d.left " + part (begins_packed) + part (!begins_packed) + kDepth +
+        "name=d ! fakesink " +
+        (begins_packed ? "" : "videotestsrc ! video/x-raw,width=640,height=240 ! d.right");
+    fail_unless_contains (error_of (launch), begins_packed
+                                                 ? "images of one view after images of two"
+                                                 : "images of two views after images of one");
+  }
 }
 GST_END_TEST;
 
@@ -186,6 +241,8 @@ stereodepthpacked_suite ()
   tcase_add_test (tc, test_ends_and_starts_again);
   tcase_add_test (tc, test_seeks);
   tcase_add_test (tc, test_what_cannot_be_divided_is_one_error);
+  tcase_add_test (tc, test_right_view_first_is_told_by_the_caps);
+  tcase_add_test (tc, test_another_packing_in_the_stream_is_one_error);
   return suite;
 }
 
