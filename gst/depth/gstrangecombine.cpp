@@ -97,6 +97,7 @@ struct GstRangeCombinePrivate {
   int frames_to_check = kCheckedFrames;      /* 0: depth was found, or a warning was posted */
   std::optional<rangecast::DepthRange> out_of_range; /* of the last frame that was checked */
   double depth_scale = kDefaultDepthScale;
+  bool has_caps_scale = false;                       /* depth_scale is that of the caps */
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE; /* of the output */
   GstBufferPool *pool = nullptr;
   GstVideoConverter *converter = nullptr;
@@ -156,7 +157,8 @@ gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, 
 
 /* ---- negotiation ---- */
 
-/* Whether the calibration is that of the caps: properties take precedence. */
+/* Whether the calibration, the depth scale and the view-id are those of the caps: properties rig
+ * and focal-length replace them; near, far and depth-unit may still change the output. */
 static bool
 uses_caps_view (const GstRangeCombinePrivate *priv, const ViewSettings &settings)
 {
@@ -170,11 +172,11 @@ make_depth_view (const GstRangeCombinePrivate *priv, const ViewSettings &setting
   const int width = priv->depth->width, height = priv->depth->height;
   if (uses_caps_view (priv, settings)) {
     view = *priv->depth_view;
-    if (const Status s = rangecast::scale_view (view, width, height); !s.ok ())
-      return {s.code (), "pad depth is " + size_text (width, height) +
-                             " but its calibration is for " +
-                             size_text (priv->depth_view->width, priv->depth_view->height) +
-                             "; expected the same shape"};
+    if (view.width != width || view.height != height)
+      return {StatusCode::kBadData, "pad depth is " + size_text (width, height) +
+                                        " but the calibration in its caps is for " +
+                                        size_text (view.width, view.height) +
+                                        "; expected that size, or property rig or focal-length"};
   } else if (settings.rig.empty ()) {
     const double focal_length =
         settings.focal_length > 0 ? settings.focal_length : kDefaultFocalLength * width;
@@ -223,8 +225,8 @@ configure_views (GstRangeCombinePrivate *priv, const CombineSettings &settings)
   View depth, colour;
   if (Status s = make_depth_view (priv, settings.view, depth); !s.ok ())
     return s;
-  priv->depth_scale =
-      uses_caps_view (priv, settings.view) ? priv->depth_view->depth_unit_m : settings.depth_scale;
+  priv->has_caps_scale = uses_caps_view (priv, settings.view);
+  priv->depth_scale = priv->has_caps_scale ? priv->depth_view->depth_unit_m : settings.depth_scale;
   if (Status s =
           make_colour_view (settings, depth, priv->colour->width, priv->colour->height, colour);
       !s.ok ())
@@ -380,9 +382,10 @@ warn_of_range (GstRangeCombine *self)
   priv->frames_to_check = 0;
   GST_ELEMENT_WARNING (self, STREAM, FORMAT,
       ("pad depth: no pixel lies between near (%g m) and far (%g m); values are %d to %d, with "
-       "depth-scale=%g %g to %g m; expected another depth-scale, near or far",
+       "depth-scale=%g %g to %g m; expected another %snear or far",
           priv->view.near_m, priv->view.far_m, range.min, range.max, priv->depth_scale,
-          range.min * priv->depth_scale, range.max * priv->depth_scale),
+          range.min * priv->depth_scale, range.max * priv->depth_scale,
+          priv->has_caps_scale ? "" : "depth-scale, "),
       (nullptr));
 }
 
@@ -604,8 +607,8 @@ combine_properties ()
           "Vertical principal point in pixels, without a rig (-1 = centre)", -1, 1e6,
           kMutableReady),
       P::number<&S::depth_scale> ("depth-scale", "Depth scale",
-          "Metres per unit of the input depth; caps with a calibration say it themselves", 1e-7, 1,
-          kMutableReady),
+          "Metres per unit of the input depth (ignored where the caps carry the calibration)", 1e-7,
+          1, kMutableReady),
       P::number<&S::view, &V::depth_unit> ("depth-unit", "Depth unit",
           "Metres per depth unit of the output (0 = from the rig, or 0.0001)", 0, 1, kMutableReady),
       P::number<&S::view, &V::near> ("near", "Near",

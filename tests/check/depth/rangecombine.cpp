@@ -611,7 +611,24 @@ GST_START_TEST (test_takes_back_what_rangesplit_gave_without_properties)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_calibration_that_is_none_is_one_error_that_names_the_field)
+GST_START_TEST (test_calibration_of_another_size_in_the_caps_is_an_error)
+{
+  GstElement *pipeline =
+      gst_parse_launch ("avatartestsrc num-buffers=1 ! rangesplit name=s  s.colour ! queue ! "
+                        "c.colour  s.depth ! queue ! videocrop left=160 top=120 ! c.depth "
+                        "rangecombine name=c ! fakesink",
+          nullptr);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR),
+      "pad depth is 160x120 but the calibration in its caps is for 320x240");
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (bus);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_invalid_calibration_is_one_error_that_names_the_field)
 {
   Combine combine;
   GstCaps *caps =
@@ -622,6 +639,7 @@ GST_START_TEST (test_calibration_that_is_none_is_one_error_that_names_the_field)
   gst_harness_push_event (combine.depth, gst_event_new_caps (caps));
   gst_caps_unref (caps);
   fail_unless_contains (next_message_text (combine.bus, GST_MESSAGE_ERROR), "field \"rig\"");
+  fail_unless (gst_bus_pop_filtered (combine.bus, GST_MESSAGE_ERROR) == nullptr);
 }
 GST_END_TEST;
 
@@ -655,7 +673,8 @@ rangecombine_suite ()
   tcase_add_test (tc, test_new_size_in_the_stream_is_taken);
   tcase_add_test (tc, test_changes_states_twice);
   tcase_add_test (tc, test_takes_back_what_rangesplit_gave_without_properties);
-  tcase_add_test (tc, test_calibration_that_is_none_is_one_error_that_names_the_field);
+  tcase_add_test (tc, test_calibration_of_another_size_in_the_caps_is_an_error);
+  tcase_add_test (tc, test_invalid_calibration_is_one_error_that_names_the_field);
   return suite;
 }
 
