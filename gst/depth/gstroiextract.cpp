@@ -73,8 +73,8 @@ constexpr int kRequestMargin = 16;
 /* Number of frames since learning that are foreground on so much of the picture before that is
  * reported. Nobody fills as much of it from the first frame on. */
 constexpr int kSuspectFrames = 60;
-/* Shares of the picture, and of its pixels with depth: where the background has no texture, only a
- * person may have depth. */
+/* Shares of the picture, and of its pixels with depth. Both must be exceeded: before a background
+ * without texture, all pixels with depth may be those of the person. */
 constexpr double kSuspectShare = 0.65, kSuspectShareOfDepth = 0.9;
 
 /* One view of the stream. */
@@ -368,21 +368,25 @@ save_when_all_learnt (GstRoiExtract *self, const std::string &path)
   gst_range_post_warning (GST_ELEMENT (self), status);
 }
 
-/* Of a stream that was too short to learn a background: nothing but empty ROIs was output. */
+/* Of a view whose stream was too short to learn a background, so that only empty ROIs of it were
+ * output. A camera that sent nothing matters only for the file. */
 static void
 warn_if_not_learnt (GstRoiExtract *self, const RoiSettings &settings)
 {
-  if (all_learnt (self->priv))
+  const std::string &file = settings.save_background;
+  for (const View &view : self->priv->info.rig.views) {
+    const ViewState &state = *self->priv->views[view.id];
+    const int frames = state.background.frames ();
+    if (state.learnt || (frames + state.settled == 0 && file.empty ()))
+      continue;
+    gst_range_post_warning (GST_ELEMENT (self),
+        {StatusCode::kNotFound, (file.empty () ? "" : file + ": not written: ") + "view " +
+                                    std::to_string (view.id) + " ended after " +
+                                    std::to_string (frames) +
+                                    " frames of the background; expected background-frames, " +
+                                    std::to_string (settings.background_frames)});
     return;
-  int seen = 0;
-  for (const View &view : self->priv->info.rig.views)
-    seen = std::max (seen, self->priv->views[view.id]->background.frames ());
-  gst_range_post_warning (GST_ELEMENT (self),
-      {StatusCode::kNotFound,
-          (settings.save_background.empty () ? "" : settings.save_background + ": not written: ") +
-              "the stream ended after " + std::to_string (seen) +
-              " frames of the background; expected background-frames, " +
-              std::to_string (settings.background_frames)});
+  }
 }
 
 static void

@@ -314,13 +314,28 @@ GST_START_TEST (test_stream_too_short_for_a_background_to_save_is_a_warning)
     push (h, scene (rig, i, false));
   fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
   const std::string said = next_message_text (bus, GST_MESSAGE_WARNING);
-  fail_unless_contains (said, "not written: the stream ended after 2 frames");
+  fail_unless_contains (said, "not written: view 0 ended after 2 frames");
   fail_if (g_file_test (path, G_FILE_TEST_EXISTS));
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
   gst_harness_teardown (h);
   g_free (path);
   g_free (save);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_camera_that_sends_nothing_gives_no_warning_at_the_end)
+{
+  GstHarness *h = roi_harness (ring_rig (2), "roiextract background-frames=2");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  for (int i = 0; i < 3; i++)
+    push (h, scene (ring_rig (1), i, false));
+  fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
+  fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_WARNING) == nullptr);
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
 }
 GST_END_TEST;
 
@@ -333,7 +348,7 @@ GST_START_TEST (test_stream_that_ends_while_learning_is_a_warning)
   push (h, scene (rig, 0, false));
   fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
   fail_unless_contains (
-      next_message_text (bus, GST_MESSAGE_WARNING), "the stream ended after 1 frames");
+      next_message_text (bus, GST_MESSAGE_WARNING), "view 0 ended after 1 frames");
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
   gst_harness_teardown (h);
@@ -676,6 +691,7 @@ roiextract_suite ()
   tcase_add_test (tc, test_place_that_a_background_cannot_be_saved_to_is_one_error_at_start);
   tcase_add_test (tc, test_stream_too_short_for_a_background_to_save_is_a_warning);
   tcase_add_test (tc, test_stream_that_ends_while_learning_is_a_warning);
+  tcase_add_test (tc, test_camera_that_sends_nothing_gives_no_warning_at_the_end);
   tcase_add_test (tc, test_missing_background_file_is_one_error_that_names_it);
   tcase_add_test (tc, test_tells_upstream_the_roi_once_for_a_person_who_stays);
   tcase_add_test (tc, test_growing_person_is_told_before_the_edge_is_reached);
