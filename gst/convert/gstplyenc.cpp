@@ -56,7 +56,7 @@ struct GstPlyEncPrivate {
   PointCloudFormat::Kind kind = PointCloudFormat::kPly; /* of the output caps */
   gstrange::RangeInfo info;
   CapsErrors caps_errors;
-  guint64 frames = 0; /* since start */
+  guint64 frames = 0; /* since start or flush */
 };
 
 struct _GstPlyEnc {
@@ -213,6 +213,15 @@ gst_ply_enc_start (GstBaseTransform *base)
   return TRUE;
 }
 
+/* Sinks of one file start it again at a flush. */
+static gboolean
+gst_ply_enc_sink_event (GstBaseTransform *base, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    GST_PLY_ENC (base)->priv->frames = 0;
+  return GST_BASE_TRANSFORM_CLASS (gst_ply_enc_parent_class)->sink_event (base, event);
+}
+
 static gboolean
 gst_ply_enc_stop (GstBaseTransform *base)
 {
@@ -290,6 +299,7 @@ gst_ply_enc_class_init (GstPlyEncClass *klass)
 
   transform_class->submit_input_buffer = GST_DEBUG_FUNCPTR (submit_with_caps);
   transform_class->start = GST_DEBUG_FUNCPTR (gst_ply_enc_start);
+  transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_ply_enc_sink_event);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_ply_enc_stop);
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_ply_enc_transform_caps);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_ply_enc_set_caps);

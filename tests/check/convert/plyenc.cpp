@@ -164,7 +164,8 @@ GST_END_TEST;
 
 GST_START_TEST (test_second_cloud_for_one_file_is_one_error)
 {
-  gchar *file = g_build_filename (g_get_tmp_dir (), "rangecast-two-clouds.ply", nullptr);
+  gchar *folder = g_dir_make_tmp ("rangecast-clouds-XXXXXX", nullptr);
+  gchar *file = g_build_filename (folder, "two.ply", nullptr);
   gchar *launch = g_strdup_printf ("avatartestsrc num-buffers=2 ! video/x-range,width=32,height=24 "
                                    "! plyenc ! filesink location=%s",
       file);
@@ -178,13 +179,49 @@ GST_START_TEST (test_second_cloud_for_one_file_is_one_error)
   gst_message_parse_error (message, &error, nullptr);
   fail_unless_contains (error->message, "multifilesink");
   g_error_free (error);
+  GstObject *encoder = GST_MESSAGE_SRC (message);
+  while (GstMessage *more = gst_bus_timed_pop_filtered (bus, GST_SECOND / 4, GST_MESSAGE_ERROR)) {
+    ck_assert_ptr_ne (GST_MESSAGE_SRC (more), encoder);
+    gst_message_unref (more);
+  }
   gst_message_unref (message);
   gst_element_set_state (pipeline, GST_STATE_NULL);
   gst_object_unref (bus);
   gst_object_unref (pipeline);
   g_remove (file);
+  g_rmdir (folder);
   g_free (launch);
   g_free (file);
+  g_free (folder);
+}
+GST_END_TEST;
+
+/* A flush starts the file again. */
+GST_START_TEST (test_cloud_after_a_seek_goes_into_the_file)
+{
+  gchar *folder = g_dir_make_tmp ("rangecast-clouds-XXXXXX", nullptr);
+  gchar *file = g_build_filename (folder, "one.ply", nullptr);
+  gchar *launch =
+      g_strdup_printf ("avatartestsrc ! video/x-range,width=32,height=24,framerate=10/1 "
+                       "! plyenc ! filesink location=%s",
+          file);
+  GstElement *pipeline = gst_parse_launch (launch, nullptr);
+  gst_element_set_state (pipeline, GST_STATE_PAUSED);
+  ck_assert_int_eq (gst_element_get_state (pipeline, nullptr, nullptr, 60 * GST_SECOND),
+      GST_STATE_CHANGE_SUCCESS);
+  fail_unless (gst_element_seek (pipeline, 1, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+      GST_SEEK_TYPE_SET, GST_SECOND, GST_SEEK_TYPE_SET, GST_SECOND + GST_SECOND / 10));
+  play_to_the_end (pipeline);
+  gst_object_unref (pipeline);
+  gchar *bytes = nullptr;
+  fail_unless (g_file_get_contents (file, &bytes, nullptr, nullptr));
+  fail_unless (g_str_has_prefix (bytes, "ply\n"));
+  g_free (bytes);
+  g_remove (file);
+  g_rmdir (folder);
+  g_free (launch);
+  g_free (file);
+  g_free (folder);
 }
 GST_END_TEST;
 
@@ -595,6 +632,7 @@ plyenc_suite ()
   tcase_add_test (tc, test_view_that_the_rig_lacks_is_one_error);
   tcase_add_test (tc, test_works_again_after_null);
   tcase_add_test (tc, test_second_cloud_for_one_file_is_one_error);
+  tcase_add_test (tc, test_cloud_after_a_seek_goes_into_the_file);
   tcase_add_test (tc, test_several_clouds_go_into_numbered_files);
   tcase_add_test (tc, test_normals_of_a_slanted_plane_are_the_planes);
   tcase_add_test (tc, test_normals_do_not_mix_two_surfaces);
