@@ -173,7 +173,7 @@ describe_source () { # camera's number, WHAT
 
 # Prints width and height of the pictures of `source`.
 size_of_source () {
-  LC_ALL=C timeout 30 gst-launch-1.0 -v "${source[@]}" ! identity eos-after=2 ! fakesink name=measured 2>/dev/null |
+  LC_ALL=C timeout 30 gst-launch-1.0 -v "${source[@]}" ! identity eos-after=2 ! fakesink name=measured 2>"$folder/size.log" |
     sed -nE 's/.*measured\.GstPad:sink: caps = .*width=\(int\)([0-9]+), height=\(int\)([0-9]+).*/\1 \2/p' | head -n 1
 }
 
@@ -189,7 +189,8 @@ for i in "${!whats[@]}"; do
   case "${roles[i]}" in
     left | right | third) add_camera "${views[i]}" "${roles[i]}" "${source[@]}" ;;
     *)
-      read -r width height < <(size_of_source) || die "--${roles[i]}: no picture comes from '${whats[i]}'"
+      read -r width height < <(size_of_source) ||
+        die "--${roles[i]}: no picture comes from '${whats[i]}'$(sed -n 's/^ERROR: [^/]*/: /p' "$folder/size.log" | head -n 1)"
       if [ "${roles[i]}" = side-by-side ]; then
         left=(videocrop "right=$((width / 2))") right=(videocrop "left=$((width / 2))")
       else

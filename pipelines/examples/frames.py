@@ -61,9 +61,9 @@ def main():
     Gst.init(None)
     pipeline = Gst.parse_launch(f"{options.source} ! video/x-range ! appsink name=frames sync=false max-buffers=2")
     sink, bus = pipeline.get_by_name("frames"), pipeline.get_bus()
-    pipeline.set_state(Gst.State.PLAYING)
+    started = pipeline.set_state(Gst.State.PLAYING) != Gst.StateChangeReturn.FAILURE
     count, message = 0, None
-    while count < options.frames and not message and not sink.get_property("eos"):
+    while started and count < options.frames and not message and not sink.get_property("eos"):
         if not (sample := sink.emit("try-pull-sample", Gst.SECOND // 10)):
             message = bus.pop_filtered(Gst.MessageType.ERROR)
             continue
@@ -72,11 +72,14 @@ def main():
         middle = "centre {:.3f} {:.3f} {:.3f} m".format(*points.mean(axis=0)) if len(points) else "empty"
         print(f"{Gst.TIME_ARGS(sample.get_buffer().pts)}: {len(views)} views, {len(points)} points, {middle}")
         count += 1
+    message = message or bus.pop_filtered(Gst.MessageType.ERROR)
     pipeline.set_state(Gst.State.NULL)
     if message:
         error, details = message.parse_error()
         sys.exit(f"frames.py: {error.message} {details or ''}")
-    if options.save and count:
+    if not count:
+        sys.exit("frames.py: --source: no frame set came")
+    if options.save:
         save(options.save, points, colours)
 
 

@@ -156,6 +156,9 @@ test_frames_saves_points_of_all_views () {
   expect_error "does-not-exist" $python "$examples/frames.py" --source "filesrc location=does-not-exist ! neighbourcodeparse ! neighbourcodedec"
   expect_error "expected a name that ends in .ply or .npy" $python "$examples/frames.py" --save head.obj
   expect_error "no element" $python "$examples/frames.py" --source no-such-element
+  expect_error "no-such-device" $python "$examples/frames.py" --source "v4l2src device=/no-such-device ! d.left stereodepth name=d packing=side-by-side"
+  expect_error "no frame set came" $python "$examples/frames.py" --source "avatartestsrc num-buffers=0"
+  expect_error "expected 1 or more" $python "$examples/frames.py" --frames 0
 }
 
 # What frame_source.py draws is 0.92 to 1.08 m before the camera, and round the world's origin.
