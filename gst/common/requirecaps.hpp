@@ -24,7 +24,7 @@ require_caps (GstElement *element, GstPad *sink)
   return false;
 }
 
-/** submit_input_buffer() of GstBaseTransform, for classes: with require_caps(). */
+/** GstBaseTransform's default submit_input_buffer(), after require_caps(). */
 inline GstFlowReturn
 submit_with_caps (GstBaseTransform *base, gboolean is_discont, GstBuffer *buffer)
 {

@@ -168,7 +168,7 @@ check (const SceneSettings &s)
       !(s.model_top_m >= 0.1 && s.model_top_m <= kPersonHeight))
     return bad_setting ("model-top", "-1, 0, or 0.1 to 1.8 metres");
   if (s.model.empty () && !s.texture.empty ())
-    return bad_setting ("texture", "a model that it covers: property location");
+    return bad_setting ("texture", "a model (property location)");
   return check_room (s);
 }
 

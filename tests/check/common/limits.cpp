@@ -117,7 +117,6 @@ GST_START_TEST (test_rig_of_more_than_2_27_pixels_is_one_error_of_its_caps)
 }
 GST_END_TEST;
 
-/* A source sends refused caps again with each buffer, and with EOS after its own error. */
 /* Runs fakesrc ! `caps` element ! fakesink twice. The element must post one error each time, which
  * contains `what`. */
 static void
@@ -166,6 +165,7 @@ GST_START_TEST (test_data_without_caps_are_one_error_that_names_them)
 }
 GST_END_TEST;
 
+/* A source sends refused caps again with each buffer, and with EOS after its own error. */
 GST_START_TEST (test_caps_without_a_rig_are_one_error)
 {
   for (const char *name : {"roiextract", "cylinderfilter", "neighbourcodeenc", "plyenc",
