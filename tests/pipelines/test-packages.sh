@@ -6,14 +6,14 @@ build=${RANGECAST_BUILD:-$source_dir/build}
 # Of every file that meson installs, the packages whose lists name it.
 owners () {
   meson introspect --installed "$build" | python3 -c '
-import fnmatch, json, pathlib, subprocess, sys
+import fnmatch, json, pathlib, re, subprocess, sys
 folder = pathlib.Path(sys.argv[1])
 options = json.loads(subprocess.check_output(["meson", "introspect", "--buildoptions", sys.argv[2]]))
 prefix = next(o["value"] for o in options if o["name"] == "prefix").strip("/")
 lists = {f.stem if f.suffix == ".install" else f.name: f.read_text().split() for f in folder.glob("*.install")}
 for path in sorted(json.load(sys.stdin).values()):
     path = "usr" + path.strip("/").removeprefix(prefix)
-    path = path.replace("usr/lib/python3.11/", "usr/lib/python3/")
+    path = re.sub("^usr/lib/python3[.0-9]*/", "usr/lib/python3/", path) # for prefix /usr
     found = [name for name, patterns in lists.items() if any(fnmatch.fnmatch(path, p) or fnmatch.fnmatch(path, p + "/*") for p in patterns)]
     print(path, *found)
 ' "$pipelines/debian" "$build"
