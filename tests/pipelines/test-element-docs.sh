@@ -2,8 +2,9 @@
 # docs/elements: the generated tables are those of the elements, and the launch lines run.
 #
 # A block of a page that begins with "```sh run" is a shell script. The blocks of a page run in order in one folder, with the
-# following changes: a source draws 8 frames, sinks that open a window are fakesinks, UDP ports and the addresses of fake
-# cameras are this run's own. What a block leaves running in the background ends with it.
+# following changes: a source draws 8 frames, 4 of the empty scene, of which 3 are learnt; sinks that open a window are
+# fakesinks; UDP ports and the addresses of fake cameras are this run's own. What a block leaves running in the background ends
+# with it.
 
 pages=$source_dir/docs/elements
 
@@ -14,7 +15,7 @@ test_tables_are_those_of_the_elements () {
 # usage: adapt <script >script
 adapt () {
   sed -E -e 's/num-buffers=[0-9]{2,}/num-buffers=8/g' -e 's/\bavatartestsrc\b/avatartestsrc num-buffers=8/g' \
-    -e 's/\bvideotestsrc\b/videotestsrc num-buffers=8/g' -e 's/\b(autovideosink|glimagesink)( [a-z-]+=[^ ]+)*/fakesink/g' \
+    -e 's/\b(empty-frames=)[0-9]+/\14/g; s/\b(background-frames=)[0-9]+/\13/g' -e 's/\bvideotestsrc\b/videotestsrc num-buffers=8/g' -e 's/\b(autovideosink|glimagesink)( [a-z-]+=[^ ]+)*/fakesink/g' \
     -e "s/\\bport=500([0-9])\\b/port=$((ports / 10))\\1/g" \
     -e "s/\\bfake-cameras /fake-cameras --address-base 127.$((ports / 256)).$((ports % 256)).1 --size 160x120 /g"
 }
