@@ -129,3 +129,18 @@ test_people_are_cut_out_of_a_real_recording_without_their_shadows () {
     expect_file out/$n.png $((4 * empty))
   done
 }
+
+# As docs/guide/cameras.md reads depth that v4l2src cannot: raw frames from a pipe, beside live colour.
+test_raw_depth_from_a_pipe_joins_live_colour () {
+  gst-launch-1.0 -q avatartestsrc num-buffers=20 views=1 ! video/x-range,width=160,height=120,framerate=10/1 ! rangesplit name=s \
+    s.depth ! queue ! video/x-raw,format=GRAY16_LE ! filesink location=depth.raw  s.colour ! queue ! fakesink
+  for i in {0..19}; do
+    dd if=depth.raw bs=38400 count=1 skip="$i" 2>/dev/null
+    sleep 0.1
+  done | timeout 60 gst-launch-1.0 -q fdsrc do-timestamp=true blocksize=38400 \
+    ! rawvideoparse format=gray16-le width=160 height=120 framerate=10/1 ! queue ! c.depth \
+    videotestsrc is-live=true ! video/x-raw,width=160,height=120,framerate=10/1 ! queue ! c.colour \
+    rangecombine name=c focal-length=150 depth-scale=0.0001 ! neighbourcodeenc ! filesink location=pipe.rcnc
+  count-points pipe.rcnc >points.txt
+  [ "$(grep -c ' [1-9][0-9]\{3,\} points' points.txt)" -ge 10 ] || fail "$(cat points.txt)"
+}
