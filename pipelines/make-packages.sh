@@ -13,8 +13,9 @@ mkdir -p "$1" 2>/dev/null || die "$1: cannot create this folder"
 out=$(realpath "$1")
 cd "$(dirname "$0")/.."
 [ -f build/build.ninja ] || die "no build here: run ./setup.sh first"
-command -v dpkg-buildpackage dh_girepository >/dev/null && command -v dh >/dev/null ||
-  die "Debian's tools are missing: apt-get install dpkg-dev debhelper gobject-introspection"
+for tool in dpkg-buildpackage dh dh_girepository; do
+  command -v $tool >/dev/null || die "no $tool: apt-get install dpkg-dev debhelper gobject-introspection"
+done
 
 # meson says where it writes, but not what the tarball is called.
 folder=$(mktemp -d)
