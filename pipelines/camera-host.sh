@@ -4,6 +4,7 @@
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 source "$(dirname "$0")/rtp.sh"
+source "$(dirname "$0")/audio.sh"
 
 usage () {
   cat <<'END'
@@ -38,12 +39,14 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --depth WHAT    properties of stereodepth, e.g. "algorithm=bm refine=0", which is faster
   --encoder WHAT  properties of neighbourcodeenc, e.g. "profile=entropy temporal=true" (default:
                   the element's: profile=packed)
+  --audio SOURCE  send speech, too: a source in gst-launch-1.0 syntax, e.g. pulsesrc or "alsasrc device=hw:1"
+  --audio-to HOST:PORT  where the parent (--audio) or viewers listen for it; RTCP goes to PORT + 1
 END
   rtp_usage_sender
 }
 
 view= to= rig= input=avatar views= size=320x240 fps=15 learn=20
-format=rgb trigger=software clock_server= action_send= reconnect=false depth= encoder= loop=0 threads=
+format=rgb trigger=software clock_server= action_send= reconnect=false depth= encoder= loop=0 threads= audio_source= audio_to= audio=()
 while [ $# -gt 0 ]; do
   option=$1
   rtp_option sender "$1" "${2:-}"
@@ -54,6 +57,8 @@ while [ $# -gt 0 ]; do
   case "$1" in
     --depth) depth=${2:-}; shift ;;
     --encoder) encoder=${2:-}; shift ;;
+    --audio) audio_source=${2:-}; shift ;;
+    --audio-to) audio_to=${2:-}; shift ;;
     --view) view=${2:-}; shift ;;
     --to) to=${2:-}; shift ;;
     --rig) rig=${2:-}; shift ;;
@@ -109,6 +114,12 @@ rtp_check sender
 [ -z "$rtp_adaptive" ] || [ -n "$rtp_feedback" ] ||
   echo "camera-host.sh: --encoder: adaptive-bitrate has no effect without --feedback, because no receiver reports arrive" >&2
 send_rtp "$to"
+[ -z "$audio_source$audio_to" ] || need_option "$audio_source" --audio
+if [ -n "$audio_source" ]; then
+  need_option "$audio_to" --audio-to
+  send_audio "$audio_source" "$audio_to"
+  audio_clock "${clock_server:-system}"
+fi
 [ -f "$rig" ] || die "--rig: no file '$rig'"
 case "$input" in
   avatar | avatar=* | range) # views and rig must describe the same cameras
@@ -196,4 +207,4 @@ launch "${cameras[@]}" \
   "${depth[@]}" \
   roiextract "background-frames=$learn" \
   ! queue max-size-buffers=2 leaky=downstream \
-  ! neighbourcodeenc "${encoder[@]}" ! "${rtp[@]}"
+  ! neighbourcodeenc "${encoder[@]}" ! "${rtp[@]}" "${audio[@]}"

@@ -4,6 +4,7 @@
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 source "$(dirname "$0")/rtp.sh"
+source "$(dirname "$0")/audio.sh"
 
 usage () {
   cat <<'END'
@@ -17,6 +18,8 @@ usage: parent-host.sh --views N --listen PORT --to HOST:PORT[,HOST:PORT...] [opt
   --latency MS    how long to wait for a late view (default 60)
   --clock-port N  publish the clock on UDP port N, for camera-host.sh --clock-server (default: not published)
   --rig FILE      reject camera hosts whose cameras are not in this rig (default: accept all)
+  --audio PORT    pass speech on that one host sends to UDP ports PORT and PORT + 1 (RTCP)
+  --audio-to HOST:PORT[,HOST:PORT...]  to viewers (and to PORT + 1), or to a multicast group
 To the viewers:
 END
   rtp_usage_sender
@@ -27,7 +30,7 @@ From the cameras:
 END
 }
 
-views= listen= to= jitter=30 latency=60 clock_port= rig= cameras_feedback= camera_fec= camera_rtx=
+views= listen= to= jitter=30 latency=60 clock_port= rig= cameras_feedback= camera_fec= camera_rtx= audio_port= audio_to= audio=()
 while [ $# -gt 0 ]; do
   option=$1
   rtp_option sender "$1" "${2:-}"
@@ -46,6 +49,8 @@ while [ $# -gt 0 ]; do
     --clock-port) clock_port=${2:-}; shift ;;
     --rig) rig=${2:-}; shift ;;
     --cameras) cameras_feedback=${2:-}; shift ;;
+    --audio) audio_port=${2:-}; shift ;;
+    --audio-to) audio_to=${2:-}; shift ;;
     --camera-fec) camera_fec=yes ;;
     --camera-rtx) camera_rtx=yes ;;
     -h | --help) usage; exit 0 ;;
@@ -68,6 +73,14 @@ need_own_port () {
   [ "$1" -lt "$listen" ] || [ "$1" -ge $((listen + views)) ] || die "$2: port $1 is used by view $(($1 - listen)) (--listen $listen)"
 }
 [ -z "$clock_port" ] || need_own_port "$clock_port" --clock-port
+[ -z "$audio_port$audio_to" ] || need_option "$audio_port" --audio
+if [ -n "$audio_port" ]; then
+  need_option "$audio_to" --audio-to
+  need_audio_port "$audio_port" --audio
+  need_own_port "$audio_port" --audio
+  need_own_port $((audio_port + 1)) --audio
+  pass_audio_on "$audio_port" "$audio_to"
+fi
 feedbacks=()
 if [ -n "$cameras_feedback" ]; then
   split_addresses "$cameras_feedback" --cameras
@@ -92,4 +105,4 @@ for ((i = 0; i < views; i++)); do
   cameras+=("${rtp[@]}" ! mux.)
 done
 launch rangemux name=mux "latency=$((latency * 1000000))" ${clock_port:+"clock-port=$clock_port"} ${rig:+"rig=$rig"} \
-  ! "${viewers[@]}" "${cameras[@]}"
+  ! "${viewers[@]}" "${cameras[@]}" "${audio[@]}"

@@ -4,6 +4,7 @@
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 source "$(dirname "$0")/rtp.sh"
+source "$(dirname "$0")/audio.sh"
 
 usage () {
   cat <<'END'
@@ -15,6 +16,7 @@ Without --listen, it records the built-in figure with exact depth:
   --size WxH     picture size (default 320x240)
   --frames N     number of frame sets (default 60)
 With --listen:
+  --audio PORT   record speech, too, that arrives at this UDP port, beside FILE: x.opus beside x.rcnc
   --jitter MS    jitter buffer (default 50)
   --multicast GROUP  receive from this multicast group
   --interface IF  network interface for the group (default: the system's choice)
@@ -22,7 +24,7 @@ END
   rtp_usage_receiver
 }
 
-file= listen= views=4 size=320x240 frames=60 group= jitter=50
+file= listen= views=4 size=320x240 frames=60 group= jitter=50 audio_port= audio=()
 while [ $# -gt 0 ]; do
   option=$1
   rtp_option receiver "$1" "${2:-}"
@@ -35,6 +37,7 @@ while [ $# -gt 0 ]; do
     --views) views=${2:-}; shift ;;
     --size) size=${2:-}; shift ;;
     --frames) frames=${2:-}; shift ;;
+    --audio) audio_port=${2:-}; shift ;;
     --jitter) jitter=${2:-}; shift ;;
     --multicast) group=${2:-}; shift ;;
     --interface) rtp_interface=${2:-}; shift ;;
@@ -53,6 +56,7 @@ need_picture "$size" --size 4096
 [ -z "$rtp_interface" ] || [ -n "$group" ] || die "--interface: expected with --multicast"
 [ -z "$group" ] || [ -n "$listen" ] || die "--multicast: expected with --listen"
 [ -z "$group" ] || need_group "$group"
+[ -z "$audio_port" ] || [ -n "$listen" ] || die "--audio: expected with --listen"
 
 if [ -n "$listen" ]; then
   need_number "$listen" --listen 1 65535
@@ -60,6 +64,19 @@ if [ -n "$listen" ]; then
   rtp_check receiver
   receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
   source=("${rtp[@]}")
+  if [ -n "$audio_port" ]; then
+    need_audio_port "$audio_port" --audio
+    [ "$audio_port" != "$listen" ] || die "--audio: port $audio_port is that of --listen"
+    receive_audio "$audio_port" "$jitter" "$group"
+    speech=$(speech_beside "$file")
+    [ "$speech" != "$file" ] || die "$file: expected another name than *.opus with --audio"
+    [ ! -s "$speech" ] || mv -f -- "$speech" "$speech~"
+    # Both files begin with the first key frame set; silence where no speech came.
+    source+=(! neighbourcodeparse ! "video/x-neighbour-code,alignment=access-unit" ! step.sink_0
+      capturesync name=step start-with=sink_0 step.src_0)
+    audio+=(! step.sink_1 step.src_1 "${hear_audio[@]}" ! audiorate skip-to-first=false ! opusenc audio-type=voice bitrate=32000
+      ! oggmux ! filesink "location=$speech")
+  fi
 else
   source=(avatartestsrc "views=$views" "num-buffers=$frames" range-person-only=true
     ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1"
@@ -68,4 +85,5 @@ fi
 # If nothing arrives, an existing recording must not be lost.
 [ ! -s "$file" ] || mv -f -- "$file" "$file~"
 drop_empty "$file" "${listen:+nothing came to port $listen (no coded frame set); $file was not written}"
-launch "${source[@]}" ! neighbourcodeparse ! filesink "location=$file"
+[ -z "$audio_port" ] || RANGECAST_LAUNCH+=" --drop-empty $(printf %q "$speech")"
+launch "${source[@]}" ! neighbourcodeparse ! filesink "location=$file" "${audio[@]}"

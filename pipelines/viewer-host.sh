@@ -4,6 +4,7 @@
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 source "$(dirname "$0")/rtp.sh"
+source "$(dirname "$0")/audio.sh"
 
 usage () {
   cat <<'END'
@@ -14,13 +15,20 @@ usage: viewer-host.sh --listen PORT [options]
   --orbit DEG     orbit by itself, degrees per second (default 0)
   --size WxH      picture size (default 640x480)
   --jitter MS     jitter buffer (default 30)
+  --audio PORT    receive speech at this UDP port; it is heard, and is in the video
+  --speaker SINK  where it is heard, in gst-launch-1.0 syntax (default: autoaudiosink; none: nowhere)
+  --talk SOURCE   send speech, for a call: a source in gst-launch-1.0 syntax, e.g. pulsesrc (none: do not)
+  --talk-to HOST:PORT  where the other end listens for it (--audio)
+  --talk-clock HOST:PORT  the clock of this end's camera hosts (default: this machine's clock)
+  --echo-cancel   remove from the microphone what the speaker plays
   --multicast GROUP  receive from this multicast group, e.g. 239.255.7.1
   --interface IF  network interface for the group (default: the system's choice)
 END
   rtp_usage_receiver
 }
 
-listen= out= window= orbit=0 size=640x480 jitter=30 group=
+listen= out= window= orbit=0 size=640x480 jitter=30 group= audio_port= speaker=autoaudiosink audio=() step=() talk=none talk_to= talk_clock=system
+echo_cancel= talking=()
 while [ $# -gt 0 ]; do
   option=$1
   rtp_option receiver "$1" "${2:-}"
@@ -35,6 +43,12 @@ while [ $# -gt 0 ]; do
     --orbit) orbit=${2:-}; shift ;;
     --size) size=${2:-}; shift ;;
     --jitter) jitter=${2:-}; shift ;;
+    --audio) audio_port=${2:-}; shift ;;
+    --speaker) speaker=${2:-}; shift ;;
+    --talk) talk=${2:-}; shift ;;
+    --talk-to) talk_to=${2:-}; shift ;;
+    --talk-clock) talk_clock=${2:-}; shift ;;
+    --echo-cancel) echo_cancel=yes ;;
     --multicast) group=${2:-}; shift ;;
     --interface) rtp_interface=${2:-}; shift ;;
     -h | --help) usage; exit 0 ;;
@@ -52,19 +66,46 @@ need_degrees "$orbit" --orbit
 rtp_check receiver
 receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
 
-sinks=(picture. ! queue max-size-buffers=2 leaky=downstream ! fakesink name=snapshot sync=false async=false)
+if [ "$talk" != none ]; then
+  need_option "$talk_to" --talk-to
+  audio_filter=(! volume name=microphone)
+  # The delay between speaker and microphone is found by the filter itself; it wants pieces of 10 ms.
+  if [ -n "$echo_cancel" ] && [ -n "$audio_port" ] && [ "$speaker" != none ]; then
+    audio_filter+=(! webrtcdsp probe=heard)
+    hear_audio+=(! audio/x-raw,format=S16LE,rate=48000,channels=1 ! webrtcechoprobe name=heard)
+  fi
+  send_audio "$talk" "$talk_to" --talk
+  talking=("${audio[@]}")
+  audio_clock "$talk_clock"
+fi
+# Without speech, pictures are shown as soon as they are drawn; with it, when they are due.
+sync=false
+if [ -n "$audio_port" ]; then
+  need_audio_port "$audio_port" --audio
+  [ "$audio_port" != "$listen" ] || die "--audio: port $audio_port is that of --listen"
+  audio_words "$speaker" autoaudiosink --speaker
+  receive_audio "$audio_port" "$jitter" "$group"
+  audio+=(! step.sink_1 step.src_1 ! tee name=speech allow-not-linked=true)
+  [ "$speaker" = none ] || audio+=(speech. "${hear_audio[@]}" ! "${words[@]}")
+  # Silence while no speech arrives, for which the muxer would wait.
+  [ -z "$out" ] || audio+=(audiotestsrc is-live=true wave=silence ! audio/x-raw,rate=48000,channels=1 ! audiomixer name=mixer
+    ! opusenc ! queue max-size-time=0 max-size-buffers=0 ! film. speech. "${hear_audio[@]}" ! mixer.)
+  step=(! step.sink_0 capturesync name=step step.src_0)
+  sync=true
+fi
+sinks=(picture. ! queue max-size-buffers=2 leaky=downstream ! fakesink name=snapshot "sync=$sync" async=false)
 if [ -n "$window" ]; then
   has_display || echo "viewer-host.sh: --window: neither DISPLAY nor WAYLAND_DISPLAY is set; there may be no window" >&2
-  sinks+=(picture. ! queue max-size-buffers=2 leaky=downstream ! videoconvert ! autovideosink sync=false)
+  sinks+=(picture. ! queue max-size-buffers=2 leaky=downstream ! videoconvert ! autovideosink "sync=$sync")
 fi
 if [ -n "$out" ]; then
   mkdir -p "$out" 2>/dev/null || die "--out: cannot create '$out'"
   sinks+=(picture. ! queue max-size-buffers=8 leaky=downstream ! videoconvert ! vp8enc deadline=1 cpu-used=8 target-bitrate=2000000
-    keyframe-max-dist=60 ! webmmux ! filesink "location=$out/avatar.webm")
+    keyframe-max-dist=60 ! webmmux name=film ! filesink "location=$out/avatar.webm")
 fi
 
-launch "${rtp[@]}" \
+launch "${rtp[@]}" "${step[@]}" \
   ! queue max-size-buffers=4 leaky=downstream ! neighbourcodedec name=decoder \
   ! queue max-size-buffers=1 leaky=downstream ! cylinderfilter name=cylinder ! striprender name=view "auto-orbit=$orbit" \
   ! "video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}" ! gldownload \
-  ! identity name=rendered ! tee name=picture "${sinks[@]}"
+  ! identity name=rendered ! tee name=picture "${sinks[@]}" "${audio[@]}" "${talking[@]}"

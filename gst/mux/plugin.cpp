@@ -2,10 +2,11 @@
 /**
  * plugin-rangemux:
  *
- * Combines the streams of several range cameras into frame sets, and splits them.
+ * Combines the streams of several range cameras into frame sets, splits them, and keeps speech in step.
  */
 #include <gst/gst.h>
 
+GST_ELEMENT_REGISTER_DECLARE (capturesync)
 GST_ELEMENT_REGISTER_DECLARE (rangedemux)
 GST_ELEMENT_REGISTER_DECLARE (rangemux)
 
@@ -13,11 +14,13 @@ static gboolean
 plugin_init (GstPlugin *plugin)
 {
   gboolean registered = FALSE;
+  registered |= GST_ELEMENT_REGISTER (capturesync, plugin);
   registered |= GST_ELEMENT_REGISTER (rangedemux, plugin);
   registered |= GST_ELEMENT_REGISTER (rangemux, plugin);
   return registered;
 }
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, rangemux,
-    "Combines the streams of several range cameras into frame sets, and splits them", plugin_init,
-    PACKAGE_VERSION, "LGPL", "gst-rangecast", PACKAGE_ORIGIN)
+    "Combines the streams of several range cameras into frame sets, splits them, and keeps speech in "
+    "step",
+    plugin_init, PACKAGE_VERSION, "LGPL", "gst-rangecast", PACKAGE_ORIGIN)

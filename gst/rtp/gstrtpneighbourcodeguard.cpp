@@ -3,11 +3,12 @@
  * SECTION:element-rtpneighbourcodeguard
  * @title: rtpneighbourcodeguard
  *
- * Passes the RTP packets of one sender of coded frame sets and drops everything else that arrives
- * at its port. A sender is accepted after consecutive valid packets, and replaced by another when
- * it has been silent, sooner from the same address and port. Place it between udpsrc and
- * rtpjitterbuffer, which accepts any RTP packet. Directly behind udpsrc it attaches a socket
- * filter, so that the kernel drops floods of foreign packets.
+ * Passes the RTP packets of one sender of coded frame sets (or of another payload, such as speech,
+ * whose encoding-name is in the caps) and drops everything else that arrives at its port. A sender
+ * is accepted after consecutive valid packets, and replaced by another when it has been silent,
+ * sooner from the same address and port. Place it between udpsrc and rtpjitterbuffer, which accepts
+ * any RTP packet. Directly behind udpsrc it attaches a socket filter, so that the kernel drops
+ * floods of foreign packets.
  *
  * ## Example launch line
  * |[
@@ -49,6 +50,7 @@ constexpr GstClockTime kRestartTimeout = 250 * GST_MSECOND;
 /* Minimum number and duration of invalid packets, without a sender, for a warning. */
 constexpr guint kMinInvalidPackets = 20;
 constexpr GstClockTime kMinInvalidTime = 3 * GST_SECOND;
+constexpr char kEncoding[] = "X-NEIGHBOUR-CODE";
 constexpr std::size_t kRtxHeader = 2; /* the original sequence number, RFC 4588 */
 
 struct Settings {
@@ -81,6 +83,7 @@ struct GstRtpNeighbourCodeGuardPrivate {
   GSocket *filtered = nullptr; /* udpsrc's socket, if it has a filter */
   bool filter_paused = false;  /* while the sender is silent */
   GstCaps *caps = nullptr;     /* of the sink pad */
+  bool any_payload = false;    /* the caps name another encoding, whose packets are not examined */
 };
 
 struct _GstRtpNeighbourCodeGuard {
@@ -159,8 +162,9 @@ struct Packet {
 
 } // namespace
 
+/* @param any_payload  whether every RTP packet is a valid one */
 static Packet
-read_packet (GstBuffer *buffer)
+read_packet (GstBuffer *buffer, bool any_payload)
 {
   Packet packet;
   GstRTPBuffer rtp = GST_RTP_BUFFER_INIT;
@@ -175,7 +179,7 @@ read_packet (GstBuffer *buffer)
   packet.ssrc = gst_rtp_buffer_get_ssrc (&rtp);
   packet.sequence = gst_rtp_buffer_get_seq (&rtp);
   packet.payload_type = gst_rtp_buffer_get_payload_type (&rtp);
-  packet.version = version_of_units (payload);
+  packet.version = any_payload ? rangecast::kBitstreamVersion : version_of_units (payload);
   packet.units = packet.version == rangecast::kBitstreamVersion;
   packet.repeated_units =
       !packet.units && payload.size () > kRtxHeader &&
@@ -242,7 +246,8 @@ push_caps (GstRtpNeighbourCodeGuard *self)
   if (!priv->caps)
     return;
   GstCaps *caps = gst_caps_copy (priv->caps);
-  gst_structure_remove_field (gst_caps_get_structure (caps, 0), "payload");
+  if (!priv->any_payload)
+    gst_structure_remove_field (gst_caps_get_structure (caps, 0), "payload");
   if (priv->ssrc)
     gst_caps_set_simple (caps, "ssrc", G_TYPE_UINT, *priv->ssrc, nullptr);
   GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT, caps);
@@ -411,7 +416,10 @@ warn_of_rival (GstRtpNeighbourCodeGuard *self, const Packet &packet)
 static void
 warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet, guint64 invalid)
 {
-  if (verdict == Verdict::kInvalid)
+  if (verdict == Verdict::kInvalid && self->priv->any_payload)
+    GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
+        ("%" G_GUINT64_FORMAT " packets that are not RTP, and no valid one", invalid), (nullptr));
+  else if (verdict == Verdict::kInvalid)
     GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
         ("%" G_GUINT64_FORMAT " invalid packets and no valid one: expected coded frame sets of "
          "version %d; the stream is of another codec, or encrypted (--key)",
@@ -431,7 +439,7 @@ gst_rtp_neighbour_code_guard_chain (GstPad *, GstObject *parent, GstBuffer *buff
 {
   auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
   GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
-  const Packet packet = read_packet (buffer);
+  const Packet packet = read_packet (buffer, priv->any_payload);
   Verdict verdict = Verdict::kForeign;
   SenderProbation::Stream stream;
   const GstClockTime now = arrival_time (GST_ELEMENT (self), buffer);
@@ -492,6 +500,9 @@ gst_rtp_neighbour_code_guard_sink_event (GstPad *pad, GstObject *parent, GstEven
     return gst_pad_event_default (pad, parent, event);
   GstCaps *caps = nullptr;
   gst_event_parse_caps (event, &caps);
+  const gchar *encoding =
+      gst_structure_get_string (gst_caps_get_structure (caps, 0), "encoding-name");
+  self->priv->any_payload = encoding && g_strcmp0 (encoding, kEncoding) != 0;
   gst_caps_replace (&self->priv->caps, caps);
   gst_event_unref (event);
   push_caps (self);

@@ -8,8 +8,9 @@
 RunOptions::~RunOptions ()
 {
   for (gchar *text :
-      {stats, trace, report, snapshot, frame_log, threads_left, memory_log, srtp_key, drop_empty})
+      {stats, trace, report, snapshot, frame_log, threads_left, memory_log, srtp_key, clock})
     g_free (text);
+  g_strfreev (drop_empty);
   g_strfreev (launch);
 }
 
@@ -48,8 +49,12 @@ RunOptions::parse (int *argc, char ***argv)
           "Write the names of threads that are left when the pipeline is gone", "FILE"},
       {"srtp-key", 0, 0, G_OPTION_ARG_FILENAME, &srtp_key,
           "File with the key (60 hexadecimal digits) of every srtpenc and srtpdec", "FILE"},
-      {"drop-empty", 0, 0, G_OPTION_ARG_FILENAME, &drop_empty,
-          "Remove this file at the end if nothing was written to it", "FILE"},
+      {"drop-empty", 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &drop_empty,
+          "Remove this file at the end if nothing was written to it; may be given again", "FILE"},
+      {"clock", 0, 0, G_OPTION_ARG_STRING, &clock,
+          "Clock of the pipeline: system (monotonic), or HOST:PORT, where rangemux publishes one "
+          "(default: what its elements provide, such as a sound card's)",
+          "CLOCK"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &launch, nullptr, nullptr}, {}};
   GOptionContext *context =
       g_option_context_new ("LAUNCH-STRING... - run a pipeline and measure it");

@@ -19,7 +19,8 @@ struct RunOptions {
   gchar *threads_left = nullptr;
   gchar *memory_log = nullptr;
   gchar *srtp_key = nullptr;
-  gchar *drop_empty = nullptr;
+  gchar *clock = nullptr;
+  gchar **drop_empty = nullptr;
   gchar **launch = nullptr;
 
   RunOptions () = default;

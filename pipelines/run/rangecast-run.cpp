@@ -5,7 +5,8 @@
  *
  * Elements it looks for, by name (all may be missing): "rendered" (frames and latency),
  * "decoder" (a neighbourcodedec), "cylinder" (a cylinderfilter), "view" (a striprender), "snapshot"
- * (a sink whose last sample becomes a PNG); every rtpjitterbuffer, whatever its name. */
+ * (a sink whose last sample becomes a PNG), "microphone" (a volume, which SIGUSR1 mutes and
+ * unmutes); every rtpjitterbuffer, whatever its name. */
 #include <glib-unix.h>
 #include <glib/gstdio.h>
 #include <gst/gst.h>
@@ -14,6 +15,7 @@
 #include <memory>
 #include <string>
 
+#include "clock.hpp"
 #include "common/dump-graph.hpp"
 #include "latency-trace.hpp"
 #include "report.hpp"
@@ -166,12 +168,31 @@ on_timeout (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
+/* Mutes and unmutes the volume element named microphone. */
+gboolean
+toggle_microphone (gpointer user_data)
+{
+  auto runner = static_cast<Runner *> (user_data);
+  GstElement *microphone = gst_bin_get_by_name (GST_BIN (runner->pipeline), "microphone");
+  if (!microphone || !g_object_class_find_property (G_OBJECT_GET_CLASS (microphone), "mute")) {
+    g_printerr ("rangecast-run: no volume element named microphone to mute\n");
+  } else {
+    gboolean mute = FALSE;
+    g_object_get (microphone, "mute", &mute, nullptr);
+    g_object_set (microphone, "mute", !mute, nullptr);
+    g_print ("the microphone is %s\n", mute ? "on" : "muted");
+  }
+  gst_clear_object (&microphone);
+  return G_SOURCE_CONTINUE;
+}
+
 /* Timers and signals of the main loop. */
 void
 add_sources (Runner &runner)
 {
   g_unix_signal_add (SIGINT, send_eos, &runner);
   g_unix_signal_add (SIGTERM, send_eos, &runner);
+  g_unix_signal_add (SIGUSR1, toggle_microphone, &runner);
   if (runner.options.timeout_s > 0)
     g_timeout_add_seconds (guint (runner.options.timeout_s), on_timeout, &runner);
   const auto progress = [] (gpointer data) -> gboolean {
@@ -206,8 +227,8 @@ finish (Runner &runner)
   if (!runner.failed && options.snapshot)
     runner.failed = !write_snapshot (runner.pipeline, *runner.measure, options.snapshot);
   gst_element_set_state (runner.pipeline, GST_STATE_NULL);
-  if (options.drop_empty)
-    remove_empty (options.drop_empty);
+  for (gchar **path = options.drop_empty; path && *path; path++)
+    remove_empty (*path);
   if (runner.trace && !runner.trace->write (options.trace)) {
     g_printerr ("rangecast-run: %s: cannot be written\n", options.trace);
     runner.failed = true;
@@ -280,7 +301,8 @@ run (Runner &runner)
   const RunOptions &options = runner.options;
   runner.measure = std::make_unique<RunMeasure> (
       runner.pipeline, options, [&runner] { g_idle_add (send_eos, &runner); });
-  if ((options.frame_log && !runner.measure->log_frames (options.frame_log)) ||
+  if ((options.clock && !use_clock (runner.pipeline, options.clock)) ||
+      (options.frame_log && !runner.measure->log_frames (options.frame_log)) ||
       (options.srtp_key && !give_srtp_key (runner.pipeline, options.srtp_key)))
     runner.failed = true;
   else

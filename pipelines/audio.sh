@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# Sourced by the scripts of hosts, after rtp.sh: speech from a microphone to UDP, and from UDP to capturesync, which keeps
+# it in step with frame sets. docs/guide/speech.md explains it. RTP goes to the given port, RTCP to the next one.
+
+# Every packet says when it was captured (RFC 6051), on the clock of the camera hosts; so does RTCP.
+audio_extension='extmap-2=(string)urn:ietf:params:rtp-hdrext:ntp-64'
+audio_caps="application/x-rtp,media=audio,clock-rate=48000,encoding-name=OPUS,payload=111,$audio_extension"
+
+# usage: audio_clock system|HOST:PORT: the pipeline's clock has to be that of the camera hosts, not the sound card's.
+audio_clock () {
+  command -v rangecast-run >/dev/null || die "--audio: rangecast-run not found"
+  RANGECAST_LAUNCH="${RANGECAST_LAUNCH:-rangecast-run} --clock $(printf %q "$1")"
+}
+
+# usage: need_audio_port PORT option: the port and the next one
+need_audio_port () { need_number "$1" "$2" 1 65534; }
+
+# usage: split_audio_addresses HOST:PORT[,...] option -> checks them; sets `audio_rtcp` to the addresses of RTCP
+split_audio_addresses () {
+  local one
+  split_addresses "$1" "$2"
+  audio_rtcp=
+  for one in "${addresses[@]}"; do
+    need_audio_port "${one##*:}" "$2"
+    audio_rtcp+="${audio_rtcp:+,}${one%:*}:$((${one##*:} + 1))"
+  done
+}
+
+# usage: audio_words TEXT DEFAULT option -> sets `words` to the elements that TEXT names in gst-launch-1.0 syntax
+audio_words () {
+  eval "words=($1)"
+  [ ${#words[@]} -gt 0 ] || die "$3: expected elements in gst-launch-1.0 syntax, e.g. $2"
+}
+
+# usage: send_audio SOURCE HOST:PORT[,HOST:PORT...] [option] -> sets `audio` to the elements from a microphone to UDP
+send_audio () {
+  local words
+  split_audio_addresses "$2" "${3:---audio}-to"
+  audio_words "$1" pulsesrc "${3:---audio}"
+  audio=("${words[@]}" ! queue max-size-time=200000000 max-size-buffers=0 leaky=downstream ! audioconvert ! audioresample
+    ! audio/x-raw,format=S16LE,rate=48000,channels=1)
+  audio+=("${audio_filter[@]}" ! opusenc audio-type=voice tolerance=5000000 bitrate=32000 inband-fec=true packet-loss-percentage=10
+    ! rtpopuspay pt=111 ! "$audio_caps" ! speech.send_rtp_sink
+    rtpsession name=speech ntp-time-source=clock-time rtcp-sync-send-time=false)
+  if [ -n "$rtp_key" ]; then
+    audio+=(speech.send_rtp_src ! encrypt-speech.rtp_sink_0 srtpenc name=encrypt-speech encrypt-speech.rtp_src_0
+      ! multiudpsink "clients=$2" sync=false async=false
+      speech.send_rtcp_src ! encrypt-speech.rtcp_sink_0 encrypt-speech.rtcp_src_0)
+  else
+    audio+=(speech.send_rtp_src ! multiudpsink "clients=$2" sync=false async=false speech.send_rtcp_src)
+  fi
+  audio+=(! multiudpsink "clients=$audio_rtcp" sync=false async=false)
+}
+audio_filter=()
+
+# usage: receive_audio PORT JITTER_MS [GROUP] -> sets `audio` to the elements that receive Opus packets from a port
+receive_audio () {
+  local caps=$audio_caps
+  [ -z "$rtp_key" ] || caps=${caps/x-rtp/x-srtp}
+  audio=(udpsrc "port=$1" reuse=false "caps=$caps")
+  if [ -n "${3:-}" ]; then
+    audio+=("address=$3" reuse=true)
+    [ -z "$rtp_interface" ] || audio+=("multicast-iface=$rtp_interface")
+  fi
+  [ -z "$rtp_key" ] || audio+=(! decrypt-speech.rtp_sink srtpdec name=decrypt-speech decrypt-speech.rtp_src)
+  audio+=(! rtpneighbourcodeguard ! rtpjitterbuffer "latency=$2" max-dropout-time=1000 max-misorder-time=500 do-lost=true
+    ! rtpopusdepay)
+}
+
+# usage: pass_audio_on PORT HOST:PORT[,HOST:PORT...] -> sets `audio` to the elements that send both ports' packets on as they are
+pass_audio_on () {
+  split_audio_addresses "$2" --audio-to
+  audio=(udpsrc "port=$1" reuse=false "caps=$audio_caps" ! rtpneighbourcodeguard
+    ! multiudpsink "clients=$2" sync=false async=false "ttl-mc=$rtp_ttl"
+    udpsrc "port=$(($1 + 1))" reuse=false caps=application/x-rtcp
+    ! multiudpsink "clients=$audio_rtcp" sync=false async=false "ttl-mc=$rtp_ttl")
+}
+
+# What hears Opus packets. opusdec restores lost ones from the next (in-band FEC) or hides the loss. Its default tolerance
+# would let sound be 40 ms away from its time.
+hear_audio=(! queue max-size-time=2000000000 max-size-buffers=0 ! opusdec plc=true tolerance=5000000
+  ! audioconvert ! audioresample)
+
+# usage: speech_beside RECORDING: prints the name of the file with its speech
+speech_beside () { echo "${1%.*}.opus"; }
