@@ -39,7 +39,7 @@ send_audio () {
   audio_words "$1" pulsesrc "${3:---audio}"
   audio=("${words[@]}" ! queue max-size-time=200000000 max-size-buffers=0 leaky=downstream ! audioconvert ! audioresample
     ! audio/x-raw,format=S16LE,rate=48000,channels=1)
-  audio+=("${audio_filter[@]}" ! opusenc audio-type=voice tolerance=5000000 bitrate=32000 inband-fec=true packet-loss-percentage=10
+  audio+=("${audio_filter[@]}" ! opusenc audio-type=voice tolerance=5000000 bitrate=32000
     ! rtpopuspay pt=111 ! "$audio_caps" ! speech.send_rtp_sink
     rtpsession name=speech ntp-time-source=clock-time rtcp-sync-send-time=false)
   if [ -n "$rtp_key" ]; then
@@ -69,15 +69,15 @@ receive_audio () {
 
 # usage: pass_audio_on PORT HOST:PORT[,HOST:PORT...] -> sets `audio` to the elements that send both ports' packets on as they are
 pass_audio_on () {
+  local out=(sync=false async=false "ttl-mc=$rtp_ttl" ${rtp_interface:+"multicast-iface=$rtp_interface"})
   split_audio_addresses "$2" --audio-to
   audio=(udpsrc "port=$1" reuse=false "caps=$audio_caps" ! rtpneighbourcodeguard
-    ! multiudpsink "clients=$2" sync=false async=false "ttl-mc=$rtp_ttl"
+    ! multiudpsink "clients=$2" "${out[@]}"
     udpsrc "port=$(($1 + 1))" reuse=false caps=application/x-rtcp
-    ! multiudpsink "clients=$audio_rtcp" sync=false async=false "ttl-mc=$rtp_ttl")
+    ! multiudpsink "clients=$audio_rtcp" "${out[@]}")
 }
 
-# What hears Opus packets. opusdec restores lost ones from the next (in-band FEC) or hides the loss. Its default tolerance
-# would let sound be 40 ms away from its time.
+# What hears Opus packets. opusdec hides lost ones; its default tolerance would let sound be 40 ms away from its time.
 hear_audio=(! queue max-size-time=2000000000 max-size-buffers=0 ! opusdec plc=true tolerance=5000000
   ! audioconvert ! audioresample)
 

@@ -63,9 +63,14 @@ rtp_key=$key rtp_check sender
 # Ends what is still running, and says which part failed first.
 parts=() names=() control=()
 hang_up () {
+  local i
   trap - EXIT INT TERM
   kill -TERM "${parts[@]}" "${control[@]}" 2>/dev/null || true
-  wait 2>/dev/null || true
+  for ((i = 0; i < 50; i++)); do # a video is written to its end
+    kill -0 "${parts[@]}" 2>/dev/null || return 0
+    sleep 0.1
+  done
+  kill -KILL "${parts[@]}" 2>/dev/null || true
 }
 trap hang_up EXIT
 trap 'exit 0' INT TERM

@@ -35,6 +35,7 @@ usage: demo.sh [options]
   --threads N   maximum number of CPU cores for each camera host (default: the machine's cores divided by
                 the number of views, at least 1)
   --depth WHAT  properties of stereodepth, e.g. "algorithm=bm refine=0"
+  --render WHAT  properties of striprender, e.g. "mode=strips", which is faster
   --latency MS  how long the parent waits for a late view (default: see parent-host.sh)
 With RANGECAST_STATS=udp://HOST:PORT (or a file) the hosts send their statistics there, for top.sh.
 END
@@ -46,7 +47,7 @@ for signal in INT TERM HUP; do
 done
 stop_hosts () { :; } # until there are any
 
-input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 web= window= film=yes trace= jitter= latency= loop= threads= mtu= depth=
+input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 web= window= film=yes trace= jitter= latency= loop= threads= mtu= depth= render=
 while [ $# -gt 0 ]; do
   option=$1
   case "$1" in
@@ -54,6 +55,7 @@ while [ $# -gt 0 ]; do
     --threads) threads=${2:-}; shift ;;
     --mtu) mtu=${2:-}; shift ;;
     --depth) depth=${2:-}; shift ;;
+    --render) render=${2:-}; shift ;;
     --loop) loop=${2:-}; shift ;;
     --views) views=${2:-}; shift ;;
     --size) size=${2:-}; shift ;;
@@ -88,6 +90,7 @@ need_number "$port" --port 1024 65000
 [ -z "$loop" ] || need_number "$loop" --loop 0 100000
 [ -z "$loop" ] || [[ "$input" == avatar* ]] || die "--loop: expected with --input avatar"
 [ -z "$depth" ] || [ "$input" != range ] || die "--depth: expected with cameras; --input range has no stereodepth"
+[ -z "$render" ] || [ -z "$web" ] || die "--render: expected without --web; browsers draw themselves"
 [ -n "$out" ] || die "--out: expected a folder"
 [ -z "$views" ] || need_number "$views" --views 1 64
 out=$(absolute "$out")
@@ -204,7 +207,8 @@ else
   [ -n "$film" ] || rm -f "$out/avatar.webm" # of another run
   RANGECAST_HOST=viewer RANGECAST_LAUNCH="rangecast-run $(trace_option viewer) --progress --frames $frames --views $views --turn --timeout $((60 + 4 * frames / fps)) \
     --snapshot $(printf %q "$out/avatar.png") --report $(printf %q "$out/log/viewer.json")" \
-    pipelines/viewer-host.sh --listen "$viewer_port" ${film:+--out "$out"} ${jitter:+--jitter "$jitter"} $window &
+    pipelines/viewer-host.sh --listen "$viewer_port" ${film:+--out "$out"} ${jitter:+--jitter "$jitter"} \
+    ${render:+--render "$render"} $window &
 fi
 viewer=$!
 pids+=($viewer)

@@ -75,7 +75,7 @@ if [ -n "$listen" ]; then
     source+=(! neighbourcodeparse ! "video/x-neighbour-code,alignment=access-unit" ! step.sink_0
       capturesync name=step start-with=sink_0 step.src_0)
     audio+=(! step.sink_1 step.src_1 "${hear_audio[@]}" ! audiorate skip-to-first=false ! opusenc audio-type=voice bitrate=32000
-      ! oggmux ! filesink "location=$speech")
+      ! oggmux ! filesink async=false "location=$speech")
   fi
 else
   source=(avatartestsrc "views=$views" "num-buffers=$frames" range-person-only=true
@@ -86,4 +86,4 @@ fi
 [ ! -s "$file" ] || mv -f -- "$file" "$file~"
 drop_empty "$file" "${listen:+nothing came to port $listen (no coded frame set); $file was not written}"
 [ -z "$audio_port" ] || RANGECAST_LAUNCH+=" --drop-empty $(printf %q "$speech")"
-launch "${source[@]}" ! neighbourcodeparse ! filesink "location=$file" "${audio[@]}"
+launch "${source[@]}" ! neighbourcodeparse ! filesink async=false "location=$file" "${audio[@]}"

@@ -14,6 +14,7 @@ usage: viewer-host.sh --listen PORT [options]
   --window        show it in a window: drag to orbit, wheel to zoom
   --orbit DEG     orbit by itself, degrees per second (default 0)
   --size WxH      picture size (default 640x480)
+  --render WHAT   properties of striprender, e.g. "mode=strips", which is faster
   --jitter MS     jitter buffer (default 30)
   --audio PORT    receive speech at this UDP port; it is heard, and is in the video
   --speaker SINK  where it is heard, in gst-launch-1.0 syntax (default: autoaudiosink; none: nowhere)
@@ -28,7 +29,7 @@ END
 }
 
 listen= out= window= orbit=0 size=640x480 jitter=30 group= audio_port= speaker=autoaudiosink audio=() step=() talk=none talk_to= talk_clock=system
-echo_cancel= talking=()
+echo_cancel= talking=() render= hear_echo=()
 while [ $# -gt 0 ]; do
   option=$1
   rtp_option receiver "$1" "${2:-}"
@@ -42,6 +43,7 @@ while [ $# -gt 0 ]; do
     --window) window=1 ;;
     --orbit) orbit=${2:-}; shift ;;
     --size) size=${2:-}; shift ;;
+    --render) render=${2:-}; shift ;;
     --jitter) jitter=${2:-}; shift ;;
     --audio) audio_port=${2:-}; shift ;;
     --speaker) speaker=${2:-}; shift ;;
@@ -68,12 +70,12 @@ receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
 
 if [ "$talk" != none ]; then
   need_option "$talk_to" --talk-to
-  audio_filter=(! volume name=microphone)
-  # The delay between speaker and microphone is found by the filter itself; it wants pieces of 10 ms.
+  # The filter finds the delay between loudspeaker and microphone itself.
   if [ -n "$echo_cancel" ] && [ -n "$audio_port" ] && [ "$speaker" != none ]; then
-    audio_filter+=(! webrtcdsp probe=heard)
-    hear_audio+=(! audio/x-raw,format=S16LE,rate=48000,channels=1 ! webrtcechoprobe name=heard)
+    audio_filter=(! webrtcdsp probe=heard)
+    hear_echo=(! audio/x-raw,format=S16LE,rate=48000,channels=1 ! webrtcechoprobe name=heard)
   fi
+  audio_filter+=(! volume name=microphone)
   send_audio "$talk" "$talk_to" --talk
   talking=("${audio[@]}")
   audio_clock "$talk_clock"
@@ -85,11 +87,11 @@ if [ -n "$audio_port" ]; then
   [ "$audio_port" != "$listen" ] || die "--audio: port $audio_port is that of --listen"
   audio_words "$speaker" autoaudiosink --speaker
   receive_audio "$audio_port" "$jitter" "$group"
-  audio+=(! step.sink_1 step.src_1 ! tee name=speech allow-not-linked=true)
-  [ "$speaker" = none ] || audio+=(speech. "${hear_audio[@]}" ! "${words[@]}")
-  # Silence while no speech arrives, for which the muxer would wait.
-  [ -z "$out" ] || audio+=(audiotestsrc is-live=true wave=silence ! audio/x-raw,rate=48000,channels=1 ! audiomixer name=mixer
-    ! opusenc ! queue max-size-time=0 max-size-buffers=0 ! film. speech. "${hear_audio[@]}" ! mixer.)
+  # Silence while no speech arrives, for which sinks and the muxer would wait.
+  audio+=(! step.sink_1 step.src_1 "${hear_audio[@]}" ! mixer.
+    audiotestsrc is-live=true wave=silence ! audio/x-raw,rate=48000 ! audiomixer name=mixer ! tee name=said allow-not-linked=true)
+  [ "$speaker" = none ] || audio+=(said. ! queue ! audioconvert ! audioresample "${hear_echo[@]}" ! "${words[@]}")
+  [ -z "$out" ] || audio+=(said. ! queue ! audioconvert ! opusenc ! queue max-size-time=0 max-size-buffers=0 ! film.)
   step=(! step.sink_0 capturesync name=step step.src_0)
   sync=true
 fi
@@ -104,8 +106,9 @@ if [ -n "$out" ]; then
     keyframe-max-dist=60 ! webmmux name=film ! filesink "location=$out/avatar.webm")
 fi
 
+read -ra render <<<"$render"
 launch "${rtp[@]}" "${step[@]}" \
   ! queue max-size-buffers=4 leaky=downstream ! neighbourcodedec name=decoder \
-  ! queue max-size-buffers=1 leaky=downstream ! cylinderfilter name=cylinder ! striprender name=view "auto-orbit=$orbit" \
+  ! queue max-size-buffers=1 leaky=downstream ! cylinderfilter name=cylinder ! striprender name=view "auto-orbit=$orbit" "${render[@]}" \
   ! "video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}" ! gldownload \
   ! identity name=rendered ! tee name=picture "${sinks[@]}" "${audio[@]}" "${talking[@]}"

@@ -18,8 +18,6 @@
  */
 #include "gstcapturesync.h"
 
-#include <gstrange/gstrangemeta.h>
-
 #include <memory>
 #include <mutex>
 #include <new>
@@ -28,6 +26,7 @@
 #include <vector>
 
 #include "capturealignment.hpp"
+#include "common/capturetime.hpp"
 #include "common/elementproperties.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_capture_sync_debug);
@@ -93,20 +92,6 @@ stream_of (GstPad *pad)
 }
 
 /* ---- times ---- */
-
-/* Of a frame set, or of RTP with the header extension ntp-64 (RFC 6051). */
-static GstClockTime
-capture_time_of (GstBuffer *buffer)
-{
-  const GstClockTime capture = gst_range_buffer_get_capture_time (buffer);
-  if (GST_CLOCK_TIME_IS_VALID (capture))
-    return capture;
-  static GstStaticCaps ntp = GST_STATIC_CAPS ("timestamp/x-ntp");
-  GstCaps *reference = gst_static_caps_get (&ntp);
-  const auto meta = gst_buffer_get_reference_timestamp_meta (buffer, reference);
-  gst_caps_unref (reference);
-  return meta ? meta->timestamp : GST_CLOCK_TIME_NONE;
-}
 
 static void
 warn_of_missing_time (GstCaptureSync *self, Stream &stream)
@@ -426,8 +411,8 @@ capture_sync_properties ()
 static GstStructure *
 make_stats (const GstCaptureSyncPrivate *priv)
 {
-  GstStructure *stats = gst_structure_new (
-      "application/x-capturesync-stats", "steps", G_TYPE_UINT64, guint64 (priv->alignment.steps ()), nullptr);
+  GstStructure *stats = gst_structure_new ("application/x-capturesync-stats", "steps",
+      G_TYPE_UINT64, guint64 (priv->alignment.steps ()), nullptr);
   for (const auto &stream : priv->streams) {
     if (!stream->timing.lag)
       continue;

@@ -162,6 +162,8 @@ gst_rtp_neighbour_code_depay_set_caps (GstRTPBaseDepayload *base, GstCaps *caps)
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
     return FALSE;
   set_source_caps (base, stream);
+  priv->collector.reset (); /* of another rig in band the same units count again */
+  priv->used_generation = 0;
   return TRUE;
 }
 

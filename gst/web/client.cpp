@@ -20,6 +20,8 @@ constexpr gint64 kMaxFlight_us = 2 * G_USEC_PER_SEC;
 constexpr guint64 kMaxBuffered = 65536;
 /** Interval of rig views on a data channel. */
 constexpr gint64 kRigInterval_us = G_USEC_PER_SEC / 2;
+/** Speech waits for a client whose frame sets have not been acknowledged for so long. */
+constexpr gint64 kMaxSpeechWait_us = G_USEC_PER_SEC;
 constexpr gint64 kMaxOpening_us = 20 * G_USEC_PER_SEC;
 /** Data channels that a client may ask for, and candidates of each. */
 constexpr guint kMaxChannels = 4, kMaxCandidates = 64;
@@ -392,6 +394,28 @@ Client::send_slices (const FrameSet &frame_set, MessageHeader header, bool with_
     whole += message_size;
   }
   return whole;
+}
+
+/* Speech alone is never acknowledged, so it stops where frame sets are not either: nothing grows.
+ */
+void
+Client::send (const AudioPacket &packet)
+{
+  const bool is_behind = unacknowledged_since_us_ &&
+                         g_get_monotonic_time () - unacknowledged_since_us_ > kMaxSpeechWait_us;
+  if (!entered_ || closing_ || !hello_.audio || !any_ || is_behind ||
+      soup_websocket_connection_get_state (socket_) != SOUP_WEBSOCKET_STATE_OPEN)
+    return;
+  gsize size = 0;
+  const gconstpointer data = g_bytes_get_data (packet.data.get (), &size);
+  const auto message = static_cast<guint8 *> (g_malloc (AudioHeader::kSize + size));
+  const AudioHeader header{packet.number, guint64 (packet.captured_us)};
+  header.write (message);
+  if (size > 0)
+    std::memcpy (message + AudioHeader::kSize, data, size);
+  const BytesPtr bytes (g_bytes_new_take (message, AudioHeader::kSize + size));
+  soup_websocket_connection_send_message (socket_, SOUP_WEBSOCKET_DATA_BINARY, bytes.get ());
+  bytes_ += AudioHeader::kSize + size;
 }
 
 void

@@ -28,6 +28,13 @@ struct FrameSet {
   gint64 captured_us; ///< on g_get_monotonic_time(); -1: unknown
 };
 
+/** A packet of Opus (RFC 6716) on its way to the clients that want to hear. */
+struct AudioPacket {
+  BytesPtr data; ///< null: none
+  guint32 number;
+  gint64 captured_us; ///< on g_get_monotonic_time()
+};
+
 /** A browser: its WebSocket, and its data channel if it has one. The server's thread only. */
 class Client : private DataChannel::Owner {
 public:
@@ -56,6 +63,8 @@ public:
 
   /** Sends it, if the client is ready for it. */
   void send (const FrameSet &frame_set);
+  /** Sends it, if the client wants to hear and keeps up. Always over the WebSocket. */
+  void send (const AudioPacket &packet);
   /** The stream has ended; what is sent next begins another one. */
   void end ();
   /** Sends a text message, if the client was let in. */

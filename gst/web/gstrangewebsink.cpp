@@ -11,6 +11,8 @@
  * By default only this machine can connect. An @address that others can reach needs a @token, a
  * @token-file, or @anonymous=true; use @certificate there, too.
  *
+ * Speech (Opus) that comes to the request pad `audio` is heard in step with the picture.
+ *
  * When it listens, it posts an element message `rangewebsink-address` with the field `url`
  * (string), the address of the page.
  *
@@ -28,7 +30,6 @@
 
 #include <atomic>
 #include <gstrange/gstrangeinfo.hpp>
-#include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
 #include <memory>
 #include <mutex>
@@ -39,6 +40,7 @@
 
 #include "category.hpp"
 #include "common/capserrors.hpp"
+#include "common/capturetime.hpp"
 #include "common/elementproperties.hpp"
 #include "server.hpp"
 
@@ -58,6 +60,8 @@ struct GstRangeWebSinkPrivate {
   /* state changes only: servers of before, whose clients have not closed their connections yet */
   std::vector<std::shared_ptr<web::Server>> stopped;
 
+  GstSegment audio_segment{}; /* streaming thread of the audio pad only */
+
   /* streaming thread only */
   CapsErrors caps_errors;
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
@@ -72,6 +76,9 @@ static GstStaticPadTemplate sink_template =
     GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
         GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
             ", version = (int) 3, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
+
+static GstStaticPadTemplate audio_template = GST_STATIC_PAD_TEMPLATE ("audio", GST_PAD_SINK,
+    GST_PAD_REQUEST, GST_STATIC_CAPS ("audio/x-opus, channel-mapping-family = (int) 0"));
 
 G_DEFINE_TYPE_WITH_CODE (GstRangeWebSink, gst_range_web_sink, GST_TYPE_BASE_SINK,
     GST_DEBUG_CATEGORY_INIT (gst_range_web_sink_debug, "rangewebsink", 0, "Range web sink"))
@@ -101,11 +108,10 @@ gst_range_web_sink_set_caps (GstBaseSink *base, GstCaps *caps)
   return TRUE;
 }
 
-/* When the frame set was captured, on g_get_monotonic_time(); -1: unknown. */
+/* A capture time on g_get_monotonic_time(); -1: unknown. */
 static gint64
-capture_time_us (GstElement *element, GstBuffer *buffer)
+monotonic_us (GstElement *element, GstClockTime captured)
 {
-  const GstClockTime captured = gst_range_buffer_get_capture_time (buffer);
   GstClock *clock = gst_element_get_clock (element);
   if (!clock || !GST_CLOCK_TIME_IS_VALID (captured)) {
     gst_clear_object (&clock);
@@ -140,7 +146,7 @@ gst_range_web_sink_render (GstBaseSink *base, GstBuffer *buffer)
       GST_TIME_ARGS (GST_BUFFER_PTS (buffer)));
   current_server (priv)->push (web::BytesPtr (g_bytes_new_take (units, size)),
       !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT), is_discontinuity (priv, buffer),
-      capture_time_us (GST_ELEMENT (base), buffer));
+      monotonic_us (GST_ELEMENT (base), capture_time_of (buffer)));
   priv->reporter.passed (GST_ELEMENT (base), buffer);
   return GST_FLOW_OK;
 }
@@ -164,6 +170,72 @@ gst_range_web_sink_event (GstBaseSink *base, GstEvent *event)
     priv->reporter.finish ();
   }
   return handled;
+}
+
+/* ---- speech ---- */
+
+static GstFlowReturn
+gst_range_web_sink_audio_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
+{
+  GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (parent)->priv;
+  GstClockTime captured = capture_time_of (buffer);
+  if (!GST_CLOCK_TIME_IS_VALID (captured)) { /* live, of this pipeline */
+    const GstClockTime running = gst_segment_to_running_time (
+        &priv->audio_segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
+    if (GST_CLOCK_TIME_IS_VALID (running))
+      captured = gst_element_get_base_time (GST_ELEMENT (parent)) + running;
+  }
+  const gint64 captured_us = monotonic_us (GST_ELEMENT (parent), captured);
+  gpointer data = nullptr;
+  gsize size = 0;
+  gst_buffer_extract_dup (buffer, 0, gst_buffer_get_size (buffer), &data, &size);
+  gst_buffer_unref (buffer);
+  web::BytesPtr packet (g_bytes_new_take (data, size));
+  const auto server = current_server (priv);
+  if (!server)
+    return GST_FLOW_FLUSHING;
+  if (captured_us >= 0)
+    server->push_audio (std::move (packet), captured_us);
+  return GST_FLOW_OK;
+}
+
+/* Speech may begin, pause and end while frame sets go on. */
+static gboolean
+gst_range_web_sink_audio_event (GstPad *, GstObject *parent, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_SEGMENT)
+    gst_event_copy_segment (event, &GST_RANGE_WEB_SINK (parent)->priv->audio_segment);
+  gst_event_unref (event);
+  return TRUE;
+}
+
+static GstPad *
+gst_range_web_sink_request_pad (
+    GstElement *element, GstPadTemplate *pad_template, const gchar *, const GstCaps *)
+{
+  GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (element)->priv;
+  if (GstPad *there = gst_element_get_static_pad (element, "audio")) {
+    gst_object_unref (there);
+    return nullptr;
+  }
+  GstPad *pad = gst_pad_new_from_template (pad_template, "audio");
+  gst_segment_init (&priv->audio_segment, GST_FORMAT_TIME);
+  gst_pad_set_chain_function (pad, GST_DEBUG_FUNCPTR (gst_range_web_sink_audio_chain));
+  gst_pad_set_event_function (pad, GST_DEBUG_FUNCPTR (gst_range_web_sink_audio_event));
+  gst_pad_set_active (pad, GST_STATE (element) > GST_STATE_READY);
+  gst_element_add_pad (element, pad);
+  if (const auto server = current_server (priv))
+    server->set_audio (true);
+  return pad;
+}
+
+static void
+gst_range_web_sink_release_pad (GstElement *element, GstPad *pad)
+{
+  gst_pad_set_active (pad, FALSE);
+  gst_element_remove_pad (element, pad);
+  if (const auto server = current_server (GST_RANGE_WEB_SINK (element)->priv))
+    server->set_audio (false);
 }
 
 /* On the server's thread, which does not wait for what upstream does with the event. */
@@ -220,6 +292,10 @@ gst_range_web_sink_start (GstElement *element)
   if (const Status status = server->start ();
       gst_range_flow_return (element, status) != GST_FLOW_OK)
     return false;
+  if (GstPad *audio = gst_element_get_static_pad (element, "audio")) {
+    server->set_audio (true);
+    gst_object_unref (audio);
+  }
   {
     std::lock_guard guard (priv->lock);
     priv->settings.url = server->url ();
@@ -402,9 +478,12 @@ gst_range_web_sink_class_init (GstRangeWebSinkClass *klass)
   web_properties ().install (object_class, properties::kFirstSettingId);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
+  gst_element_class_add_static_pad_template (element_class, &audio_template);
   gst_element_class_set_static_metadata (element_class, "Range web sink", "Sink/Network",
       "Serves coded frame sets, and a page that shows them, to browsers", "gst-rangecast");
   element_class->change_state = GST_DEBUG_FUNCPTR (gst_range_web_sink_change_state);
+  element_class->request_new_pad = GST_DEBUG_FUNCPTR (gst_range_web_sink_request_pad);
+  element_class->release_pad = GST_DEBUG_FUNCPTR (gst_range_web_sink_release_pad);
 
   base_class->set_caps = GST_DEBUG_FUNCPTR (gst_range_web_sink_set_caps);
   base_class->event = GST_DEBUG_FUNCPTR (gst_range_web_sink_event);

@@ -80,7 +80,7 @@ parse_want (const JsonMessage &message, Hello &hello)
   if (!JSON_NODE_HOLDS_ARRAY (node))
     return false;
   JsonArray *array = json_node_get_array (node);
-  hello.stream = hello.stats = false;
+  hello.stream = hello.stats = hello.audio = false;
   for (guint i = 0; i < json_array_get_length (array); i++) {
     JsonNode *item = json_array_get_element (array, i);
     if (!JSON_NODE_HOLDS_VALUE (item) || json_node_get_value_type (item) != G_TYPE_STRING)
@@ -88,6 +88,7 @@ parse_want (const JsonMessage &message, Hello &hello)
     const std::string_view name = json_node_get_string (item);
     hello.stream |= name == "stream";
     hello.stats |= name == "stats";
+    hello.audio |= name == "audio";
   }
   return true;
 }
@@ -128,6 +129,16 @@ MessageHeader::write (guint8 *to) const
   GST_WRITE_UINT32_LE (to + 16, dropped);
   GST_WRITE_UINT32_LE (to + 20, delay_us);
   GST_WRITE_UINT64_LE (to + 24, sent_us);
+}
+
+void
+AudioHeader::write (guint8 *to) const
+{
+  to[0] = 2;
+  to[1] = 0;
+  GST_WRITE_UINT16_LE (to + 2, 0);
+  GST_WRITE_UINT32_LE (to + 4, number);
+  GST_WRITE_UINT64_LE (to + 8, captured_us);
 }
 
 /* ---- tokens ---- */

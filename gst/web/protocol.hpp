@@ -61,7 +61,7 @@ std::string json_string (const std::string &text);
 struct Hello {
   int version = 0;
   std::string token;
-  bool stream = true, stats = false; ///< what it wants
+  bool stream = true, stats = false, audio = false; ///< what it wants
 };
 /** @param[out] error  what is wrong with the message, if nothing is returned */
 std::optional<Hello> parse_hello (const JsonMessage &message, std::string &error);
@@ -76,6 +76,16 @@ struct MessageHeader {
   guint32 frame_set = 0, message = 0, dropped = 0;
   guint32 delay_us = kUnknownDelay;
   guint64 sent_us = 0;
+
+  void write (guint8 *to) const;
+};
+
+/** Header of a packet of speech. */
+struct AudioHeader {
+  static constexpr gsize kSize = 16;
+
+  guint32 number = 0;      ///< in the stream
+  guint64 captured_us = 0; ///< on g_get_monotonic_time()
 
   void write (guint8 *to) const;
 };

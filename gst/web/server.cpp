@@ -629,6 +629,7 @@ Server::welcome ()
 {
   std::string json = "{\"type\":\"welcome\",\"version\":" + std::to_string (kProtocolVersion) +
                      ",\"window\":" + std::to_string (settings_.window) +
+                     ",\"audio\":" + (has_audio_ ? "true" : "false") +
                      ",\"rtc\":" + (rtc_ ? "true" : "false");
   if (rtc_)
     json += ",\"iceServers\":" + ice_servers (settings_);
@@ -709,6 +710,17 @@ Server::push (BytesPtr units, bool key, bool discontinuity, gint64 captured_us)
 }
 
 void
+Server::push_audio (BytesPtr packet, gint64 captured_us)
+{
+  std::lock_guard guard (lock_);
+  const guint32 number = next_audio_++;
+  if (queue_.size () >= kMaxQueue)
+    return;
+  queue_.push_back ({{}, false, {std::move (packet), number, captured_us}});
+  wake ();
+}
+
+void
 Server::end ()
 {
   std::lock_guard guard (lock_);
@@ -720,7 +732,7 @@ void
 Server::flush ()
 {
   std::lock_guard guard (lock_);
-  std::erase_if (queue_, [] (const Item &item) { return !item.is_end; });
+  std::erase_if (queue_, [] (const Item &item) { return !item.is_end && !item.audio.data; });
   flushed_ = true;
 }
 
@@ -755,6 +767,8 @@ Server::deliver ()
       Client &client = **at++; /* it may leave */
       if (item.is_end)
         client.end ();
+      else if (item.audio.data)
+        client.send (item.audio);
       else
         client.send (item.frame_set);
     }

@@ -36,6 +36,8 @@ public:
 
   /** @param element  for the log and `request_key`; outlives the server */
   Server (GstObject *element, Settings settings, RequestKey request_key);
+  /** Whether clients are told that there is speech. Any thread. */
+  void set_audio (bool has_audio) { has_audio_ = has_audio; }
   /** Waits until stop() is complete: clients have half a second to confirm that they are closed. */
   ~Server () override;
   Server (const Server &) = delete;
@@ -54,6 +56,8 @@ public:
   void set_rig (std::string rig_units);
   /** Takes the frame set; the server numbers it. @param captured_us, discontinuity  see FrameSet */
   void push (BytesPtr units, bool key, bool discontinuity, gint64 captured_us);
+  /** Takes a packet of speech. @param captured_us  on g_get_monotonic_time() */
+  void push_audio (BytesPtr packet, gint64 captured_us);
   void end ();
   /** Drops the frame sets that wait; the next one does not continue them. */
   void flush ();
@@ -72,9 +76,10 @@ public:
 private:
   /** Connections of WebSockets that are not closed yet; may outlive the server. */
   using ConnectionCount = std::shared_ptr<std::atomic<int>>;
-  struct Item { /* a frame set, or the end of the stream */
+  struct Item { /* a frame set, a packet of speech, or the end of the stream */
     FrameSet frame_set;
     bool is_end = false;
+    AudioPacket audio{};
   };
 
   Admission admit (
@@ -123,7 +128,8 @@ private:
   std::list<std::unique_ptr<Client>> clients_;
   ConnectionCount connections_ = std::make_shared<std::atomic<int>> (0);
   bool rtc_ = false; /* data channels are offered */
-  PageFiles page_;   /* server's thread */
+  std::atomic<bool> has_audio_ = false;
+  PageFiles page_; /* server's thread */
   gint64 key_requested_us_;
   guint64 gone_bytes_ = 0; /* of clients that left */
   GuessLimiter guesses_;
@@ -134,7 +140,7 @@ private:
   bool woken_ = false;
   bool flushed_ = false; /* since the last frame set */
   std::shared_ptr<const std::string> rig_units_;
-  guint32 next_number_ = 0;
+  guint32 next_number_ = 0, next_audio_ = 0;
   Counters counters_;
   std::vector<GstStructure *> client_stats_;
 };

@@ -112,6 +112,7 @@ const Key kKeys[] = {
     {"h", false, [] (Viewer &v) { v.overlay->toggle_help (); }},
     {"s", false, write_picture},
     {"p", false, write_points},
+    {"m", false, toggle_mute},
     {"q", false, [] (Viewer &v) { g_main_loop_quit (v.loop); }},
     {"Escape", false, [] (Viewer &v) { g_main_loop_quit (v.loop); }},
     {"space", true, pause},
@@ -149,6 +150,7 @@ key_rows (bool is_file)
   }
   rows.push_back ({"s", "save the picture (PNG)"});
   rows.push_back ({"p", "save the points (PLY)"});
+  rows.push_back ({"m", "sound off or on"});
   rows.push_back ({"h", "show or hide these keys"});
   rows.push_back ({"q, Esc", "quit"});
   return rows;

@@ -21,6 +21,11 @@ check_numbers (const ViewerOptions &options)
   if (options.listen < 0 || options.listen > 65535)
     return bad_option (
         "--listen", "a port from 1 to 65535", std::to_string (options.listen).c_str ());
+  if (options.audio < 0 || options.audio > 65535)
+    return bad_option (
+        "--audio", "a port from 1 to 65535", std::to_string (options.audio).c_str ());
+  if (options.audio && !options.listen)
+    return bad_option ("--audio", "--listen, too", std::to_string (options.audio).c_str ());
   if (options.latency_ms < 0 || options.latency_ms > 10000)
     return bad_option ("--latency", "0 to 10000 ms", std::to_string (options.latency_ms).c_str ());
   if (!(options.auto_orbit >= -3600 && options.auto_orbit <= 3600))
@@ -100,6 +105,8 @@ parse_arguments (int *argc, char ***argv, const char *keys, ViewerOptions &optio
 {
   const GOptionEntry entries[] = {{"listen", 0, 0, G_OPTION_ARG_INT, &options.listen,
                                       "Show the RTP stream that arrives at this UDP port", "PORT"},
+      {"audio", 0, 0, G_OPTION_ARG_INT, &options.audio,
+          "Play the speech that arrives at this UDP port, too", "PORT"},
       {"latency", 0, 0, G_OPTION_ARG_INT, &options.latency_ms,
           "Jitter buffer of RTP and RTSP (default 30)", "MS"},
       {"no-filter", 0, 0, G_OPTION_ARG_NONE, &options.no_filter,

@@ -7,6 +7,7 @@
 /** What the command line says. clear_options() frees its strings. */
 struct ViewerOptions {
   gint listen = 0; /* UDP port; 0: none */
+  gint audio = 0;  /* UDP port of speech; 0: none */
   gint latency_ms = 30;
   gboolean no_filter = FALSE;
   gboolean once = FALSE;

@@ -50,10 +50,10 @@ on_frame_set (GstPad *pad, GstPadProbeInfo *info, gpointer user_data)
   return GST_PAD_PROBE_OK;
 }
 
-/* ---- from frame sets to the window ---- */
+} // namespace
 
 GstElement *
-add (Viewer &viewer, const char *factory)
+add_element (Viewer &viewer, const char *factory)
 {
   GstElement *element = gst_element_factory_make (factory, nullptr);
   if (!element) {
@@ -66,6 +66,10 @@ add (Viewer &viewer, const char *factory)
   gst_bin_add (GST_BIN (viewer.pipeline), element);
   return element;
 }
+
+namespace {
+
+/* ---- from frame sets to the window ---- */
 
 void
 set_picture_size (Viewer &viewer, int width, int height)
@@ -135,11 +139,11 @@ void
 build_view (Viewer &viewer)
 {
   const ViewerOptions &options = viewer.options;
-  viewer.first = add (viewer, "queue");
-  viewer.render = add (viewer, "striprender");
-  viewer.size = add (viewer, "capsfilter");
-  viewer.overlay_element = add (viewer, "overlaycomposition");
-  viewer.sink = add (viewer, "glimagesink");
+  viewer.first = add_element (viewer, "queue");
+  viewer.render = add_element (viewer, "striprender");
+  viewer.size = add_element (viewer, "capsfilter");
+  viewer.overlay_element = add_element (viewer, "overlaycomposition");
+  viewer.sink = add_element (viewer, "glimagesink");
   g_object_set (viewer.first, "max-size-buffers", 2, "max-size-bytes", 0, "max-size-time",
       guint64 (0), nullptr);
   set_picture_size (viewer, options.width, options.height);
@@ -156,7 +160,7 @@ build_view (Viewer &viewer)
     g_object_set (viewer.render, "keep-rate", TRUE, nullptr);
   GstElement *before = viewer.first;
   if (!options.no_filter) {
-    before = add (viewer, "cylinderfilter");
+    before = add_element (viewer, "cylinderfilter");
     gst_element_link (viewer.first, before);
   }
   gst_element_link_many (
@@ -171,9 +175,11 @@ build_view (Viewer &viewer)
 void
 build_receiver (Viewer &viewer)
 {
-  GstElement *source = add (viewer, "udpsrc"), *jitter = add (viewer, "rtpjitterbuffer"),
-             *depayloader = add (viewer, "rtpneighbourcodedepay"), *queue = add (viewer, "queue"),
-             *decoder = add (viewer, "neighbourcodedec");
+  GstElement *source = add_element (viewer, "udpsrc"),
+             *jitter = add_element (viewer, "rtpjitterbuffer"),
+             *depayloader = add_element (viewer, "rtpneighbourcodedepay"),
+             *queue = add_element (viewer, "queue"),
+             *decoder = add_element (viewer, "neighbourcodedec");
   GstCaps *caps = gst_caps_from_string (kRtpCaps);
   g_object_set (source, "port", viewer.options.listen, "reuse", FALSE, "buffer-size", 4 << 20,
       "caps", caps, nullptr);
@@ -181,7 +187,12 @@ build_receiver (Viewer &viewer)
   g_object_set (jitter, "latency", viewer.options.latency_ms, nullptr);
   g_object_set (queue, "max-size-buffers", 4, nullptr);
   gst_util_set_object_arg (G_OBJECT (queue), "leaky", "downstream");
-  gst_element_link_many (source, jitter, depayloader, queue, decoder, viewer.first, nullptr);
+  gst_element_link_many (source, jitter, depayloader, nullptr);
+  gst_element_link_many (queue, decoder, viewer.first, nullptr);
+  if (viewer.options.audio)
+    build_speech_receiver (viewer, depayloader, queue);
+  else
+    gst_element_link (depayloader, queue);
 }
 
 void
@@ -193,6 +204,8 @@ on_pad_added (GstElement *, GstPad *pad, gpointer user_data)
   const GstStructure *structure = caps ? gst_caps_get_structure (caps, 0) : nullptr;
   if (structure && gst_structure_has_name (structure, "video/x-range") && !gst_pad_is_linked (sink))
     gst_pad_link (pad, sink);
+  else if (structure && gst_structure_has_name (structure, "audio/x-raw"))
+    hear (viewer, pad);
   gst_object_unref (sink);
   gst_clear_caps (&caps);
 }
@@ -238,13 +251,24 @@ build_opener (Viewer &viewer, const char *uri)
     gst_plugin_feature_set_rank (renderer, GST_RANK_NONE);
     gst_object_unref (renderer);
   }
-  GstElement *opener = add (viewer, "uridecodebin");
-  GstCaps *caps = gst_caps_new_empty_simple ("video/x-range");
+  GstElement *opener = add_element (viewer, "uridecodebin");
+  GstCaps *caps = gst_caps_from_string ("video/x-range; audio/x-raw");
   g_object_set (opener, "uri", uri, "caps", caps, nullptr);
   gst_caps_unref (caps);
   g_signal_connect (opener, "pad-added", G_CALLBACK (on_pad_added), &viewer);
   g_signal_connect (opener, "no-more-pads", G_CALLBACK (on_no_more_pads), &viewer);
   g_signal_connect (opener, "source-setup", G_CALLBACK (on_source_setup), &viewer);
+}
+
+/* The speech beside a recording. */
+void
+build_speech_opener (Viewer &viewer, const std::string &path)
+{
+  gchar *uri = gst_filename_to_uri (path.c_str (), nullptr);
+  GstElement *opener = add_element (viewer, "uridecodebin");
+  g_object_set (opener, "uri", uri, nullptr);
+  g_signal_connect (opener, "pad-added", G_CALLBACK (on_pad_added), &viewer);
+  g_free (uri);
 }
 
 /* Reports it if no plugin opens such URIs. */
@@ -293,7 +317,9 @@ build_pipeline (Viewer &viewer)
   build_view (viewer);
   if (uri)
     build_opener (viewer, uri);
-  else
+  if (const std::string speech = find_speech (viewer); !speech.empty ())
+    build_speech_opener (viewer, speech);
+  if (!uri)
     build_receiver (viewer);
   g_free (uri);
   return true;

@@ -22,6 +22,7 @@ struct Viewer {
   GstElement *size = nullptr;            /* capsfilter behind it */
   GstElement *overlay_element = nullptr; /* overlaycomposition */
   GstElement *sink = nullptr;
+  GstElement *volume = nullptr; /* of the speech; nullptr: there is none */
   GMainLoop *loop = nullptr;
   bool is_file = false;
   bool failed = false;
@@ -39,10 +40,23 @@ struct Viewer {
 void fail (Viewer &viewer, const std::string &text);
 
 /** @name pipeline.cpp @{ */
+/** Adds an element to the pipeline; exits where its plugin is missing. */
+GstElement *add_element (Viewer &viewer, const char *factory);
 /** @return false after reporting an error */
 bool build_pipeline (Viewer &viewer);
 /** GSourceFunc: fails because the input has no frame sets. */
 gboolean refuse_input (gpointer viewer);
+/** @} */
+
+/** @name speech.cpp, main thread or before it runs @{ */
+/** Plays what comes from a pad, decoded. @return false if it cannot be, or other speech is heard */
+bool hear (Viewer &viewer, GstPad *pad);
+/** Receives speech at options.audio, and puts capturesync between the two elements. */
+void build_speech_receiver (Viewer &viewer, GstElement *before, GstElement *after);
+/** The path of the speech beside the recording that is shown; empty: none. */
+std::string find_speech (const Viewer &viewer);
+/** Main thread. */
+void toggle_mute (Viewer &viewer);
 /** @} */
 
 /** @name snapshots.cpp, main thread @{ */

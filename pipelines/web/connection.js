@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // A WebSocket to rangewebsink that is made anew when it is lost. It runs in a page or a worker. A data channel, which only pages have, is
 // the owner's: signal () and transmit () connect it to this.
-import { FrameAssembler, MAX_FRAME_SET, ServerClock, VERSION } from './protocol.js';
+import { FrameAssembler, MAX_FRAME_SET, readSpeech, ServerClock, VERSION } from './protocol.js';
 
 const SILENCE = 3000, CLOCK_INTERVAL = 2000, FIRST_WAIT = 500, LONGEST_WAIT = 10000;
 
@@ -16,8 +16,9 @@ const CLOSED = {
 };
 
 export class Connection {
-  // want: ['stream', 'stats']; on: functions for events, each may be missing:
+  // want: ['stream', 'audio', 'stats']; on: functions for events, each may be missing:
   //   frameSet (frameSet): see FrameAssembler; it must acknowledge (frameSet) it
+  //   speech (packet): see readSpeech (), with captured in ms of this clock
   //   say (text, kind): a sentence about the connection; '' removes it
   //   state (name): connecting, waiting (for frame sets), receiving, ended, closed, token
   //   welcome (message), stats (rows), signal (message): from the server
@@ -191,9 +192,18 @@ export class Connection {
   receive (buffer, transport) {
     if (!this.welcomed)
       return this.giveUp ("The server sent a frame set before 'welcome'.");
+    const speech = readSpeech (buffer);
+    if (speech)
+      return this.hear (speech);
     if (!this.assemblers[transport].add (buffer))
       this.giveUp (buffer.byteLength > MAX_FRAME_SET ? `The server sent ${buffer.byteLength} bytes in one message, more than a frame set may have.`
         : 'The server sent a message that is not a frame set.');
+  }
+
+  hear (speech) {
+    const captured = this.clock.toLocal (speech.captured);
+    if (captured !== undefined)
+      this.emit ('speech', { ...speech, captured });
   }
 
   deliver (frameSet, transport) {

@@ -122,6 +122,7 @@ onmessage = ({ data }) => {
     toggle: () => stage.source?.toggle?.(),
     seek: () => stage.source?.seek?.(data.time),
     points: () => stage.points (),
+    hold: () => stage.source?.hold?.(data),
     signal: () => stage.source?.signal?.(data),
     transmit: () => stage.source?.transmit?.(data),
   };

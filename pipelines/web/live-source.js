@@ -8,19 +8,35 @@ export class LiveSource {
   constructor (stage, live) {
     this.stage = stage;
     this.live = live;
+    this.wait = 0; // ms that frame sets wait before they are decoded
+    this.due = 0; // of the last one, performance.now ()
   }
 
   start () {
     const { stage } = this;
-    this.connection = new Connection ({ ...this.live, on: {
-      frameSet: (frameSet) => this.decode (frameSet),
+    this.connection = new Connection ({ ...this.live, want: ['stream', 'audio'], on: {
+      speech: (packet) => stage.post ({ type: 'hear', packet }),
+      frameSet: (frameSet) => this.receive (frameSet),
       say: (text, kind) => stage.say (text, kind),
       state: (name) => this.handleState (name),
-      welcome: (message) => stage.post ({ type: 'welcome', rtc: message.rtc === true, iceServers: message.iceServers }),
+      welcome: (message) => stage.post ({ type: 'welcome', audio: message.audio === true, rtc: message.rtc === true, iceServers: message.iceServers }),
       signal: (message) => stage.post ({ type: 'signal', message }),
     } });
   }
-  close () { this.connection.close (); }
+  close () {
+    this.closed = true;
+    this.connection.close ();
+  }
+
+  hold ({ wait }) { this.wait = wait; }
+  receive (frameSet) {
+    const now = performance.now ();
+    this.due = Math.max (this.due, now + this.wait); // in their order
+    if (this.due <= now)
+      this.decode (frameSet);
+    else
+      setTimeout (() => this.closed || this.decode (frameSet), this.due - now);
+  }
 
   handleState (name) {
     if (name === 'connecting')

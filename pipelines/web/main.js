@@ -8,6 +8,7 @@ import { DataChannel } from './data-channel.js';
 import { followPointers } from './pointers.js';
 import { Renderer } from './renderer.js';
 import { findServer, storeToken, readToken } from './server.js';
+import { Speech } from './speech.js';
 import { Stats } from './stats.js';
 import { Headset } from './xr.js';
 
@@ -49,7 +50,8 @@ class Page {
     this.worker.onmessage = ({ data }) => this[data.type] (data);
     this.worker.onerror = (event) => say (`The decoder could not be started: ${event.message ?? 'its file could not be loaded'}.`);
     this.worker.postMessage ({ type: 'start', module });
-    this.stats = new Stats (element ('stats'), parameters.has ('stats'));
+    this.speech = new Speech (say, (wait) => this.worker.postMessage ({ type: 'hold', wait }));
+    this.stats = new Stats (element ('stats'), parameters.has ('stats'), (latency) => this.speech.follow (latency));
     this.pending = null; // the newest frame set, not uploaded yet
     this.wanted = false;
     this.server = null; // { url, token }
@@ -97,7 +99,9 @@ class Page {
     if (state === 'connecting')
       this.closeChannel ();
   }
-  welcome ({ rtc, iceServers }) {
+  hear ({ packet }) { this.speech.add (packet); }
+  welcome ({ audio, rtc, iceServers }) {
+    element ('sound').hidden = !audio;
     if (rtc && parameters.get ('transport') === 'webrtc')
       this.openChannel (iceServers, 3);
   }
@@ -246,6 +250,10 @@ class Page {
     element ('home').onclick = () => this.move ('rc_go_home');
     element ('mode').textContent = settings.mode === BLEND ? 'Blend' : 'Strips';
     element ('mode').onclick = () => this.toggleMode ();
+    element ('sound').onclick = () => {
+      this.speech.toggle ();
+      element ('sound').textContent = this.speech.isOn ? 'Sound off' : 'Sound on';
+    };
     element ('save-picture').onclick = () => canvas.toBlob ((blob) => blob && save (blob, 'rangecast.png'));
     element ('save-points').onclick = () => this.worker.postMessage ({ type: 'points' });
     element ('token').onsubmit = (event) => {

@@ -17,6 +17,15 @@ export const readMessage = (buffer) => {
   return message.kind !== 1 || message.index < message.count ? message : null;
 };
 
+const SPEECH_HEADER = 16;
+// @return { number, captured (ms of the server's clock), data: Uint8Array (a packet of Opus) }; null if the message is no speech
+export const readSpeech = (buffer) => {
+  const view = new DataView (buffer);
+  if (buffer.byteLength < SPEECH_HEADER || view.getUint8 (0) !== 2)
+    return null;
+  return { number: view.getUint32 (4, true), captured: Number (view.getBigUint64 (8, true)) / 1000, data: new Uint8Array (buffer, SPEECH_HEADER) };
+};
+
 // a - b of numbers modulo 2^32
 const difference = (a, b) => (a - b) | 0;
 

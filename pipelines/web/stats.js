@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Quality and latency of what is shown, once a second.
 export class Stats {
-  constructor (place, visible) {
+  // onSeen (latency): for each frame set
+  constructor (place, visible, onSeen) {
     this.place = place;
+    this.onSeen = onSeen;
     place.hidden = !visible;
     this.latencies = []; // of the last frame sets, ms
     this.reset ();
@@ -13,6 +15,7 @@ export class Stats {
   }
   // latency: ms until the frame after the draw calls
   seen (latency) {
+    this.onSeen (latency);
     this.latencies.push (latency);
     if (this.latencies.length > 1000)
       this.latencies.shift ();

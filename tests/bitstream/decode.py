@@ -16,7 +16,9 @@ from __future__ import annotations
 import struct
 import sys
 from array import array
+from collections import Counter
 from dataclasses import dataclass, field
+from fractions import Fraction
 from math import floor, hypot
 from typing import BinaryIO, Callable, Iterable, Iterator, NamedTuple, Union
 
@@ -155,11 +157,12 @@ class Reader:
     """Reads access units; keeps the rig from one to the next."""
 
     data: bytes
-    views: dict[int, View] = field(default_factory=dict)
-    parts: dict[int, tuple[View, bytes]] = field(default_factory=dict)
+    views: dict[int, View] = field(default_factory=dict)  # of the rig that is in force, by view-id
+    parts: dict[int, tuple[View, bytes]] = field(default_factory=dict)  # views and blobs that came, by number
     rig_key: tuple[int, int, int] | None = None
     earlier: dict[int, list[Picture]] = field(default_factory=dict)  # by view-id: the latest two to refer to
-    rig: dict[int, bytes] = field(default_factory=dict)  # the payloads of its units
+    complete: tuple[Fraction, list[bytes], dict[int, View]] | None = None  # the rig that was complete last: rate, blobs, views
+    rig: list | None = None  # rate and blobs of the rig that is in force
     counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTED, 0))
 
     def access_units(self) -> Iterator[dict[int, Picture]]:
@@ -225,6 +228,7 @@ class Reader:
                     self.take_rig_view(flags, payload)
             except Damaged:
                 self.counts["damaged slices" if kind == SLICE else "damaged rig views"] += 1
+        self.take_up_rig()
         if not other_units or not self.views:
             return None
 
@@ -241,7 +245,8 @@ class Reader:
 
     def draw(self, parts: list[Slice]) -> Picture:
         """Draws the slices of one view, without those that are at odds with most of them."""
-        frequent = max(parts, key=lambda part: sum(map(part.agrees, parts)))
+        votes = Counter(part.common() for part in parts)
+        frequent = max(parts, key=lambda part: votes[part.common()])
         agreeing = [part for part in parts if part.agrees(frequent)]
         self.counts["damaged slices"] += len(parts) - len(agreeing)
         picture = Picture(self.views[frequent.view], frequent)
@@ -293,22 +298,28 @@ class Reader:
         return lambda x, y: UNKNOWN
 
     def take_rig_view(self, flags: int, payload: bytes) -> None:
-        """Collects the views of the rig and makes it the present one when all are there."""
+        """Collects the views of a rig; the rig is complete when all are there."""
         if flags & ~KEY or len(payload) < RIG_VIEW_FIELDS.size:
             raise Damaged("rig view")
         number, total, numerator, denominator = RIG_VIEW_FIELDS.unpack_from(payload)
         if not 1 <= total <= 64 or number >= total or numerator >> 31 or not 1 <= denominator < 1 << 31:
             raise Damaged("rig view")
-        view = parse_rig_blob(payload[RIG_VIEW_FIELDS.size :])
+        blob = payload[RIG_VIEW_FIELDS.size :]
+        view = parse_rig_blob(blob)
         if self.rig_key != (total, numerator, denominator):
             self.rig_key = (total, numerator, denominator)
             self.parts = {}
-        self.parts[number] = view, payload
+        self.parts[number] = view, blob
         by_id = {view.id: view for view, _ in self.parts.values()}
         widest, tallest = (max(side) for side in zip(*((view.width, view.height) for view in by_id.values())))
         if len(by_id) == total and total * widest * tallest <= MAX_RIG_PIXELS:
-            self.views = by_id
-            rig = {number: payload for number, (_, payload) in self.parts.items()}
+            rate = Fraction(numerator, denominator)
+            self.complete = rate, [blob for _, (_, blob) in sorted(self.parts.items())], by_id
+
+    def take_up_rig(self) -> None:
+        """The rig that was complete last holds for the whole access unit; a change forgets earlier frame sets."""
+        if self.complete:
+            *rig, self.views = self.complete
             if self.rig != rig:
                 self.rig, self.earlier = rig, {}
 

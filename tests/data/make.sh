@@ -32,8 +32,9 @@ for profile in plain packed entropy; do
 done
 "$here/make-lossy.py" temporal-entropy.rcnc temporal-lossy.rcnc
 "$here/make-damaged.py" coarse.rcnc damaged.rcnc
-for stream in default exact coarse damaged packed exact-packed entropy inverse temporal-{plain,packed,entropy,lossy}; do
-  "$here/../bitstream/decode.py" "$stream.rcnc" "$stream" >/dev/null
+"$here/make-rules.py" .
+for stream in default exact coarse damaged packed exact-packed entropy inverse temporal-{plain,packed,entropy,lossy} rules-*.rcnc; do
+  "$here/../bitstream/decode.py" "${stream%.rcnc}.rcnc" "${stream%.rcnc}" >/dev/null
 done
 sha256sum -- *-depth-?.raw *-colour-?.raw >SHA256SUMS
 rm -- *-depth-?.raw *-colour-?.raw

@@ -70,6 +70,7 @@ sound (GstPad *pad, GstPadProbeInfo *info, gpointer)
   const GstClockTime begin = clock_time_of (pad, buffer);
   GST_PAD_PROBE_INFO_DATA (info) = buffer = gst_buffer_make_writable (buffer);
   GstMapInfo map;
+  GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_GAP); /* of silence */
   if (!gst_buffer_map (buffer, &map, GST_MAP_WRITE))
     return GST_PAD_PROBE_OK;
   gint16 *samples = (gint16 *)map.data;
@@ -130,8 +131,9 @@ show (GstElement *sink, GstBuffer *buffer, GstPad *pad, gpointer kind)
 }
 
 static void
-watch (const GValue *value, gpointer)
+watch (const GValue *value, gpointer entry_of_sound)
 {
+  const auto entry = static_cast<const gchar *> (entry_of_sound);
   auto element = static_cast<GstElement *> (g_value_get_object (value));
   const gchar *factory = GST_OBJECT_NAME (gst_element_get_factory (element));
   const gchar *name = GST_OBJECT_NAME (element);
@@ -139,7 +141,7 @@ watch (const GValue *value, gpointer)
   const bool sends = std::getenv ("CLAP_SEND");
   if (sends && g_str_equal (factory, "neighbourcodeenc"))
     gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_BUFFER, whiten, nullptr, nullptr);
-  else if (sends && g_str_equal (factory, "opusenc"))
+  else if (sends && g_str_equal (entry, g_str_equal (entry, "microphone") ? name : factory))
     gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_BUFFER, sound, nullptr, nullptr);
   else if (log_file && g_str_equal (factory, "fakesink") &&
            (g_str_equal (name, "snapshot") || g_str_equal (name, "speaker"))) {
@@ -161,7 +163,10 @@ gst_parse_launchv (const gchar **argv, GError **error)
   if (!GST_IS_BIN (pipeline))
     return pipeline;
   GstIterator *all = gst_bin_iterate_recurse (GST_BIN (pipeline));
-  gst_iterator_foreach (all, watch, nullptr);
+  /* Before the switch that mutes it, if there is one. */
+  GstElement *microphone = gst_bin_get_by_name (GST_BIN (pipeline), "microphone");
+  gst_iterator_foreach (all, watch, const_cast<char *> (microphone ? "microphone" : "opusenc"));
+  gst_clear_object (&microphone);
   gst_iterator_free (all);
   return pipeline;
 }

@@ -180,10 +180,66 @@ END
 
 test_recorded_streams_decode_as_ever () {
   local stream
-  for stream in default exact coarse damaged packed exact-packed entropy inverse temporal-{plain,packed,entropy,lossy}; do
+  for stream in default exact coarse damaged packed exact-packed entropy inverse temporal-{plain,packed,entropy,lossy} \
+    rules-{damage,depth,entropy,examples,motion,packed,references,rig,slices,stream}; do
     python3 "$python_decoder" "$source_dir/tests/data/$stream.rcnc" "$stream" || fail "$stream"
   done
   sha256sum --check --quiet "$source_dir/tests/data/SHA256SUMS"
+}
+
+# The streams of the document's numbered rules: no encoder writes such.
+test_rules_decode_the_same () {
+  local stream views
+  for stream in damage depth entropy examples motion packed references rig slices stream; do
+    views=1
+    [[ $stream =~ ^(depth|rig|slices)$ ]] && views=2
+    expect_decoders_agree "$source_dir/tests/data/rules-$stream.rcnc" "$views" "rules-$stream"
+  done
+}
+
+# Each misreading of a rule changes a picture of a recorded stream.
+test_streams_pin_each_rule () {
+  python3 "$source_dir/tests/bitstream/perturb.py" >table.txt || fail "$(cat table.txt)"
+  while IFS= read -r row; do
+    grep -qxF -- "$row" "$source_dir/tests/data/README.md" || fail "tests/data/README.md lacks: $row"
+  done <table.txt
+}
+
+# The slices that the document explains are those of rules-examples.rcnc.
+test_examples_of_the_document_are_recorded () {
+  python3 - "$source_dir" <<'END'
+import re, sys
+root = sys.argv[1]
+stream = open(f"{root}/tests/data/rules-examples.rcnc", "rb").read()
+page = open(f"{root}/docs/formats/bitstream.md", encoding="utf-8").read().partition("## Examples")[2]
+blocks = [block for block in re.split(r"\n\n+", page) if block.startswith("    31 01 ")]
+slices = [bytes.fromhex("".join(re.findall(r"^    ((?:[0-9a-f]{2} ?)+)(?:  |$)", block, re.MULTILINE))) for block in blocks]
+wrong = [one.hex(" ") for one in slices if one not in stream or int.from_bytes(one[2:4], "little") != len(one)]
+sys.exit("\n".join(wrong) if wrong or len(slices) != 3 else 0)
+END
+}
+
+# R65. Without the limit the last slice would show view 1.
+test_slices_beyond_the_limit_are_missing () {
+  python3 - "$source_dir" <<'END'
+import sys
+from importlib import import_module
+sys.path.append(f"{sys.argv[1]}/tests/data")
+rules = import_module("make-rules")
+stream = rules.Stream(0, rules.rig_view(0, 2, 0), rules.rig_view(1, 2, 1))
+empty = stream.slice((0, 0, 0, 0), 1, b"", roi=(0, 0, 0, 0))
+last = stream.plain((0, 0, 24, 20), 1, "4" * 480, view=1)
+stream.raw([*stream.rig, *[empty] * ((1 << 17) - 1), last, last])
+stream.raw([*[empty] * (1 << 17), last])
+open("limit.rcnc", "wb").write(stream.bytes)
+END
+  expect_decoders_agree limit.rcnc 2 "2^17 slices"
+  python3 - <<'END' || fail "expected view 1 in the first frame set alone"
+import sys
+frames = open("python-depth-1.raw", "rb").read()
+size = 2 * 24 * 20
+sys.exit(len(frames) != 2 * size or not any(frames[:size]) or any(frames[size:]))
+END
 }
 
 # What the document says of damage: both decoders find the same. The rig, at the beginning, stays

@@ -70,7 +70,7 @@ test_elements_are_found_where_they_were_installed () {
 neighbourcode neighbourcodeenc neighbourcodedec neighbourcodeparse
 rangeconvert rangesplit plyenc
 rangedepth stereodepth roiextract rangecombine
-rangemux rangemux rangedemux
+rangemux rangemux rangedemux capturesync
 rangerender cylinderfilter striprender rangerender
 rangetestsrc avatartestsrc
 rtpneighbourcode rtpneighbourcodepay rtpneighbourcodedepay rtpneighbourcodeguard rtcpreports

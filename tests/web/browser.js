@@ -9,7 +9,7 @@ export const required = createRequire (path.join (work, 'package.json')); // mod
 export const sleep = (ms) => new Promise ((resolve) => setTimeout (resolve, ms));
 
 export const launch = () => required ('puppeteer-core').launch ({ executablePath: process.env.CHROMIUM, headless: true,
-  args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--hide-scrollbars', '--ignore-certificate-errors'] });
+  args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--hide-scrollbars', '--ignore-certificate-errors', '--mute-audio'] });
 
 // prepare (page): before it loads the address
 export const openPage = async (browser, address, viewport = { width: 640, height: 480 }, prepare = async () => {}) => {

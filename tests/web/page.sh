@@ -19,6 +19,6 @@ for mode in blend strips; do
       ! filesink "location=$work/native-$mode-$angle.png" || skip "striprender cannot draw here"
   done
 done
-live=("$here/live.test.js" "$here/rtc.test.js")
-compgen -G "$RANGECAST_BUILD/gst/web/*.so" >/dev/null || { echo "left out: live.test.js and rtc.test.js, because rangewebsink is missing"; live=(); }
+live=("$here/live.test.js" "$here/rtc.test.js" "$here/speech.test.js")
+compgen -G "$RANGECAST_BUILD/gst/web/*.so" >/dev/null || { echo "left out: live.test.js, rtc.test.js and speech.test.js, because rangewebsink is missing"; live=(); }
 exec node --test "$@" "$here/page.test.js" "$here/server.test.js" "${live[@]}"

@@ -14,9 +14,10 @@ export const killServers = () => {
 };
 
 const people = ['avatartestsrc', 'is-live=true', 'views=4', 'range-person-only=true', '!', 'video/x-range,width=160,height=120,framerate=15/1'];
-// settings: of rangewebsink; encoder: of neighbourcodeenc; scene: the source. Resolves when it listens: { address, port, process, log (), stop (signal): exit status or signal }.
-export const serve = async (settings = [], encoder = [], scene = people) => {
-  const server = spawn ('gst-launch-1.0', ['-m', ...scene, '!', 'neighbourcodeenc', ...encoder, '!', 'rangewebsink', 'sync=false', ...settings]);
+// settings: of rangewebsink, and what follows it; encoder: of neighbourcodeenc; scene: the source; env: added to the environment. Resolves when it listens: { address, port, process, log (), stop (signal): exit status or signal }.
+export const serve = async (settings = [], encoder = [], scene = people, env = {}) => {
+  const server = spawn ('gst-launch-1.0', ['-m', ...scene, '!', 'neighbourcodeenc', ...encoder, '!', 'rangewebsink', 'sync=false', ...settings],
+    { env: { ...process.env, ...env } });
   servers.add (server);
   let log = '';
   const ended = new Promise ((resolve) => server.on ('exit', (status, signal) => {
@@ -51,13 +52,15 @@ export const memory = (server) => Number (/VmRSS:\s+(\d+)/.exec (fs.readFileSync
 // A client without a page. acknowledges: how it answers frame sets
 export const client = (address, { hello = { type: 'hello', version: 1 }, acknowledges = true, ...options } = {}) => {
   const socket = new WebSocket (`${address.replace (/^http/, 'ws')}/stream`, 'rangecast.v1', { rejectUnauthorized: false, ...options });
-  const seen = { socket, texts: [], frames: [] };
+  const seen = { socket, texts: [], frames: [], speech: [] };
   seen.closed = new Promise ((resolve) => socket.on ('close', (code, reason) => resolve ({ code, reason: String (reason) })));
   socket.on ('error', (error) => { seen.error = error; });
   socket.on ('open', () => hello && socket.send (JSON.stringify (hello)));
   socket.on ('message', (data, binary) => {
     if (!binary)
       return seen.texts.push (JSON.parse (data));
+    if (data.readUInt8 (0) === 2)
+      return seen.speech.push ({ number: data.readUInt32LE (4), captured: Number (data.readBigUInt64LE (8)) / 1000, bytes: data.length - 16 });
     const frameSet = data.readUInt32LE (4);
     seen.frames.push ({ frameSet, key: (data.readUInt8 (1) & 1) !== 0, dropped: data.readUInt32LE (16), delay: data.readUInt32LE (20), bytes: data.length,
       firstUnit: data.readUInt8 (32) & 15 });

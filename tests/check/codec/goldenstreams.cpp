@@ -181,6 +181,21 @@ GST_START_TEST (test_damage_costs_what_it_ever_did)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_rules_of_the_bitstream_decode_as_ever)
+{
+  expect_digests ("rules-damage", 1);
+  expect_digests ("rules-depth");
+  expect_digests ("rules-entropy", 1);
+  expect_digests ("rules-examples", 1);
+  expect_digests ("rules-motion", 1);
+  expect_digests ("rules-packed", 1);
+  expect_digests ("rules-references", 1);
+  expect_digests ("rules-rig");
+  expect_digests ("rules-slices");
+  expect_digests ("rules-stream", 1);
+}
+GST_END_TEST;
+
 /* Without thresholds nothing is lost, so that the encoder must give the file back. */
 GST_START_TEST (test_exact_pictures_are_coded_as_ever)
 {
@@ -215,6 +230,7 @@ goldenstreams_suite ()
   tcase_add_test (tc, test_exact_pictures_decode_as_ever);
   tcase_add_test (tc, test_few_bits_and_empty_views_decode_as_ever);
   tcase_add_test (tc, test_damage_costs_what_it_ever_did);
+  tcase_add_test (tc, test_rules_of_the_bitstream_decode_as_ever);
   tcase_add_test (tc, test_exact_pictures_are_coded_as_ever);
   return suite;
 }

@@ -205,6 +205,29 @@ GST_START_TEST (test_rig_of_the_caps_suffices)
 }
 GST_END_TEST;
 
+/* A guard sends the caps again, with another SSRC, when the sender restarts: its rig in band
+ * counts, not the one of a description from before. */
+GST_START_TEST (test_rig_in_band_replaces_that_of_caps_which_come_again)
+{
+  const Sent described (ring_rig (1, 64, 48)),
+      sent[2] = {Sent (ring_rig (2, 64, 48)), Sent (ring_rig (2, 64, 48))};
+  GstHarness *h = gst_harness_new ("rtpneighbourcodedepay");
+  for (int i = 0; i < 2; i++) {
+    GstCaps *caps = gst_caps_copy (described.caps);
+    gst_caps_set_simple (caps, "ssrc", G_TYPE_UINT, guint (i), nullptr);
+    gst_harness_set_src_caps (h, caps);
+    for (GstBuffer *packet : sent[i].packets)
+      gst_harness_push (h, gst_buffer_ref (packet));
+    GstCaps *out = gst_pad_get_current_caps (h->sinkpad);
+    gstrange::RangeInfo info;
+    fail_unless_ok (gstrange::parse_caps (out, info));
+    fail_unless_equals_int (info.views (), 2);
+    gst_caps_unref (out);
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_nothing_comes_out_before_the_rig_is_known)
 {
   const Sent sent (ring_rig (2), 2, "rtpneighbourcodepay mtu=1400 config-interval=0");
@@ -406,6 +429,7 @@ rtpneighbourcodedepay_suite ()
   tcase_add_test (tc, test_an_access_unit_that_lacks_slices_is_no_key_unit_and_others_are);
   tcase_add_test (tc, test_rig_of_64_views_comes_in_band);
   tcase_add_test (tc, test_rig_of_the_caps_suffices);
+  tcase_add_test (tc, test_rig_in_band_replaces_that_of_caps_which_come_again);
   tcase_add_test (tc, test_nothing_comes_out_before_the_rig_is_known);
   tcase_add_test (tc, test_slices_of_views_that_the_rig_has_not_are_damaged_units);
   tcase_add_test (tc, test_damaged_packets_are_counted_and_never_fatal);
