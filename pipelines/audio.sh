@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Sourced by the scripts of hosts, after rtp.sh: speech from a microphone to UDP, and from UDP to capturesync, which keeps
-# it in step with frame sets. docs/guide/speech.md explains it. RTP goes to the given port, RTCP to the next one.
+# it in sync with frame sets. docs/guide/speech.md explains it. RTP goes to the given port, RTCP to the next one.
 
 # Every packet says when it was captured (RFC 6051), on the clock of the camera hosts; so does RTCP.
 audio_extension='extmap-2=(string)urn:ietf:params:rtp-hdrext:ntp-64'
@@ -15,10 +15,11 @@ audio_clock () {
 # usage: need_audio_port PORT option: the port and the next one
 need_audio_port () { need_number "$1" "$2" 1 65534; }
 
-# usage: split_audio_addresses HOST:PORT[,...] option -> checks them; sets `audio_rtcp` to the addresses of RTCP
+# usage: split_audio_addresses HOST:PORT[,...] option -> checks them; sets `audio_rtcp` to the addresses of RTCP, `audio_udp` to properties of sinks
 split_audio_addresses () {
   local one
   split_addresses "$1" "$2"
+  audio_udp=(sync=false async=false "ttl-mc=$rtp_ttl" ${rtp_interface:+"multicast-iface=$rtp_interface"})
   audio_rtcp=
   for one in "${addresses[@]}"; do
     need_audio_port "${one##*:}" "$2"
@@ -44,12 +45,12 @@ send_audio () {
     rtpsession name=speech ntp-time-source=clock-time rtcp-sync-send-time=false)
   if [ -n "$rtp_key" ]; then
     audio+=(speech.send_rtp_src ! encrypt-speech.rtp_sink_0 srtpenc name=encrypt-speech encrypt-speech.rtp_src_0
-      ! multiudpsink "clients=$2" sync=false async=false
+      ! multiudpsink "clients=$2" "${audio_udp[@]}"
       speech.send_rtcp_src ! encrypt-speech.rtcp_sink_0 encrypt-speech.rtcp_src_0)
   else
-    audio+=(speech.send_rtp_src ! multiudpsink "clients=$2" sync=false async=false speech.send_rtcp_src)
+    audio+=(speech.send_rtp_src ! multiudpsink "clients=$2" "${audio_udp[@]}" speech.send_rtcp_src)
   fi
-  audio+=(! multiudpsink "clients=$audio_rtcp" sync=false async=false)
+  audio+=(! multiudpsink "clients=$audio_rtcp" "${audio_udp[@]}")
 }
 audio_filter=()
 
@@ -69,12 +70,11 @@ receive_audio () {
 
 # usage: pass_audio_on PORT HOST:PORT[,HOST:PORT...] -> sets `audio` to the elements that send both ports' packets on as they are
 pass_audio_on () {
-  local out=(sync=false async=false "ttl-mc=$rtp_ttl" ${rtp_interface:+"multicast-iface=$rtp_interface"})
   split_audio_addresses "$2" --audio-to
   audio=(udpsrc "port=$1" reuse=false "caps=$audio_caps" ! rtpneighbourcodeguard
-    ! multiudpsink "clients=$2" "${out[@]}"
+    ! multiudpsink "clients=$2" "${audio_udp[@]}"
     udpsrc "port=$(($1 + 1))" reuse=false caps=application/x-rtcp
-    ! multiudpsink "clients=$audio_rtcp" "${out[@]}")
+    ! multiudpsink "clients=$audio_rtcp" "${audio_udp[@]}")
 }
 
 # What hears Opus packets. opusdec hides lost ones; its default tolerance would let sound be 40 ms away from its time.
@@ -82,4 +82,7 @@ hear_audio=(! queue max-size-time=2000000000 max-size-buffers=0 ! opusdec plc=tr
   ! audioconvert ! audioresample)
 
 # usage: speech_beside RECORDING: prints the name of the file with its speech
-speech_beside () { echo "${1%.*}.opus"; }
+speech_beside () {
+  local name=${1##*/}
+  echo "${1:0:${#1}-${#name}}${name%.*}.opus"
+}

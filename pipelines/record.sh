@@ -49,6 +49,7 @@ while [ $# -gt 0 ]; do
 done
 [ -n "$file" ] || { usage >&2; die "expected a file to write"; }
 need_place "$file"
+speech=$(speech_beside "$file")
 need_number "$views" --views 1 64
 need_number "$frames" --frames 1 1000000
 need_picture "$size" --size 4096
@@ -68,9 +69,7 @@ if [ -n "$listen" ]; then
     need_audio_port "$audio_port" --audio
     [ "$audio_port" != "$listen" ] || die "--audio: port $audio_port is that of --listen"
     receive_audio "$audio_port" "$jitter" "$group"
-    speech=$(speech_beside "$file")
     [ "$speech" != "$file" ] || die "$file: expected another name than *.opus with --audio"
-    [ ! -s "$speech" ] || mv -f -- "$speech" "$speech~"
     # Both files begin with the first key frame set; silence where no speech came.
     source+=(! neighbourcodeparse ! "video/x-neighbour-code,alignment=access-unit" ! step.sink_0
       capturesync name=step start-with=sink_0 step.src_0)
@@ -84,6 +83,7 @@ else
 fi
 # If nothing arrives, an existing recording must not be lost.
 [ ! -s "$file" ] || mv -f -- "$file" "$file~"
+[ "$speech" = "$file" ] || [ ! -s "$speech" ] || mv -f -- "$speech" "$speech~" # of the recording before
 drop_empty "$file" "${listen:+nothing came to port $listen (no coded frame set); $file was not written}"
-[ -z "$audio_port" ] || RANGECAST_LAUNCH+=" --drop-empty $(printf %q "$speech")"
+[ -z "$audio_port" ] || [[ "${RANGECAST_LAUNCH:-}" != rangecast-run* ]] || RANGECAST_LAUNCH+=" --drop-empty $(printf %q "$speech")"
 launch "${source[@]}" ! neighbourcodeparse ! filesink async=false "location=$file" "${audio[@]}"

@@ -3,9 +3,9 @@
  * SECTION:element-capturesync
  * @title: capturesync
  *
- * Makes due together what was captured together, such as speech and frame sets (lip sync): each
- * buffer's PTS becomes its capture time plus the lag of the slowest stream. What enters at sink_0
- * leaves at src_0. The capture time is a GstReferenceTimestampMeta, `timestamp/x-range-capture` or
+ * Synchronises streams, such as speech and frame sets, by capture time (lip sync): each buffer's
+ * PTS becomes its capture time plus the lag of the slowest stream. What enters at sink_0 leaves at
+ * src_0. The capture time is a GstReferenceTimestampMeta, `timestamp/x-range-capture` or
  * `timestamp/x-ntp`; all have to be of one clock.
  *
  * ## Example launch line
@@ -18,6 +18,7 @@
  */
 #include "gstcapturesync.h"
 
+#include <cstdio>
 #include <memory>
 #include <mutex>
 #include <new>
@@ -46,8 +47,10 @@ struct Stream {
 
   /* streaming thread of the sink pad only */
   GstSegment segment{};
-  bool warned = false;  /* of missing capture times */
-  bool started = false; /* with start-with: its segment was sent */
+  bool warned = false; /* of missing capture times */
+  /* with start-with */
+  bool started = false;         /* its segment was sent */
+  bool warned_of_clock = false; /* of capture times of another clock */
 
   CaptureAlignment::Stream timing{}; /* under the element's lock */
 };
@@ -61,6 +64,7 @@ struct GstCaptureSyncPrivate {
   CaptureAlignment alignment;
   bool apart = false;                       /* and a warning was posted */
   GstClockTime start = GST_CLOCK_TIME_NONE; /* with start-with: capture time of running time 0 */
+  gint64 start_lag = 0;                     /* running time less capture time there */
 
   /* with the streaming thread, or while none runs */
   Stream *find (guint number)
@@ -94,7 +98,7 @@ stream_of (GstPad *pad)
 /* ---- times ---- */
 
 static void
-warn_of_missing_time (GstCaptureSync *self, Stream &stream)
+warn_missing_capture_time (GstCaptureSync *self, Stream &stream)
 {
   if (!std::exchange (stream.warned, true))
     GST_ELEMENT_WARNING (self, STREAM, FORMAT,
@@ -107,7 +111,7 @@ warn_of_missing_time (GstCaptureSync *self, Stream &stream)
 }
 
 static void
-tell_relation (GstCaptureSync *self, CaptureAlignment::Relation relation, gint64 spread)
+report_relation (GstCaptureSync *self, CaptureAlignment::Relation relation, gint64 spread)
 {
   const bool apart = relation == CaptureAlignment::Relation::kApart;
   {
@@ -122,7 +126,7 @@ tell_relation (GstCaptureSync *self, CaptureAlignment::Relation relation, gint64
             double (spread) / GST_SECOND),
         (nullptr));
   else
-    GST_INFO_OBJECT (self, "the streams are in step");
+    GST_INFO_OBJECT (self, "the streams are in sync");
 }
 
 /* Sets the buffer's time so that it is due with others of its capture time. */
@@ -134,21 +138,23 @@ align (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
   const GstClockTime running =
       gst_segment_to_running_time (&stream.segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
   if (!GST_CLOCK_TIME_IS_VALID (capture))
-    warn_of_missing_time (self, stream);
+    warn_missing_capture_time (self, stream);
   GST_LOG_OBJECT (stream.sink, "captured %" GST_TIME_FORMAT ", running time %" GST_TIME_FORMAT,
       GST_TIME_ARGS (capture), GST_TIME_ARGS (running));
+  const bool placed = GST_CLOCK_TIME_IS_VALID (capture) && GST_CLOCK_TIME_IS_VALID (running);
   bool stepped = false;
   gint64 delay = 0, spread = 0;
   auto relation = CaptureAlignment::Relation::kTogether;
   {
     std::lock_guard guard (priv->lock);
-    if (GST_CLOCK_TIME_IS_VALID (capture) && GST_CLOCK_TIME_IS_VALID (running))
+    if (placed)
       relation = priv->alignment.place (
           stream.timing, running, capture, priv->settings.max_delay, stepped);
     delay = stream.timing.delay;
-    spread = priv->alignment.spread ();
+    spread = placed ? priv->alignment.spread (running) : 0;
   }
-  tell_relation (self, relation, spread);
+  if (placed)
+    report_relation (self, relation, spread);
   if (stepped)
     GST_DEBUG_OBJECT (stream.sink, "step: from now on %" GST_STIME_FORMAT " later than it comes",
         GST_STIME_ARGS (delay));
@@ -167,17 +173,34 @@ align (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
 
 /* ---- start-with ---- */
 
+/* A sender that was restarted elsewhere, or a host whose clock was set. */
+static void
+warn_other_clock (GstCaptureSync *self, Stream &stream)
+{
+  if (!std::exchange (stream.warned_of_clock, true))
+    GST_ELEMENT_WARNING (self, STREAM, FAILED,
+        ("%s: dropping buffers whose capture times are of another clock than that of the first "
+         "buffer of %s",
+            GST_PAD_NAME (stream.sink), self->priv->settings.start_with.c_str ()),
+        (nullptr));
+}
+
 /* Where running time 0 is, which the first key frame set (or packet of speech) of the named pad
- * decides. GST_CLOCK_TIME_NONE until then. */
+ * decides. GST_CLOCK_TIME_NONE until then.
+ * @param running  of the buffer on the pad, GST_CLOCK_TIME_NONE if unknown
+ * @param[out] other_clock  whether the buffer was captured by another clock than the first one */
 static GstClockTime
-find_start (
-    GstCaptureSyncPrivate *priv, const Stream &stream, GstBuffer *buffer, GstClockTime capture)
+find_start (GstCaptureSyncPrivate *priv, const Stream &stream, GstBuffer *buffer,
+    GstClockTime capture, GstClockTime running, bool &other_clock)
 {
   std::lock_guard guard (priv->lock);
   if (!GST_CLOCK_TIME_IS_VALID (priv->start) &&
       priv->settings.start_with == GST_PAD_NAME (stream.sink) &&
       !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT))
-    priv->start = capture;
+    priv->start = capture, priv->start_lag = GST_CLOCK_DIFF (capture, running);
+  other_clock = GST_CLOCK_TIME_IS_VALID (priv->start) && GST_CLOCK_TIME_IS_VALID (capture) &&
+                guint64 (ABS (GST_CLOCK_DIFF (capture, running) - priv->start_lag)) >
+                    priv->settings.max_delay;
   return priv->start;
 }
 
@@ -188,10 +211,17 @@ restart (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
 {
   const GstClockTime capture = capture_time_of (buffer);
   if (!GST_CLOCK_TIME_IS_VALID (capture))
-    warn_of_missing_time (self, stream);
-  const GstClockTime start = find_start (self->priv, stream, buffer, capture);
-  if (!GST_CLOCK_TIME_IS_VALID (capture) || !GST_CLOCK_TIME_IS_VALID (start) || capture < start) {
-    GST_LOG_OBJECT (stream.sink, "before the start: dropping %" GST_PTR_FORMAT, buffer);
+    warn_missing_capture_time (self, stream);
+  bool other_clock = false;
+  const GstClockTime start = find_start (self->priv, stream, buffer, capture,
+      gst_segment_to_running_time (&stream.segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer)),
+      other_clock);
+  if (other_clock)
+    warn_other_clock (self, stream);
+  if (other_clock || !GST_CLOCK_TIME_IS_VALID (capture) || !GST_CLOCK_TIME_IS_VALID (start) ||
+      capture < start) {
+    GST_DEBUG_OBJECT (stream.sink, "%s: dropping %" GST_PTR_FORMAT,
+        other_clock ? "another clock" : "before the start", buffer);
     gst_buffer_unref (buffer);
     return nullptr;
   }
@@ -246,6 +276,9 @@ move_gap (GstCaptureSync *self, Stream &stream, GstEvent *event)
   }
   GstEvent *moved =
       gst_event_new_gap (delay < 0 && GstClockTime (-delay) > time ? 0 : time + delay, duration);
+  GstGapFlags flags;
+  gst_event_parse_gap_flags (event, &flags);
+  gst_event_set_gap_flags (moved, flags);
   gst_event_set_seqnum (moved, gst_event_get_seqnum (event));
   gst_event_unref (event);
   return moved;
@@ -255,8 +288,18 @@ static gboolean
 gst_capture_sync_sink_event (GstPad *pad, GstObject *parent, GstEvent *event)
 {
   auto self = GST_CAPTURE_SYNC (parent);
+  if (!stream_of (pad)) { /* released */
+    gst_event_unref (event);
+    return FALSE;
+  }
   Stream &stream = *stream_of (pad);
   switch (GST_EVENT_TYPE (event)) {
+    case GST_EVENT_STREAM_START:
+    case GST_EVENT_EOS: { /* holds nobody up any more */
+      std::lock_guard guard (self->priv->lock);
+      stream.timing = {};
+      break;
+    }
     case GST_EVENT_SEGMENT:
       gst_event_copy_segment (event, &stream.segment);
       if (!has_start (self->priv))
@@ -286,14 +329,17 @@ gst_capture_sync_sink_event (GstPad *pad, GstObject *parent, GstEvent *event)
 /* ---- pads ---- */
 
 static GstIterator *
-gst_capture_sync_links (GstPad *pad, GstObject *)
+gst_capture_sync_links (GstPad *pad, GstObject *parent)
 {
-  const Stream *stream = stream_of (pad);
-  if (!stream) /* released */
-    return nullptr;
   GValue value = G_VALUE_INIT;
   g_value_init (&value, GST_TYPE_PAD);
-  g_value_set_object (&value, pad == stream->sink ? stream->src : stream->sink);
+  {
+    std::lock_guard guard (GST_CAPTURE_SYNC (parent)->priv->lock);
+    const Stream *stream = stream_of (pad);
+    if (!stream) /* released */
+      return nullptr;
+    g_value_set_object (&value, pad == stream->sink ? stream->src : stream->sink);
+  }
   GstIterator *links = gst_iterator_new_single (GST_TYPE_PAD, &value);
   g_value_unset (&value);
   return links;
@@ -358,13 +404,15 @@ gst_capture_sync_release_pad (GstElement *element, GstPad *sink)
   GstPad *src = stream->src;
   gst_pad_set_active (src, FALSE);
   gst_pad_set_active (sink, FALSE);
-  for (GstPad *pad : {src, sink})
-    gst_pad_set_element_private (pad, nullptr);
+  {
+    std::lock_guard guard (priv->lock);
+    for (GstPad *pad : {src, sink})
+      gst_pad_set_element_private (pad, nullptr);
+    priv->alignment.remove (&stream->timing);
+    std::erase_if (priv->streams, [stream] (const auto &one) { return one.get () == stream; });
+  }
   gst_element_remove_pad (element, src);
   gst_element_remove_pad (element, sink);
-  std::lock_guard guard (priv->lock);
-  priv->alignment.remove (&stream->timing);
-  std::erase_if (priv->streams, [stream] (const auto &one) { return one.get () == stream; });
 }
 
 /* ---- life ---- */
@@ -381,7 +429,7 @@ gst_capture_sync_change_state (GstElement *element, GstStateChange transition)
   priv->alignment = {};
   for (const auto &stream : priv->streams) {
     gst_segment_init (&stream->segment, GST_FORMAT_UNDEFINED);
-    stream->warned = stream->started = false;
+    stream->warned = stream->started = stream->warned_of_clock = false;
     stream->timing = {};
     priv->alignment.add (&stream->timing);
   }
@@ -396,9 +444,8 @@ capture_sync_properties ()
   using P = PropertyTable<Settings>;
   static P table = {
       P::number<&Settings::max_delay> ("max-delay", "Maximum delay",
-          "Maximum difference of lags in nanoseconds; streams that are further apart are of "
-          "different "
-          "clocks and pass as they are",
+          "Maximum difference in lag between streams in nanoseconds; beyond it their clocks are "
+          "assumed to differ, and timestamps are not changed",
           0, G_MAXINT64, kMutablePlaying),
       P::text<&Settings::start_with> ("start-with", "Start with",
           "Name of the sink pad whose first key buffer is running time 0, for recordings; what was "
@@ -454,7 +501,7 @@ gst_capture_sync_class_init (GstCaptureSyncClass *klass)
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Lip sync by capture time", "Generic",
-      "Makes due together what was captured together: speech and frame sets", "gst-rangecast");
+      "Synchronises streams, such as speech and frame sets, by capture time", "gst-rangecast");
 
   GST_DEBUG_CATEGORY_INIT (gst_capture_sync_debug, "capturesync", 0, "Lip sync by capture time");
 }

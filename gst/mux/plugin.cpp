@@ -2,7 +2,8 @@
 /**
  * plugin-rangemux:
  *
- * Combines the streams of several range cameras into frame sets, splits them, and keeps speech in step.
+ * Combines the streams of several range cameras into frame sets, splits them, and keeps speech in
+ * sync.
  */
 #include <gst/gst.h>
 
@@ -21,6 +22,7 @@ plugin_init (GstPlugin *plugin)
 }
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, rangemux,
-    "Combines the streams of several range cameras into frame sets, splits them, and keeps speech in "
-    "step",
+    "Combines the streams of several range cameras into frame sets, splits them, and keeps speech "
+    "in "
+    "sync",
     plugin_init, PACKAGE_VERSION, "LGPL", "gst-rangecast", PACKAGE_ORIGIN)

@@ -296,6 +296,7 @@ Client::send (const FrameSet &frame_set)
   needs_key_ |= frame_set.discontinuity;
   any_ = true;
   last_ = frame_set.number;
+  last_us_ = g_get_monotonic_time ();
   const bool new_rig = rig_units_ != frame_set.rig_units;
   if (!has_room (g_bytes_get_size (frame_set.units.get ()) +
                  (new_rig ? frame_set.rig_units->size () : 0))) {
@@ -396,13 +397,15 @@ Client::send_slices (const FrameSet &frame_set, MessageHeader header, bool with_
   return whole;
 }
 
-/* Speech alone is never acknowledged, so it stops where frame sets are not either: nothing grows.
- */
+/* Speech alone is never acknowledged, so it stops where frame sets do, or are not acknowledged
+ * either: nothing grows. */
 void
 Client::send (const AudioPacket &packet)
 {
-  const bool is_behind = unacknowledged_since_us_ &&
-                         g_get_monotonic_time () - unacknowledged_since_us_ > kMaxSpeechWait_us;
+  const gint64 now = g_get_monotonic_time ();
+  const bool is_behind =
+      now - last_us_ > kMaxSpeechWait_us ||
+      (unacknowledged_since_us_ && now - unacknowledged_since_us_ > kMaxSpeechWait_us);
   if (!entered_ || closing_ || !hello_.audio || !any_ || is_behind ||
       soup_websocket_connection_get_state (socket_) != SOUP_WEBSOCKET_STATE_OPEN)
     return;

@@ -123,6 +123,7 @@ private:
   bool needs_key_ = true;                       /* an earlier frame set was not sent */
   guint32 first_ = 0;                           /* number of the first frame set since welcome */
   guint32 last_ = 0;                            /* of the last one that came by */
+  gint64 last_us_ = 0;                          /* when that was */
   guint32 sent_ = 0;                            /* frame sets */
   guint32 messages_ = 0, channel_messages_ = 0; /* on the WebSocket, on the data channel */
   gint64 unacknowledged_since_us_ = 0;          /* 0: all is acknowledged */

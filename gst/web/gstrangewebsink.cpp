@@ -11,7 +11,7 @@
  * By default only this machine can connect. An @address that others can reach needs a @token, a
  * @token-file, or @anonymous=true; use @certificate there, too.
  *
- * Speech (Opus) that comes to the request pad `audio` is heard in step with the picture.
+ * Speech (Opus) that comes to the request pad `audio` is heard in sync with the picture.
  *
  * When it listens, it posts an element message `rangewebsink-address` with the field `url`
  * (string), the address of the page.
@@ -178,14 +178,20 @@ static GstFlowReturn
 gst_range_web_sink_audio_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
 {
   GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (parent)->priv;
-  GstClockTime captured = capture_time_of (buffer);
-  if (!GST_CLOCK_TIME_IS_VALID (captured)) { /* live, of this pipeline */
-    const GstClockTime running = gst_segment_to_running_time (
-        &priv->audio_segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
-    if (GST_CLOCK_TIME_IS_VALID (running))
-      captured = gst_element_get_base_time (GST_ELEMENT (parent)) + running;
+  if (priv->audio_segment.format != GST_FORMAT_TIME) {
+    GST_ELEMENT_ERROR (parent, STREAM, FORMAT,
+        ("audio: expected a segment of time, got %s",
+            gst_format_get_name (priv->audio_segment.format)),
+        (nullptr));
+    gst_buffer_unref (buffer);
+    return GST_FLOW_ERROR;
   }
-  const gint64 captured_us = monotonic_us (GST_ELEMENT (parent), captured);
+  gint64 captured_us = monotonic_us (GST_ELEMENT (parent), capture_time_of (buffer));
+  const GstClockTime running =
+      gst_segment_to_running_time (&priv->audio_segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
+  if (captured_us < 0 && GST_CLOCK_TIME_IS_VALID (running)) /* live, or of another clock */
+    captured_us = monotonic_us (
+        GST_ELEMENT (parent), gst_element_get_base_time (GST_ELEMENT (parent)) + running);
   gpointer data = nullptr;
   gsize size = 0;
   gst_buffer_extract_dup (buffer, 0, gst_buffer_get_size (buffer), &data, &size);
@@ -196,6 +202,8 @@ gst_range_web_sink_audio_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
     return GST_FLOW_FLUSHING;
   if (captured_us >= 0)
     server->push_audio (std::move (packet), captured_us);
+  else
+    GST_DEBUG_OBJECT (parent, "dropping a packet of speech: it is not known when it was captured");
   return GST_FLOW_OK;
 }
 

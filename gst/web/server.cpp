@@ -21,7 +21,8 @@ namespace web {
 namespace {
 
 /** Frame sets that wait for the server's thread; more would be late. */
-constexpr std::size_t kMaxQueue = 8;
+constexpr std::ptrdiff_t kMaxQueue = 8;
+constexpr std::size_t kMaxAudioQueue = 100; /* items, when a packet of speech comes */
 constexpr guint kTick_ms = 1000, kStats_ms = 250;
 /** A client that reads nothing for so long is disconnected. */
 constexpr gint kMaxUnread_ms = 30000;
@@ -701,7 +702,8 @@ Server::push (BytesPtr units, bool key, bool discontinuity, gint64 captured_us)
   discontinuity |= std::exchange (flushed_, false);
   counters_.frame_sets++;
   const guint32 number = next_number_++;
-  if (queue_.size () >= kMaxQueue) {
+  const auto is_frame_set = [] (const Item &item) { return !item.is_end && !item.audio.data; };
+  if (std::ranges::count_if (queue_, is_frame_set) >= kMaxQueue) {
     GST_DEBUG_OBJECT (element_, "the server is busy; dropping frame set %u", number);
     return;
   }
@@ -714,8 +716,10 @@ Server::push_audio (BytesPtr packet, gint64 captured_us)
 {
   std::lock_guard guard (lock_);
   const guint32 number = next_audio_++;
-  if (queue_.size () >= kMaxQueue)
+  if (queue_.size () >= kMaxAudioQueue) {
+    GST_DEBUG_OBJECT (element_, "the server is busy; dropping packet %u of speech", number);
     return;
+  }
   queue_.push_back ({{}, false, {std::move (packet), number, captured_us}});
   wake ();
 }

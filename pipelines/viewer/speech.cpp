@@ -23,20 +23,21 @@ speech_beside (const char *recording)
 bool
 hear (Viewer &viewer, GstPad *pad)
 {
-  if (viewer.volume)
+  if (viewer.hears.exchange (true))
     return false; /* one voice is heard already */
   GstElement *queue = add_element (viewer, "queue"),
              *convert = add_element (viewer, "audioconvert"),
              *resample = add_element (viewer, "audioresample"),
+             *volume = add_element (viewer, "volume"),
              *sink = add_element (viewer, "autoaudiosink");
-  viewer.volume = add_element (viewer, "volume");
   g_object_set (queue, "max-size-time", 2 * GST_SECOND, "max-size-buffers", 0, nullptr);
-  gst_element_link_many (queue, convert, resample, viewer.volume, sink, nullptr);
-  for (GstElement *element : {sink, viewer.volume, resample, convert, queue})
+  gst_element_link_many (queue, convert, resample, volume, sink, nullptr);
+  for (GstElement *element : {sink, volume, resample, convert, queue})
     gst_element_sync_state_with_parent (element);
   GstPad *first = gst_element_get_static_pad (queue, "sink");
   const bool linked = gst_pad_link (pad, first) == GST_PAD_LINK_OK;
   gst_object_unref (first);
+  viewer.volume = volume;
   return linked;
 }
 
@@ -48,8 +49,8 @@ toggle_mute (Viewer &viewer)
     return;
   }
   gboolean mute = FALSE;
-  g_object_get (viewer.volume, "mute", &mute, nullptr);
-  g_object_set (viewer.volume, "mute", !mute, nullptr);
+  g_object_get (viewer.volume.load (), "mute", &mute, nullptr);
+  g_object_set (viewer.volume.load (), "mute", !mute, nullptr);
   viewer.overlay->say (mute ? "sound on" : "sound off");
 }
 
@@ -65,13 +66,17 @@ build_speech_receiver (Viewer &viewer, GstElement *before, GstElement *after)
   GstCaps *caps = gst_caps_from_string (kSpeechCaps);
   g_object_set (source, "port", viewer.options.audio, "reuse", FALSE, "caps", caps, nullptr);
   gst_caps_unref (caps);
-  g_object_set (jitter, "latency", viewer.options.latency_ms, "do-lost", TRUE, nullptr);
+  g_object_set (jitter, "latency", viewer.options.latency_ms, "do-lost", TRUE, "max-dropout-time",
+      1000, "max-misorder-time", 500, nullptr);
   g_object_set (decoder, "plc", TRUE, "tolerance", gint64 (5 * GST_MSECOND), nullptr);
   gst_element_link_pads (before, "src", step, "sink_0");
   gst_element_link_pads (step, "src_0", after, "sink");
   gst_element_link_many (source, guard, jitter, depayloader, nullptr);
   gst_element_link_pads (depayloader, "src", step, "sink_1");
-  gst_element_link_pads (step, "src_1", decoder, "sink");
+  GstElement *queue = add_element (viewer, "queue");
+  g_object_set (queue, "max-size-time", 2 * GST_SECOND, "max-size-buffers", 0, nullptr);
+  gst_element_link_pads (step, "src_1", queue, "sink");
+  gst_element_link (queue, decoder);
   /* Silence while no speech arrives, for which the picture would wait. */
   GstElement *silence = add_element (viewer, "audiotestsrc"),
              *mixer = add_element (viewer, "audiomixer");

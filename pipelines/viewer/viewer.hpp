@@ -22,7 +22,8 @@ struct Viewer {
   GstElement *size = nullptr;            /* capsfilter behind it */
   GstElement *overlay_element = nullptr; /* overlaycomposition */
   GstElement *sink = nullptr;
-  GstElement *volume = nullptr; /* of the speech; nullptr: there is none */
+  std::atomic<bool> hears = false;            /* one voice */
+  std::atomic<GstElement *> volume = nullptr; /* of the speech; nullptr: there is none */
   GMainLoop *loop = nullptr;
   bool is_file = false;
   bool failed = false;
@@ -48,8 +49,9 @@ bool build_pipeline (Viewer &viewer);
 gboolean refuse_input (gpointer viewer);
 /** @} */
 
-/** @name speech.cpp, main thread or before it runs @{ */
-/** Plays what comes from a pad, decoded. @return false if it cannot be, or other speech is heard */
+/** @name speech.cpp @{ */
+/** Plays what comes from a pad, decoded. Any thread. @return false if it cannot be, or other speech
+ * is heard */
 bool hear (Viewer &viewer, GstPad *pad);
 /** Receives speech at options.audio, and puts capturesync between the two elements. */
 void build_speech_receiver (Viewer &viewer, GstElement *before, GstElement *after);

@@ -9,6 +9,7 @@ export class LiveSource {
     this.stage = stage;
     this.live = live;
     this.wait = 0; // ms that frame sets wait before they are decoded
+    this.generation = 0; // of connections
     this.due = 0; // of the last one, performance.now ()
   }
 
@@ -30,21 +31,27 @@ export class LiveSource {
 
   hold ({ wait }) { this.wait = wait; }
   receive (frameSet) {
-    const now = performance.now ();
+    if (this.wait > 0) // else when it is decoded; waiting must not use up the server's window
+      this.connection.acknowledge (frameSet);
+    const now = performance.now (), acknowledged = this.wait > 0;
     this.due = Math.max (this.due, now + this.wait); // in their order
     if (this.due <= now)
-      this.decode (frameSet);
-    else
-      setTimeout (() => this.closed || this.decode (frameSet), this.due - now);
+      this.decode (frameSet, acknowledged);
+    else {
+      const { generation } = this;
+      setTimeout (() => this.closed || generation !== this.generation || this.decode (frameSet, acknowledged), this.due - now);
+    }
   }
 
   handleState (name) {
+    if (name === 'connecting')
+      this.generation++; // what waits is of the connection before
     if (name === 'connecting')
       this.stage.core.call ('rc_forget_stream');
     this.stage.post ({ type: 'live', state: name });
   }
 
-  decode (frameSet) {
+  decode (frameSet, acknowledged) {
     const { core } = this.stage;
     let outcome;
     try {
@@ -60,7 +67,8 @@ export class LiveSource {
       this.connection.reopen ();
       return;
     }
-    this.connection.acknowledge (frameSet);
+    if (!acknowledged)
+      this.connection.acknowledge (frameSet);
     if (outcome === FAILED) // until the next frame set
       this.connection.say (core.message (), 'error');
     if (outcome === NOTHING && core.call ('rc_rig_views') === 0)

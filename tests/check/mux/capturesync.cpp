@@ -200,19 +200,78 @@ GST_START_TEST (test_recording_starts_with_the_first_key_frame_set)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_recording_leaves_out_what_another_clock_captured)
+{
+  Step step ("sink_0");
+  const GstClockTime begin = 900 * GST_SECOND;
+  fail_unless_equals_uint64 (pass (step.picture, 50 * kMs, begin, kFrameSet), 0);
+  fail_unless_equals_uint64 (pass (step.sound, 70 * kMs, begin + 20 * kMs, kRtp), 20 * kMs);
+  for (GstClockTime other :
+      {begin + 3600 * GST_SECOND, begin + 5 * GST_SECOND}) /* restarted hosts */
+    fail_if (GST_CLOCK_TIME_IS_VALID (pass (step.sound, 90 * kMs, other, kRtp)));
+  const std::string text = next_message_text (step.bus, GST_MESSAGE_WARNING, 0);
+  fail_unless (text.starts_with ("sink_1: dropping buffers"), "%s", text.c_str ());
+  fail_unless_equals_string (next_message_text (step.bus, GST_MESSAGE_WARNING, 0).c_str (), "");
+  fail_unless_equals_uint64 (pass (step.sound, 110 * kMs, begin + 60 * kMs, kRtp), 60 * kMs);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_stream_that_has_ended_holds_nobody_up)
+{
+  Step step;
+  for (GstEventType end : {GST_EVENT_EOS, GST_EVENT_UNKNOWN}) { /* or is only silent */
+    pass (step.picture, 180 * kMs, 0, kFrameSet);
+    fail_unless_equals_uint64 (pass (step.sound, 50 * kMs, 0, kRtp), 180 * kMs);
+    const GstClockTime later = end == GST_EVENT_EOS ? 20 * kMs : 10 * GST_SECOND;
+    if (end == GST_EVENT_EOS)
+      fail_unless (gst_harness_push_event (step.picture, gst_event_new_eos ()));
+    fail_unless_equals_uint64 (pass (step.sound, 50 * kMs + later, later, kRtp), 50 * kMs + later);
+    if (end == GST_EVENT_EOS) { /* the next file or call */
+      fail_unless (gst_harness_push_event (step.picture, gst_event_new_stream_start ("next")));
+      gst_harness_set_src_caps_str (step.picture, "video/x-neighbour-code");
+    }
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_streams_whose_clocks_part_are_discontinuous)
+{
+  Step step;
+  pass (step.picture, 180 * kMs, 0, kFrameSet);
+  fail_unless_equals_uint64 (pass (step.sound, 50 * kMs, 0, kRtp), 180 * kMs);
+  gst_harness_push (step.sound, buffer_at (70 * kMs, 3600 * GST_SECOND, kRtp));
+  GstBuffer *buffer = gst_harness_pull (step.sound);
+  fail_unless_equals_uint64 (GST_BUFFER_PTS (buffer), 70 * kMs);
+  fail_unless (GST_BUFFER_IS_DISCONT (buffer));
+  gst_buffer_unref (buffer);
+  pass (step.sound, 90 * kMs, GST_CLOCK_TIME_NONE, kRtp); /* says nothing of clocks */
+  pass (step.sound, 110 * kMs, 3600 * GST_SECOND + 40 * kMs, kRtp);
+  int warnings = 0;
+  while (next_message_text (step.bus, GST_MESSAGE_WARNING, 0).find (" apart ") != std::string::npos)
+    warnings++;
+  fail_unless_equals_int (warnings, 1);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_gap_moves_with_its_stream)
 {
   Step step;
   pass (step.picture, 180 * kMs, 0, kFrameSet);
   pass (step.sound, 50 * kMs, 0, kRtp);
-  fail_unless (gst_harness_push_event (step.sound, gst_event_new_gap (70 * kMs, 20 * kMs)));
+  GstEvent *gap = gst_event_new_gap (70 * kMs, 20 * kMs);
+  gst_event_set_gap_flags (gap, GST_GAP_FLAG_MISSING_DATA);
+  fail_unless (gst_harness_push_event (step.sound, gap));
+  GstGapFlags flags = {};
   GstClockTime time = 0;
   while (GstEvent *event = gst_harness_try_pull_event (step.sound)) {
-    if (GST_EVENT_TYPE (event) == GST_EVENT_GAP)
+    if (GST_EVENT_TYPE (event) == GST_EVENT_GAP) {
       gst_event_parse_gap (event, &time, nullptr);
+      gst_event_parse_gap_flags (event, &flags);
+    }
     gst_event_unref (event);
   }
   fail_unless_equals_uint64 (time, 200 * kMs);
+  fail_unless_equals_int (flags, GST_GAP_FLAG_MISSING_DATA);
 }
 GST_END_TEST;
 
@@ -252,6 +311,9 @@ capturesync_suite ()
   tcase_add_test (tc, test_streams_of_different_clocks_pass_with_one_warning);
   tcase_add_test (tc, test_buffers_without_capture_time_pass_with_one_warning);
   tcase_add_test (tc, test_recording_starts_with_the_first_key_frame_set);
+  tcase_add_test (tc, test_recording_leaves_out_what_another_clock_captured);
+  tcase_add_test (tc, test_stream_that_has_ended_holds_nobody_up);
+  tcase_add_test (tc, test_streams_whose_clocks_part_are_discontinuous);
   tcase_add_test (tc, test_gap_moves_with_its_stream);
   tcase_add_test (tc, test_pads_come_in_pairs_and_go);
   return s;
