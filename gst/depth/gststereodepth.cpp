@@ -48,6 +48,7 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
 #include <optional>
+#include <rangecast/base/guarded.hpp>
 #include <rangecast/geometry/size_text.hpp>
 #include <rangecast/stereo/stereo_depth.hpp>
 #include <string>
@@ -380,8 +381,8 @@ negotiate (GstStereoDepth *self, bool has_third)
       GST_WARNING_OBJECT (self, "pad %s: frames without caps", kPadNames[side]);
       return GST_FLOW_NOT_NEGOTIATED;
     }
-  if (const GstFlowReturn flow =
-          gst_range_flow_return (GST_ELEMENT (self), configure_core (priv, has_third));
+  if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self),
+          rangecast::guarded ("stereo", [&] { return configure_core (priv, has_third); }));
       flow != GST_FLOW_OK)
     return flow;
   const GstVideoInfo &left = *priv->inputs[kLeft].info;
@@ -498,7 +499,8 @@ push_pair (GstStereoDepth *self, GstBuffer *third)
   GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &output);
   if (flow != GST_FLOW_OK)
     return flow;
-  flow = gst_range_flow_return (GST_ELEMENT (self), match_pair (self, third, output));
+  flow = gst_range_flow_return (GST_ELEMENT (self),
+      rangecast::guarded ("stereo", [&] { return match_pair (self, third, output); }));
   if (flow != GST_FLOW_OK) {
     gst_buffer_unref (output);
     return flow;

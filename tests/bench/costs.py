@@ -70,8 +70,9 @@ def launch(line):
 
 
 def lengths(size):
-    """Frame sets of the short and the long stream: fewer of large pictures. The short one includes what is allocated once."""
-    return (20, 80) if size == "320x240" else (10, 30)
+    """Frame sets of the short and the long stream: fewer of large pictures. The short one includes what is allocated once. They
+    differ by a multiple of stereodepth's refresh-interval (30), so that each has its share of whole pictures."""
+    return (20, 80) if size == "320x240" else (10, 40)
 
 
 def recording(folder, views, size):
@@ -194,9 +195,9 @@ def measure_memory(folder, rounds):
 
 def measure_startup(folder, rounds):
     path = min(recording(folder, 1, "320x240").items())[1]
-    one = f"filesrc location={path} ! neighbourcodeparse ! neighbourcodedec ! identity eos-after=2 ! fakesink"
+    one = f"filesrc location={shlex.quote(str(path))} ! neighbourcodeparse ! neighbourcodedec ! identity eos-after=2 ! fakesink"
     commands = {
-        "gst-launch-1.0 ... neighbourcodedec ...": ["gst-launch-1.0", "-q", *one.split()],
+        "gst-launch-1.0 ... neighbourcodedec ...": ["gst-launch-1.0", "-q", *shlex.split(one)],
         "gst-launch-1.0 ... jpegdec ... (peer)": "gst-launch-1.0 -q videotestsrc num-buffers=1 ! jpegenc ! jpegdec ! fakesink".split(),
         "gst-inspect-1.0 stereodepth": ["gst-inspect-1.0", "stereodepth"],
         "gst-inspect-1.0 striprender": ["gst-inspect-1.0", "striprender"],

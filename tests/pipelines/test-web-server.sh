@@ -258,7 +258,7 @@ test_webrtc_is_offered_where_it_is_asked_for () {
   serve --webrtc --window 9 --stun 127.0.0.1:9 --turn user:secret@127.0.0.1:9
   [[ "${links[0]}" == */\?transport=webrtc ]] || fail "${links[0]}"
   offered=$(watch "${links[0]}" "" 1)
-  grep -qF '"window":9,"rtc":true,"iceServers":[{"urls":"stun:127.0.0.1:9"},{"urls":"turn:127.0.0.1:9","username":"user","credential":"secret"}]' <<<"$offered" ||
+  grep -qF '"window":9,"audio":false,"rtc":true,"iceServers":[{"urls":"stun:127.0.0.1:9"},{"urls":"turn:127.0.0.1:9","username":"user","credential":"secret"}]' <<<"$offered" ||
     fail "$offered"
   stop_server
 }

@@ -144,7 +144,8 @@ StereoDepth::clear_rims_of_third (const Roi &roi)
   before_fusion_.create (disparity.size (), CV_16U);
   const cv::Mat from (disparity.size (), CV_16S, disparity.data, disparity.step);
   cv::Mat to (disparity.size (), CV_16S, before_fusion_.data, before_fusion_.step);
-  const int radius = settings_.silhouette_radius * 5 / 4; /* these rims are wider */
+  /* These rims are wider; beyond 64 pixels the filter's sums would saturate. */
+  const int radius = std::min (64, settings_.silhouette_radius * 5 / 4);
   SilhouetteFilter::Settings rims = {radius, settings_.flying_pixel_step, 0, kMin};
   rims.nearest = static_cast<int> (finder_.disparity_at (rectifier_.range_view ().far_m));
   rims.only_beyond = true;
