@@ -196,9 +196,13 @@ find_start (GstCaptureSyncPrivate *priv, const Stream &stream, GstBuffer *buffer
   std::lock_guard guard (priv->lock);
   if (!GST_CLOCK_TIME_IS_VALID (priv->start) &&
       priv->settings.start_with == GST_PAD_NAME (stream.sink) &&
-      !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT))
-    priv->start = capture, priv->start_lag = GST_CLOCK_DIFF (capture, running);
+      !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT) &&
+      GST_CLOCK_TIME_IS_VALID (running)) {
+    priv->start = capture;
+    priv->start_lag = GST_CLOCK_DIFF (capture, running);
+  }
   other_clock = GST_CLOCK_TIME_IS_VALID (priv->start) && GST_CLOCK_TIME_IS_VALID (capture) &&
+                GST_CLOCK_TIME_IS_VALID (running) &&
                 guint64 (ABS (GST_CLOCK_DIFF (capture, running) - priv->start_lag)) >
                     priv->settings.max_delay;
   return priv->start;

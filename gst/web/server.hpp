@@ -36,7 +36,7 @@ public:
 
   /** @param element  for the log and `request_key`; outlives the server */
   Server (GstObject *element, Settings settings, RequestKey request_key);
-  /** Whether clients are told that there is speech. Any thread. */
+  /** Sets whether the welcome message announces speech. Any thread. */
   void set_audio (bool has_audio) { has_audio_ = has_audio; }
   /** Waits until stop() is complete: clients have half a second to confirm that they are closed. */
   ~Server () override;

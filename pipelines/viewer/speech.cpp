@@ -82,7 +82,8 @@ build_speech_receiver (Viewer &viewer, GstElement *before, GstElement *after)
              *mixer = add_element (viewer, "audiomixer");
   g_object_set (silence, "is-live", TRUE, nullptr);
   gst_util_set_object_arg (G_OBJECT (silence), "wave", "silence");
-  gst_element_link_many (decoder, mixer, nullptr);
+  gst_element_link_many (decoder, add_element (viewer, "audioconvert"),
+      add_element (viewer, "audioresample"), mixer, nullptr);
   gst_element_link_many (silence, mixer, nullptr);
   GstPad *pad = gst_element_get_static_pad (mixer, "src");
   hear (viewer, pad);

@@ -28,7 +28,7 @@ export class Speech {
     if (this.isOn)
       return this.stop ();
     if (!('AudioDecoder' in globalThis))
-      return this.say (isSecureContext ? 'This browser cannot decode the sound (WebCodecs).' : 'Browsers play the sound only over https, or of this machine.', 'note');
+      return this.say (isSecureContext ? 'This browser cannot decode the sound (WebCodecs).' : 'Browsers play the sound only over https or from localhost.', 'note');
     this.context = new AudioContext ({ latencyHint: 'interactive', sampleRate: RATE });
     this.destination = this.context.createGain ();
     this.destination.connect (this.context.destination);

@@ -179,6 +179,27 @@ END
   stop_all "$camera"
 }
 
+# The window's program: live, and a recording with speech beside it.
+view () { # seconds options...
+  env -u GST_GL_PLATFORM -u GST_GL_WINDOW GST_DEBUG=GST_SCHEDULING:5 GST_DEBUG_NO_COLOR=1 GST_DEBUG_FILE="$PWD/passed.txt" \
+    timeout -s INT "$1" xvfb-run -a rangecast-viewer --size 160x120 "${@:2}" >window.log 2>&1 || true
+  local pad
+  for pad in striprender0:sink volume0:sink; do
+    [ "$(grep -c "<$pad> calling" passed.txt)" -gt 20 ] || fail "$pad: $(grep '^rangecast-viewer' window.log)"
+  done
+}
+test_window_plays_speech () {
+  command -v xvfb-run >/dev/null && command -v rangecast-viewer >/dev/null || skip "no Xvfb, or no rangecast-viewer"
+  export_rig 1
+  start_parent "$ports"
+  start_sender "$ports"
+  view 12 --listen $((ports + 20)) --audio $((ports + 22))
+  stop_all "$camera" "$parent"
+  gst-launch-1.0 -q avatartestsrc num-buffers=40 ! video/x-range,width=160,height=120 ! neighbourcodeenc ! filesink location=talk.rcnc
+  gst-launch-1.0 -q audiotestsrc num-buffers=60 ! opusenc ! oggmux ! filesink location=talk.opus
+  view 30 talk.rcnc --once
+}
+
 test_wrong_options_are_named () {
   local camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml --to 127.0.0.1:5000)
   local parent=("$pipelines/parent-host.sh" --views 2 --listen 5000 --to 127.0.0.1:6000)
