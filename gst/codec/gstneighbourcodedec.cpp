@@ -34,6 +34,7 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
 #include <optional>
+#include <rangecast/base/guarded.hpp>
 #include <rangecast/neighbourcode/access_unit.hpp>
 #include <span>
 #include <vector>
@@ -156,11 +157,12 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   auto self = GST_NEIGHBOUR_CODE_DEC (base);
   GstNeighbourCodeDecPrivate *priv = self->priv;
   gstrange::RangeInfo info;
-  Status status = gstrange::parse_caps (in, info);
-  if (status.ok ())
+  Status status = rangecast::guarded ("caps", [&] {
+    if (Status s = gstrange::parse_caps (in, info); !s.ok ())
+      return s;
     priv->concealment.set_rig (priv->decoder.rig (), info.rig);
-  if (status.ok ())
-    status = priv->decoder.set_rig (info.rig);
+    return priv->decoder.set_rig (info.rig);
+  });
   priv->reporter.set_views (info.rig);
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
@@ -187,12 +189,13 @@ gst_neighbour_code_dec_src_event (GstBaseTransform *base, GstEvent *event)
 
 /* ---- a frame set ---- */
 
-/* Adds the views to `output` and decodes them. Views of the rig that did not come are left out, or
- * repeated from `older`, which may be nullptr. */
+/* Adds the views of `units` to `output` and decodes them. Views of the rig that did not come are
+ * left out, or repeated from `older`, which may be nullptr. */
 static Status
-decode_into (GstNeighbourCodeDecPrivate *priv, GstBuffer *output, GstBuffer *older, int n_threads,
-    DecoderResult &result)
+decode_into (GstNeighbourCodeDecPrivate *priv, std::span<const Bytes> units, GstBuffer *output,
+    GstBuffer *older, int n_threads, DecoderResult &result)
 {
+  priv->decoder.plan (units, result, older);
   std::optional<gstrange::RangeFrameMap> last;
   std::span<const rangecast::RangeImage> older_views;
   if (older)
@@ -263,13 +266,13 @@ decode_frame_set (
   GstBuffer *older = priv->concealment.begin (input);
   if (settings.conceal == CONCEAL_INVALID)
     older = nullptr;
-  DecoderResult result;
-  priv->decoder.plan (units, result, older);
   GstBuffer *buffer = nullptr;
   if (const GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &buffer);
       flow != GST_FLOW_OK)
     return flow;
-  const Status status = decode_into (priv, buffer, older, settings.n_threads, result);
+  DecoderResult result;
+  const Status status = rangecast::guarded ("decoder",
+      [&] { return decode_into (priv, units, buffer, older, settings.n_threads, result); });
   {
     std::lock_guard guard (priv->lock);
     priv->frames++;

@@ -35,6 +35,7 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
+#include <rangecast/base/guarded.hpp>
 #include <rangecast/neighbourcode/access_unit.hpp>
 #include <span>
 
@@ -157,7 +158,8 @@ gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
   const GstStructure *structure = gst_caps_get_structure (out, 0);
-  const Status status = gstrange::parse_caps (in, priv->info);
+  const Status status =
+      rangecast::guarded ("caps", [&] { return gstrange::parse_caps (in, priv->info); });
   priv->is_configured = false;
   priv->reporter.set_views (priv->info.rig);
   priv->encoder.request_key (); /* decoders reset their references at new caps */
@@ -319,7 +321,8 @@ encode_input (GstNeighbourCodeEnc *self)
   }
   request_key_if_due (self, input, settings);
   EncoderResult result;
-  const Status status = encode_frame (self, input, settings, result);
+  const Status status =
+      rangecast::guarded ("encoder", [&] { return encode_frame (self, input, settings, result); });
   if (!status.ok ())
     return gst_range_flow_return (GST_ELEMENT (self), status);
   warn_missed_target (self, settings.rate);

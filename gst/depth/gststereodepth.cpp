@@ -136,9 +136,10 @@ struct GstStereoDepthPrivate {
   bool negotiate_third = false; /* third has new caps: negotiate with its next image */
   rangecast::StereoDepth core;
   GstBufferPool *pool = nullptr;
-  bool discont = false;             /* a pair was dropped */
-  GstClockTime processing_time = 0; /* mean time to match a pair, at most `latency` */
-  guint64 dropped_before_pair = 0;  /* images without partner up to the last pair */
+  bool discont = false;                        /* a pair was dropped */
+  GstClockTime last_pts = GST_CLOCK_TIME_NONE; /* of the last left image that was matched */
+  GstClockTime processing_time = 0;            /* mean time to match a pair, at most `latency` */
+  guint64 dropped_before_pair = 0;             /* images without partner up to the last pair */
   bool warned_mirrored = false, warned_unpaired = false;
 };
 
@@ -488,6 +489,19 @@ match_pair (GstStereoDepth *self, GstBuffer *third, GstBuffer *output)
   return status;
 }
 
+/* What was learnt from earlier images is of no use where the stream is broken: where the left
+ * image's time goes back, or on by more than a second after a discontinuity. A lost image or two
+ * are not that much; matching everything again would lose a host under load even more. */
+static void
+reset_after_break (GstStereoDepthPrivate *priv)
+{
+  const GstBuffer *left = priv->pair.buffers.first;
+  const GstClockTime before = priv->last_pts, now = priv->last_pts = GST_BUFFER_PTS (left);
+  if (GST_CLOCK_TIME_IS_VALID (before) && GST_CLOCK_TIME_IS_VALID (now) &&
+      (now < before || (GST_BUFFER_IS_DISCONT (left) && now - before > GST_SECOND)))
+    priv->core.reset ();
+}
+
 static GstFlowReturn
 push_pair (GstStereoDepth *self, GstBuffer *third)
 {
@@ -499,6 +513,7 @@ push_pair (GstStereoDepth *self, GstBuffer *third)
   GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &output);
   if (flow != GST_FLOW_OK)
     return flow;
+  reset_after_break (priv);
   flow = gst_range_flow_return (GST_ELEMENT (self),
       rangecast::guarded ("stereo", [&] { return match_pair (self, third, output); }));
   if (flow != GST_FLOW_OK) {
@@ -680,6 +695,7 @@ gst_stereo_depth_start (GstAggregator *aggregator)
   priv->negotiate = true;
   priv->negotiate_third = priv->third_released = false;
   priv->warned_unpaired = priv->discont = false;
+  priv->last_pts = GST_CLOCK_TIME_NONE;
   priv->dropped_before_pair = priv->processing_time = 0;
   priv->matcher->reset ();
   priv->rois.reset ();
@@ -700,6 +716,7 @@ gst_stereo_depth_flush (GstAggregator *aggregator)
   priv->rois.restart_interval ();
   priv->core.reset ();
   priv->discont = false;
+  priv->last_pts = GST_CLOCK_TIME_NONE;
   std::lock_guard guard (priv->lock);
   priv->earliest = GST_CLOCK_TIME_NONE;
   return GST_FLOW_OK;

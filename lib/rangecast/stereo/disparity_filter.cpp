@@ -369,11 +369,17 @@ DisparityFilter::fill_gaps_of_columns (
           const int x0 = hull.x + int (stripe) * kColumns;
           std::int16_t last[kColumns]; /* rows with a disparity */
           std::uint8_t ends[kColumns] = {};
-          std::fill_n (last, kColumns, std::int16_t{INT16_MIN});
+          int bottom = -1; /* of the part before */
           for (const cv::Rect &part : tiles.parts ()) {
-            const int begin = std::max (x0, part.x) - x0,
-                      end = std::min (x0 + kColumns, part.br ().x) - x0;
-            for (int y = part.y; begin < end && y < part.br ().y; y++) {
+            const int begin = std::clamp (part.x - x0, 0, kColumns),
+                      end = std::clamp (part.br ().x - x0, begin, kColumns);
+            /* A gap lies within what was matched: between parts, nothing is known. */
+            if (part.y != bottom)
+              std::fill_n (last, kColumns, std::int16_t{INT16_MIN});
+            std::fill (last, last + begin, std::int16_t{INT16_MIN});
+            std::fill (last + end, last + kColumns, std::int16_t{INT16_MIN});
+            bottom = part.br ().y;
+            for (int y = part.y; begin < end && y < bottom; y++) {
               const auto d = disparity.ptr<std::int16_t> (y) + x0;
               find_ends (d + begin, end - begin, min, y, width, last + begin, ends + begin);
               const std::uint8_t *at = ends + begin;

@@ -46,6 +46,9 @@ public:
   Status set (
       const PairGeometry &pair, const StereoSettings &settings, double near_m, double far_m);
 
+  /** Forgets the background that was seen in earlier images. */
+  void reset () { background_.reset (); }
+
   /** @param left, right  CV_8UC4, R G B x, of the pair's size
    *  @param roi          inside the image, not empty
    *  @param parts        rectangles one below the other in which to match; null = the whole ROI

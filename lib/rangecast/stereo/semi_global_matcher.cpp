@@ -31,9 +31,13 @@ constexpr int kStep = 10, kJump = 60, kMinJump = 15, kEdge = 8;
 constexpr std::uint8_t kNever = 200;
 static_assert (kMaxCost + kJump < kNever && kNever + kStep < 256);
 
-constexpr int kSide = 32;                   /* of a tile, pixels */
-constexpr int kOverlap = 16;                /* rows in which paths converge */
-constexpr std::size_t kMaxCells = 36 << 20; /* maximum number in memory, of two bytes each */
+constexpr int kSide = 32;    /* of a tile, pixels */
+constexpr int kOverlap = 16; /* rows in which paths converge */
+/* Of two bytes each; exceeded only where two bands of tiles have more. */
+constexpr std::size_t kMaxCells = 36 << 20;
+constexpr int kMinBands = 2;         /* one has no rows without overlap */
+constexpr int kMaxDisparities = 512; /* of a tile; if there are more, the nearest are searched */
+static_assert (kMinBands * kSide > 2 * kOverlap);
 constexpr std::int16_t kAmbiguous = INT16_MIN;
 
 /* Number of disparities from which half the size is searched first; margin around what was found
@@ -725,8 +729,11 @@ SemiGlobalMatcher::find_coarse (const cv::Mat &left, const cv::Mat &right, int n
 void
 SemiGlobalMatcher::choose_disparities (int x, int y, Tile &tile) const
 {
-  tile.low = min_disparity_;
-  tile.count = disparities_;
+  const auto search = [&tile] (int low, int end) {
+    tile.low = std::max (low, end - kMaxDisparities);
+    tile.count = end - tile.low;
+  };
+  search (min_disparity_, min_disparity_ + disparities_);
   if (coarse_disparity_.empty ())
     return;
   const cv::Rect around (
@@ -744,18 +751,15 @@ SemiGlobalMatcher::choose_disparities (int x, int y, Tile &tile) const
   if (high < least)
     return;
   const int first = std::max (min_disparity_, (low >> 3) - kMargin),
-            last = std::min (min_disparity_ + disparities_ - 1, (high >> 3) + 1 + kMargin);
-  if (first > last)
-    return;
-  tile.low = first;
-  tile.count = last - first + 1;
+            end = std::min (min_disparity_ + disparities_, (high >> 3) + 2 + kMargin);
+  if (first < end)
+    search (first, end);
 }
 
 /* Adds bands of tiles to a stripe until it reaches the end of the image or memory is full. */
 void
 SemiGlobalMatcher::add_bands (Stripe &stripe)
 {
-  constexpr int kMinBands = 4;
   static_assert (kTileArea == kSide * kSide);
   std::size_t at = 0;
   tiles_.clear ();

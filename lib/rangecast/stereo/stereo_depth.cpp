@@ -27,16 +27,14 @@ StereoDepth::set (const View &view, const StereoSettings &settings, bool with_th
       return s;
   view_ = view;
   settings_ = settings;
+  reset ();
   mirror_.reset ();
   for (StillAverage &still : still_)
     still.set (settings.average);
   if (settings.steady > 0)
     temporal_.set (
         view.width, view.height, settings.steady, pair.focal_baseline / range.depth_unit_m);
-  changes_.reset ();
   occupancy_.set (view.width, view.height);
-  near_now_m_ = far_now_m_ = 0;
-  last_roi_ = {};
   pictures_[0].release ();
   return to_depth_.set (
       range.intrinsics.fx, rectifier_.baseline_m (), range.depth_unit_m, range.near_m, range.far_m);

@@ -63,7 +63,8 @@ public:
    * images. */
   [[nodiscard]] bool looks_mirrored () const { return mirror_.mirrored (); }
 
-  /** After a gap in the stream: discards the history of temporal filters. */
+  /** After a break in the stream: discards all that was learnt from earlier images, also the
+   * background. The next images should be matched completely, as changed_outside() requests. */
   void reset ()
   {
     changes_.reset ();
@@ -71,7 +72,9 @@ public:
     for (StillAverage &still : still_)
       still.reset ();
     occupancy_.reset ();
-    near_now_m_ = far_now_m_ = 0;
+    finder_.reset ();
+    near_now_m_ = far_now_m_ = seen_share_ = 0;
+    last_roi_ = {};
   }
 
   /** The disparities of the last image, 1/16 pixel with equal principal points, 0 = no match; of

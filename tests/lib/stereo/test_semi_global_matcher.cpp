@@ -136,6 +136,28 @@ TEST (SemiGlobalMatcher, both_surfaces_are_found_at_half_the_size_first)
   }
 }
 
+/* A tile at the edge of a near surface spans more disparities than are searched at once. */
+TEST (SemiGlobalMatcher, near_surface_is_found_at_any_number_of_disparities)
+{
+  constexpr int kVeryNear = 700, kAll = 720;
+  const cv::Rect surface (1010, 16, 200, 96); /* its edges lie within tiles */
+  cv::Mat texture (128, 2200, CV_8U);
+  cv::theRNG ().state = 3;
+  cv::randu (texture, 0, 255);
+  cv::GaussianBlur (texture, texture, {}, 1.5);
+  const cv::Mat right = texture (cv::Rect (kFar, 0, 1400, 128)).clone ();
+  cv::Mat left = texture (cv::Rect (0, 0, 1400, 128)).clone ();
+  cv::Mat shown = right (surface - cv::Point (kVeryNear, 0));
+  cv::randu (shown, 0, 255);
+  cv::GaussianBlur (shown, shown, {}, 1.5);
+  shown.copyTo (left (surface));
+  SemiGlobalMatcher matcher;
+  cv::Mat disparity;
+  matcher.match (left, right, 0, kAll, 2, disparity);
+  EXPECT_GT (share_right (disparity, {1020, 26, 180, 76}, kVeryNear), 0.95);
+  EXPECT_GT (share_right (disparity, {1250, 10, 140, 108}, kFar), 0.95);
+}
+
 TEST (SemiGlobalMatcher, rungs_agree_at_any_number_of_disparities)
 {
   const Pair pair (8);

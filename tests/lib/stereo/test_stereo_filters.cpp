@@ -173,6 +173,24 @@ TEST (StereoFilters, flying_pixels_are_those_that_few_neighbours_follow)
   }
 }
 
+TEST (StereoFilters, gaps_are_filled_within_a_part_and_not_between_parts)
+{
+  cv::Mat colour (60, 20, CV_8UC4, cv::Scalar::all (90));
+  const cv::Rect upper (0, 4, 20, 16), lower (4, 28, 16, 16), last (0, 44, 20, 16);
+  cv::Mat disparity (60, 20, CV_16S, cv::Scalar (kNone));
+  for (const cv::Rect &part : {upper, lower, last})
+    disparity (part).setTo (320);
+  disparity (cv::Rect (8, 10, 1, 5)).setTo (kNone);  /* in a part */
+  disparity (cv::Rect (10, 40, 1, 8)).setTo (kNone); /* across two that touch */
+  Tiles tiles;
+  tiles.set (std::vector{upper, lower, last}, 1);
+  DisparityFilter ().fill_gaps (colour, 30, kMin, tiles, disparity);
+  EXPECT_EQ (cv::countNonZero (disparity (cv::Rect (0, 20, 20, 8)) != kNone), 0);
+  EXPECT_EQ (cv::countNonZero (disparity (cv::Rect (0, 28, 4, 16)) != kNone), 0);
+  for (const cv::Rect &part : {upper, lower, last})
+    EXPECT_EQ (cv::countNonZero (disparity (part) != 320), 0);
+}
+
 TEST (StereoFilters, what_the_right_camera_cannot_see_goes)
 {
   cv::Mat disparity (1, 64, CV_16S, cv::Scalar (160));

@@ -218,8 +218,10 @@ RigCollector::update_if_complete ()
     return s;
   else if (!s.ok ()) /* two views with one id: a change that has not arrived completely */
     return {};
-  if (generation_ > 0 && info.fps_n == info_.fps_n && info.fps_d == info_.fps_d &&
-      encode_rig (info.rig) == encode_rig (info_.rig))
+  const auto is_of_rate = [this] (const StreamInfo &other) {
+    return std::int64_t{fps_n_} * other.fps_d == std::int64_t{other.fps_n} * fps_d_;
+  };
+  if (generation_ > 0 && is_of_rate (info_) && encode_rig (info.rig) == encode_rig (info_.rig))
     return {};
   info_ = std::move (info);
   generation_++;

@@ -144,9 +144,6 @@ struct CodedPixel {
   PixelState state = 0;
 
   [[nodiscard]] constexpr bool valid () const { return state != 0; }
-  [[nodiscard]] constexpr int origin () const { return static_cast<int> (state & 7); }
-  /** The origin, with predicted and corrected pixels as one. */
-  [[nodiscard]] constexpr int kind () const { return static_cast<int> (state >> 8 & 3); }
 };
 
 /** Limits of the components, and of depth, R, G, B. */
@@ -202,11 +199,6 @@ struct Neighbours {
   [[nodiscard]] std::size_t kinds () const
   {
     return (left.state + (states[0] << 2) + (states[1] << 4)) >> 8 & 63;
-  }
-  /** Sum over left, upper and upper-right. */
-  [[nodiscard]] Activity activities () const
-  {
-    return static_cast<Activity> ((left.state + states[0] + states[1]) >> 32);
   }
 };
 

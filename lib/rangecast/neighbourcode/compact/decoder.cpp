@@ -139,7 +139,7 @@ CompactDecoder::decode_run (PackedReader &slice_code, const CompactQuantisers &q
       continue;
     }
     const auto chosen =
-        static_cast<unsigned> (x > begin || n.any () ? code.choice<true> (n) : int{kCorrect});
+        static_cast<unsigned> (x > begin || n.any () ? code.choice (n) : int{kCorrect});
     if (chosen < kPredict) [[likely]] {
       const auto from = static_cast<std::ptrdiff_t> (x + chosen) - kTakeUpper;
       const std::uint64_t take_left = zero_mask (chosen);
@@ -244,7 +244,7 @@ bool
 CompactDecoder::decode_packed_row (PackedReader &code, const CompactQuantisers &quantisers,
     int columns, std::uint16_t *depth, Rgbx *colour, std::uint64_t &points)
 {
-  if (!decode_run_ends (code, columns))
+  if (!decode_valid_bits (code, columns))
     return false;
   return for_this_cpu ([&, width = static_cast<std::size_t> (columns)] {
     std::uint8_t *const kinds = kinds_.data () + 1;
@@ -268,30 +268,46 @@ CompactDecoder::decode_packed_row (PackedReader &code, const CompactQuantisers &
   });
 }
 
-/* The same as decode_runs(), with bits for the pixels. */
+/* Reads the ends of alternating runs from begin to end, as rule R21 has it; the first may be empty.
+ * @param expected  expected (x, value) is where the run from x on is expected to end
+ * @param use       use (x, end, value) is called for each run */
+template <class Code, class Expected, class Use>
+[[gnu::always_inline]] inline bool
+decode_runs (Code &code, int begin, int end, const Expected &expected, const Use &use)
+{
+  bool now = false;
+  for (int x = begin; x < end; now = !now) {
+    std::int32_t later = 0;
+    if (!code.run (now, later))
+      return false;
+    const int to = expected (x, now) + later;
+    if (to > end || to < x || (to == x && (x > begin || now)))
+      return false;
+    use (x, to, now);
+    x = to;
+  }
+  return true;
+}
+
+/* Reads which pixels of a row are valid as bits, and the ends of its runs. */
 template <class Code>
 bool
-CompactDecoder::decode_run_ends (Code &slice_code, int columns)
+CompactDecoder::decode_valid_bits (Code &slice_code, int columns)
 {
   Code code = slice_code;
   std::ranges::fill (valid_, std::uint32_t{0});
   runs_.clear ();
-  bool now = false;
-  for (int x = 0; x < columns; now = !now) {
-    std::int32_t later = 0;
-    if (!code.run (now, later))
-      return false;
-    const int end = bits_end (upper_valid_, x, now, columns) + later;
-    if (end > columns || end < x || (end == x && (x > 0 || now)))
-      return false;
-    if (now)
-      set_bits (valid_, x, end);
-    runs_.push_back (end);
-    x = end;
-  }
+  const bool good = decode_runs (
+      code, 0, columns,
+      [&] (int x, bool value) { return bits_end (upper_valid_, x, value, columns); },
+      [&] (int x, int end, bool value) {
+        if (value)
+          set_bits (valid_, x, end);
+        runs_.push_back (end);
+      });
   std::swap (valid_, upper_valid_);
   slice_code = code;
-  return true;
+  return good;
 }
 
 /* ---- entropy ---- */
@@ -349,7 +365,7 @@ bool
 CompactDecoder::decode_entropy_row (EntropyReader &code, const CompactQuantisers &quantisers,
     int columns, std::uint16_t *depth, Rgbx *colour, std::uint64_t &points)
 {
-  if (!decode_run_ends (code, columns))
+  if (!decode_valid_bits (code, columns))
     return false;
   const EntropyRow row = entropy_.row (runs_);
   has_unknown_ = false;
@@ -384,24 +400,15 @@ CompactDecoder::decode_entropy_row (EntropyReader &code, const CompactQuantisers
 
 /* Reads which pixels of a row are valid, and the ends of its runs. */
 bool
-CompactDecoder::decode_runs (PackedReader &code, int columns)
+CompactDecoder::decode_valid (PackedReader &code, int columns)
 {
-  const std::vector<std::uint8_t> &upper = upper_.valid ();
-  std::vector<std::uint8_t> &valid = row_.valid ();
   runs_.clear ();
-  bool now = false;
-  for (int x = 0; x < columns; now = !now) {
-    std::int32_t later = 0;
-    if (!code.run (now, later))
-      return false;
-    const int end = run_end (upper, x, now) + later;
-    if (end > columns || end < x || (end == x && (x > 0 || now)))
-      return false;
-    std::fill (valid.begin () + x, valid.begin () + end, std::uint8_t{now});
-    runs_.push_back (end);
-    x = end;
-  }
-  return true;
+  return decode_runs (
+      code, 0, columns, [&] (int x, bool value) { return run_end (upper_.valid (), x, value); },
+      [&] (int x, int end, bool value) {
+        std::fill_n (row_.valid ().begin () + x, end - x, std::uint8_t{value});
+        runs_.push_back (end);
+      });
 }
 
 /* Reads which pixels of a run of valid ones equal those of the earlier frame set. */
@@ -409,26 +416,19 @@ bool
 CompactDecoder::decode_earlier_runs (PackedReader &code, std::size_t begin, std::size_t end)
 {
   const std::span<const std::uint8_t> upper (upper_.earlier ().data (), end);
-  const int first = static_cast<int> (begin), last = static_cast<int> (end);
-  bool now = false;
-  for (int x = first; x < last; now = !now) {
-    std::int32_t later = 0;
-    if (!code.run (now, later))
-      return false;
-    const int to = run_end (upper, x, now) + later;
-    if (to > last || to < x || (to == x && (x > first || now)))
-      return false;
-    std::fill (row_.earlier ().begin () + x, row_.earlier ().begin () + to, std::uint8_t{now});
-    x = to;
-  }
-  return true;
+  return decode_runs (
+      code, static_cast<int> (begin), static_cast<int> (end),
+      [&] (int x, bool value) { return run_end (upper, x, value); },
+      [&] (int x, int to, bool value) {
+        std::fill_n (row_.earlier ().begin () + x, to - x, std::uint8_t{value});
+      });
 }
 
 bool
 CompactDecoder::decode_row (
     PackedReader &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points)
 {
-  if (!decode_runs (code, columns))
+  if (!decode_valid (code, columns))
     return false;
   std::size_t begin = 0;
   bool valid = false;

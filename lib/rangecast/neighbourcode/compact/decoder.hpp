@@ -32,14 +32,14 @@ private:
   bool load_earlier (
       Code &code, const SliceHeader &header, const DecoderReference &reference, int y);
   bool decode_earlier_runs (PackedReader &code, std::size_t begin, std::size_t end);
-  bool decode_runs (PackedReader &code, int columns);
+  bool decode_valid (PackedReader &code, int columns);
   bool decode_row (
       PackedReader &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points);
   [[gnu::always_inline]] bool decode_run (PackedReader &slice_code,
       const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
   [[gnu::always_inline]] bool decode_packed_run (
       PackedReader &slice_code, std::size_t begin, std::size_t end);
-  template <class Code> bool decode_run_ends (Code &code, int columns);
+  template <class Code> bool decode_valid_bits (Code &code, int columns);
   bool decode_packed_row (PackedReader &code, const CompactQuantisers &quantisers, int columns,
       std::uint16_t *depth, Rgbx *colour, std::uint64_t &points);
   template <bool Delta>

@@ -266,13 +266,13 @@ CompactEncoder::best_choice (
 /* ---- writing the symbols of a row ---- */
 
 /* Codes a pixel that no neighbour replaces. @return its state */
-template <class Code, bool Delta>
+template <class Code>
 inline PixelState
 CompactEncoder::code_full (Code &code, const Neighbours &n, Components residual)
 {
   const bool has_neighbour = n.any (), predicted = has_neighbour & is_zero (residual);
   result_.full_pixels++;
-  code.template full<Delta> (n, has_neighbour, residual);
+  code.full (n, has_neighbour, residual);
   const Components size = residual < 0 ? -residual : residual;
   size_sums_ += size + (size > 0);
   size_counts_ -= size > 0;
@@ -331,7 +331,7 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
     const std::uint64_t chosen = select (take_left, kTakeLeft, other);
     /* Write the choice, or the pixel in full. */
     if (chosen != kPredict) [[likely]] {
-      code.template choice<Delta> (n, static_cast<int> (chosen));
+      code.choice (n, static_cast<int> (chosen));
       const auto from = static_cast<std::ptrdiff_t> (x + other) - kTakeUpper;
       left_key = select (take_left, left_key, upper_keys[from]);
       left = {select (take_left, left.code, upper_codes[from]),
@@ -340,7 +340,7 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
     } else {
       if constexpr (!Best)
         full = make_full (own[x], n);
-      left.state = code_full<Code, Delta> (code, n, full.residual);
+      left.state = code_full (code, n, full.residual);
       left.code = full.code;
       left_key = full.key;
     }

@@ -74,7 +74,7 @@ private:
   template <class Code> void code_earlier_runs (Code &code, std::size_t begin, std::size_t end);
   template <class Code, bool Best, bool Delta>
   [[gnu::always_inline]] void code_run (Code &slice_code, std::size_t begin, std::size_t end);
-  template <class Code, bool Delta>
+  template <class Code>
   [[gnu::always_inline]] PixelState code_full (
       Code &code, const Neighbours &n, Components residual);
   template <class Code, bool Delta> Code begin_slice (int first_row);

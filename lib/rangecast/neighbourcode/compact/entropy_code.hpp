@@ -229,8 +229,8 @@ public:
 
   /** @name How CompactEncoder hands over pixels one by one: row() writes them @{ */
   void begin_row (const EntropyRow &row) { residual_ = row.residuals; }
-  template <bool Delta> void choice (const Neighbours &, int) {}
-  template <bool Delta> void full (const Neighbours &, bool has_neighbour, Components r)
+  void choice (const Neighbours &, int) {}
+  void full (const Neighbours &, bool has_neighbour, Components r)
   {
     if (!has_neighbour || !is_zero (r))
       *residual_++ = r;

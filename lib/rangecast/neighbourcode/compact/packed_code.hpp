@@ -174,13 +174,12 @@ public:
     for (const auto member : kMotionMembers)
       golomb (zigzag (m.*member - expected.*member), kMotionOrder);
   }
-  template <bool Delta> [[gnu::always_inline]] void choice (const Neighbours &n, int chosen)
+  [[gnu::always_inline]] void choice (const Neighbours &n, int chosen)
   {
     const PrefixCode code = tables_->choice[n.kinds ()][static_cast<std::size_t> (chosen)];
     put (code.bits, code.length);
   }
   /** A pixel that equals no neighbour; its residual may be 0 if there is a neighbour. */
-  template <bool Delta>
   [[gnu::always_inline]] void full (const Neighbours &n, bool has_neighbour, Components r)
   {
     const Components sizes = r < 0 ? -r : r;
@@ -422,7 +421,7 @@ public:
     return true;
   }
   /** A PixelChoice, or kNoSymbol for damage. */
-  template <bool Delta> [[gnu::always_inline]] int choice (const Neighbours &n)
+  [[gnu::always_inline]] int choice (const Neighbours &n)
   {
     return get (tables_->choice_of[n.kinds ()], kMaxChoiceBits);
   }
