@@ -27,17 +27,11 @@ split_audio_addresses () {
   done
 }
 
-# usage: audio_words TEXT DEFAULT option -> sets `words` to the elements that TEXT names in gst-launch-1.0 syntax
-audio_words () {
-  eval "words=($1)"
-  [ ${#words[@]} -gt 0 ] || die "$3: expected elements in gst-launch-1.0 syntax, e.g. $2"
-}
-
 # usage: send_audio SOURCE HOST:PORT[,HOST:PORT...] [option] -> sets `audio` to the elements from a microphone to UDP
 send_audio () {
   local words
   split_audio_addresses "$2" "${3:---audio}-to"
-  audio_words "$1" pulsesrc "${3:---audio}"
+  split_elements "$1" pulsesrc "${3:---audio}"
   audio=("${words[@]}" ! queue max-size-time=200000000 max-size-buffers=0 leaky=downstream ! audioconvert ! audioresample
     ! audio/x-raw,format=S16LE,rate=48000,channels=1)
   audio+=("${audio_filter[@]}" ! opusenc audio-type=voice tolerance=5000000 bitrate=32000

@@ -147,10 +147,10 @@ fi
 
 # Sets `source` to the elements that play a camera.
 describe_source () { # camera's number, WHAT
-  local name=$1 what=$2 type key file count=0
+  local name=$1 what=$2 type key file count=0 words
   if is_source "$what"; then
-    eval "source=($what)"
-    source+=(! videoconvert ! queue leaky=downstream max-size-buffers=2)
+    split_elements "$what" v4l2src "$what"
+    source=("${words[@]}" ! videoconvert ! queue leaky=downstream max-size-buffers=2)
   elif is_pattern "$what"; then
     case "${what##*.}" in
       jpg | jpeg | JPG | JPEG) type=image/jpeg ;;

@@ -190,10 +190,9 @@ case "$input" in
     cameras+=(cameras.left ! "$caps" ! queue max-size-buffers=2 ! depth.left
       cameras.right ! "$caps" ! queue max-size-buffers=2 ! depth.right) ;;
   side-by-side=* | top-bottom=*)
-    eval "cameras=(${input#*=})"
-    [ ${#cameras[@]} -gt 0 ] || die "--input: expected a source after ${input%%=*}="
+    split_elements "${input#*=}" "v4l2src after ${input%%=*}=" --input
     depth=("${depth[@]:0:2}" "packing=${input%%=*}" "${depth[@]:2}")
-    cameras+=(! queue max-size-buffers=2 ! depth.left) ;;
+    cameras=("${words[@]}" ! queue max-size-buffers=2 ! depth.left) ;;
   *)
     [ -d "$input" ] || die "--input: '$input' is not avatar, avatar=MODEL, range, cameras, cameras=LEFT,RIGHT, side-by-side=SOURCE, top-bottom=SOURCE or a folder of recorded pairs"
     read_side left

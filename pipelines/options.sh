@@ -14,6 +14,18 @@ die () { echo "$(basename "$0"): $*" >&2; exit 2; }
 # usage: need_option VALUE option: an option without a default
 need_option () { [ -n "$1" ] || die "$2 is required"; }
 
+# usage: split_words TEXT option: quotes and backslashes keep spaces within a word; nothing is expanded -> sets the array `words`
+split_words () {
+  mapfile -d '' words < <(xargs -r printf '%s\0' <<<"$1" 2>/dev/null)
+  wait $! || die "$2: a quote is not closed in '$1'"
+}
+
+# usage: split_elements TEXT example option -> sets the array `words` to the words of a gst-launch-1.0 string
+split_elements () {
+  split_words "$1" "$3"
+  [ ${#words[@]} -gt 0 ] || die "$3: expected elements in gst-launch-1.0 syntax, e.g. $2"
+}
+
 is_ipv4 () { # 192.0.2.1
   [[ "$1" =~ ^([0-9]{1,3})\.([0-9]{1,3})\.([0-9]{1,3})\.([0-9]{1,3})$ ]] &&
     [ "$((10#${BASH_REMATCH[1]}))" -le 255 ] && [ "$((10#${BASH_REMATCH[2]}))" -le 255 ] &&

@@ -45,7 +45,7 @@ if [ -n "$film" ] || ! has_display; then
     die "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --film without one"
 fi
 
-audio_words "$speaker" autoaudiosink --speaker
+split_elements "$speaker" autoaudiosink --speaker
 speech=$(speech_beside "$file")
 if [ -f "$speech" ] && [ "$speech" != "$file" ]; then
   audio=(filesrc "location=$speech" ! oggdemux ! opusparse)

@@ -85,7 +85,7 @@ sync=false
 if [ -n "$audio_port" ]; then
   need_audio_port "$audio_port" --audio
   [ "$audio_port" != "$listen" ] || die "--audio: port $audio_port is that of --listen"
-  audio_words "$speaker" autoaudiosink --speaker
+  split_elements "$speaker" autoaudiosink --speaker
   receive_audio "$audio_port" "$jitter" "$group"
   # Silence while no speech arrives, for which sinks and the muxer would wait.
   audio+=(! step.sink_1 step.src_1 "${hear_audio[@]}" ! mixer.

@@ -65,12 +65,12 @@ if [ ! -e "$rig" ]; then
 fi
 
 read -ra depth <<<"$depth"
-eval "source=($input)"
+split_elements "$input" v4l2src --input
 person=()
 [ "$learn" = 0 ] || person=(! roiextract "background-frames=$learn")
 sink=(! videoconvert ! autovideosink)
 [ -z "$png" ] || sink=(! videoconvert ! pngenc snapshot=true ! filesink "location=$png")
 [ -n "$png" ] || sink=(! queue "${sink[@]}")
-launch "${source[@]}" ! queue max-size-buffers=2 ! depth.left \
+launch "${words[@]}" ! queue max-size-buffers=2 ! depth.left \
   stereodepth name=depth "packing=$packing" "rig=$rig" "${depth[@]}" "${person[@]}" \
   ! rangerender ! video/x-raw,width=640,height=480 "${sink[@]}"

@@ -189,6 +189,18 @@ test_a_comma_too_many_is_named () {
   grep -q 'clients=127.0.0.1:6000,127.0.0.1:6001 .*port=7000 .*port=7001 ' parent.txt || fail "$(cat parent.txt)"
 }
 
+test_elements_in_options_are_words_and_not_run () {
+  local camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml --to 127.0.0.1:6000)
+  make_rig
+  export RANGECAST_LAUNCH=echo
+  expect_error "--input: a quote is not closed in 'v4l2src device=\"a'" "${camera[@]}" --input 'side-by-side=v4l2src device="a'
+  expect_error "--input: expected elements in gst-launch-1.0 syntax" "${camera[@]}" --input side-by-side=
+  expect_error "--audio: a quote is not closed" "${camera[@]}" --audio "pulsesrc device='a" --audio-to 127.0.0.1:7000
+  "${camera[@]}" --input 'side-by-side=filesrc location="a b" ! $(touch run) ! `touch run`; touch run ! *' >words.txt
+  [ ! -e run ] || fail "the shell has run what the option holds"
+  grep -qF 'filesrc location=a b ! $(touch run) ! `touch run`; touch run ! *' words.txt || fail "$(cat words.txt)"
+}
+
 # rtpsession keeps every packet that it sends until transport-wide feedback comes; the parent has no use for that.
 test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
   local camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml --input range --to 127.0.0.1:6000 --feedback 5100)
