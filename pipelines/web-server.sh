@@ -4,6 +4,7 @@
 set -euo pipefail
 source "$(dirname "$0")/env.sh"
 source "$(dirname "$0")/rtp.sh"
+source "$(dirname "$0")/audio.sh"
 
 usage () {
   cat <<'END'
@@ -26,12 +27,14 @@ usage: web-server.sh [options]                        a built-in scene
                   works better on most links: see docs/guide/web.md
   --stun HOST:PORT, --turn USER:PASSWORD@HOST:PORT  with --webrtc: servers for clients behind NAT, who learn the password
   --jitter MS     with --listen: jitter buffer (default 30)
+  --audio PORT    with --listen: speech to hear beside the picture, as viewer-host.sh receives it
+  --clock CLOCK   with --audio: HOST:PORT where the parent publishes the camera hosts' clock (default system: they run on this machine)
   --multicast GROUP, --interface IF  with --listen: as in viewer-host.sh
 END
   rtp_usage_receiver
 }
 
-listen= file= jitter= group= port=8080 address=127.0.0.1 token= token_file= anonymous= certificate= private_key= title= stats= origins= loop= window= webrtc= stun= turn= string=()
+listen= file= audio_port= clock= jitter= group= port=8080 address=127.0.0.1 token= token_file= anonymous= certificate= private_key= title= stats= origins= loop= window= webrtc= stun= turn= string=()
 while [ $# -gt 0 ]; do
   option=$1
   [ $# = 1 ] || [ -n "$2" ] || die "option $1: expected a value, got ''"
@@ -59,6 +62,8 @@ while [ $# -gt 0 ]; do
     --stats) stats=${2:-}; shift ;;
     --origins) origins=${2:-}; shift ;;
     --jitter) jitter=${2:-}; shift ;;
+    --audio) audio_port=${2:-}; shift ;;
+    --clock) clock=${2:-}; shift ;;
     --multicast) group=${2:-}; shift ;;
     --interface) rtp_interface=${2:-}; shift ;;
     --) shift; string=("$@"); [ $# -gt 0 ] || die "--: expected a launch string"; break ;;
@@ -73,6 +78,9 @@ need_number "$port" --port 0 65535
 [ -z "$stats" ] || need_number "$stats" --stats 1 65535
 [ -z "$group" ] || need_group "$group"
 [ -z "$group$rtp_interface$rtp_fec$rtp_rtx$rtp_key$rtp_feedback$jitter" ] || [ -n "$listen" ] || die "options of RTP: expected with --listen"
+[ -z "$audio_port" ] || [ -n "$listen" ] || die "--audio: expected with --listen"
+[ -z "$clock" ] || [ -n "$audio_port" ] || die "--clock: expected with --audio"
+[ "${clock:-system}" = system ] || split_address "$clock" --clock
 [ -z "$token" ] || [[ "$token" =~ ^[A-Za-z0-9._~-]+$ ]] || die "--token: expected letters, digits and . _ ~ -, which a link may have"
 [ -z "$token$token_file" ] || [ -z "$anonymous" ] || die "--anonymous: expected without --token and --token-file"
 [ -z "$token" ] || [ -z "$token_file" ] || die "expected one of --token and --token-file"
@@ -106,13 +114,20 @@ if [ -n "$stats" ]; then
 fi
 
 # What comes from the network is sent at once; a recording and the scene in their own time.
-sync=true
+sync=true audio=()
 if [ -n "$listen" ]; then
   need_number "$listen" --listen 1 65535
   { [ -z "$file" ] && [ ${#string[@]} = 0 ]; } || die "expected one of --listen, --file and a launch string"
   rtp_check receiver
   receive_rtp 0 "$listen" "${jitter:-30}" 4194304 "$group"
   source=("${rtp[@]}") sync=false
+  if [ -n "$audio_port" ]; then
+    need_audio_port "$audio_port" --audio
+    [ "$audio_port" != "$listen" ] || die "--audio: port $audio_port is that of --listen"
+    receive_audio "$audio_port" "${jitter:-30}" "$group"
+    audio+=(! web.audio) # the page plays it when it shows what was captured at the same time
+    audio_clock "${clock:-system}"
+  fi
 elif [ -n "$file" ]; then
   [ ${#string[@]} = 0 ] || die "expected one of --listen, --file and a launch string"
   source=(filesrc "location=$file" ! neighbourcodeparse)
@@ -145,7 +160,7 @@ print_links () {
 }
 
 # rangecast-run says where it listens.
-launch "${source[@]}" ! rangewebsink name=web "sync=$sync" "${settings[@]}" > >(
+launch "${source[@]}" ! rangewebsink name=web "sync=$sync" "${settings[@]}" "${audio[@]}" > >(
   trap '' INT TERM HUP # ends at the end of its input
   while IFS= read -r line; do
     case "$line" in

@@ -273,6 +273,10 @@ decode_frame_set (
   DecoderResult result;
   const Status status = rangecast::guarded ("decoder",
       [&] { return decode_into (priv, units, buffer, older, settings.n_threads, result); });
+  if (!status.ok ()) {
+    gst_buffer_unref (buffer);
+    return gst_range_flow_return (GST_ELEMENT (self), status);
+  }
   {
     std::lock_guard guard (priv->lock);
     priv->frames++;
@@ -290,10 +294,6 @@ decode_frame_set (
         "%" G_GUINT64_FORMAT " pixels were not received, %" G_GUINT64_FORMAT
         " refer to pixels that were not",
         guint64{result.missing_pixels}, guint64{result.unknown_pixels});
-  if (!status.ok ()) {
-    gst_buffer_unref (buffer);
-    return gst_range_flow_return (GST_ELEMENT (self), status);
-  }
   GST_LOG_OBJECT (self, "decoded %" G_GUINT64_FORMAT " slices of %zu views to %" GST_PTR_FORMAT,
       guint64{result.slices}, priv->decoder.views ().size (), buffer);
   copy_metadata (self, input, buffer);
@@ -328,7 +328,7 @@ is_same_frame_set (GstBuffer *a, GstBuffer *b)
   return GST_BUFFER_PTS (a) == GST_BUFFER_PTS (b);
 }
 
-static void
+static Status
 append_slice (GstNeighbourCodeDec *self, GstBuffer *input, std::span<const Bytes> units)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
@@ -340,6 +340,7 @@ append_slice (GstNeighbourCodeDec *self, GstBuffer *input, std::span<const Bytes
     else
       GST_DEBUG_OBJECT (self, "dropping a slice: the access unit is too long");
   priv->complete = GST_BUFFER_FLAG_IS_SET (input, GST_BUFFER_FLAG_MARKER);
+  return {};
 }
 
 static GstFlowReturn
@@ -356,8 +357,9 @@ handle_input (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **output)
   GstFlowReturn flow = GST_FLOW_OK;
   if (priv->first && !is_same_frame_set (priv->first, input))
     flow = decode_slices (self, output);
-  append_slice (self, input, map.pieces ());
-  return flow;
+  const Status status =
+      rangecast::guarded ("decoder", [&] { return append_slice (self, input, map.pieces ()); });
+  return status.ok () ? flow : gst_range_flow_return (GST_ELEMENT (self), status);
 }
 
 /* The base class calls this until there is no output: one slice may end two frame sets, the one

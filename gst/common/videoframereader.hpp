@@ -5,6 +5,7 @@
 #include <gst/video/video.h>
 
 #include <rangecast/geometry/range_image.hpp>
+#include <utility>
 
 /** propose_allocation() of an aggregator that reads its input with VideoFrameReader: any stride and
  *  plane offset. */
@@ -25,6 +26,7 @@ public:
   ~VideoFrameReader () { reset (); }
   void reset ()
   {
+    close ();
     if (converter_)
       gst_video_converter_free (converter_);
     converter_ = nullptr;
@@ -48,22 +50,26 @@ public:
     return converter_ != nullptr;
   }
   /** Maps a buffer; view() is valid until close().
-   *  @return false, and there is nothing to close, if the buffer is smaller than the format needs
-   */
+   *  @return false if the buffer is smaller than the format needs */
   bool open (GstBuffer *buffer)
   {
+    close ();
     if (!converter_)
-      return gst_video_frame_map (&frame_, &info_, buffer, GST_MAP_READ);
+      return is_open_ = gst_video_frame_map (&frame_, &info_, buffer, GST_MAP_READ);
     GstVideoFrame from;
     if (!gst_video_frame_map (&from, &info_, buffer, GST_MAP_READ))
       return false;
-    const bool mapped = gst_video_frame_map (&frame_, &rgbx_, converted_, GST_MAP_READWRITE);
-    if (mapped)
+    is_open_ = gst_video_frame_map (&frame_, &rgbx_, converted_, GST_MAP_READWRITE);
+    if (is_open_)
       gst_video_converter_frame (converter_, &from, &frame_);
     gst_video_frame_unmap (&from);
-    return mapped;
+    return is_open_;
   }
-  void close () { gst_video_frame_unmap (&frame_); }
+  void close ()
+  {
+    if (std::exchange (is_open_, false))
+      gst_video_frame_unmap (&frame_);
+  }
   [[nodiscard]] rangecast::ImageView<const rangecast::Rgbx> view () const
   {
     return {static_cast<const rangecast::Rgbx *> (GST_VIDEO_FRAME_PLANE_DATA (&frame_, 0)),
@@ -76,4 +82,5 @@ private:
   GstVideoConverter *converter_ = nullptr;
   GstBuffer *converted_ = nullptr;
   GstVideoFrame frame_ = {};
+  bool is_open_ = false;
 };

@@ -136,7 +136,7 @@ struct GstStereoDepthPrivate {
   bool negotiate_third = false; /* third has new caps: negotiate with its next image */
   rangecast::StereoDepth core;
   GstBufferPool *pool = nullptr;
-  bool discont = false;                        /* a pair was dropped */
+  bool discont = false;                        /* images were dropped since the last pair */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE; /* of the last left image that was matched */
   GstClockTime processing_time = 0;            /* mean time to match a pair, at most `latency` */
   guint64 dropped_before_pair = 0;             /* images without partner up to the last pair */
@@ -244,8 +244,12 @@ dequeue_pair (GstStereoDepth *self)
   WaitingPair &pair = priv->pair;
   const GstFlowReturn flow =
       priv->matcher->pop_pair (frame_duration (priv->inputs[kLeft].info), pair.buffers);
+  const bool is_first_after_drop =
+      priv->matcher->dropped_first () + priv->matcher->dropped_second () >
+      priv->dropped_before_pair;
   warn_if_unpaired (self, flow == GST_FLOW_OK);
   if (flow == GST_FLOW_OK) {
+    priv->discont |= is_first_after_drop;
     pair.running = gstrange::running_time_of (priv->left, pair.buffers.first);
     pair.capture = gstrange::capture_time_of (priv->left, pair.buffers.first, is_live (self));
   }
@@ -382,12 +386,16 @@ negotiate (GstStereoDepth *self, bool has_third)
       GST_WARNING_OBJECT (self, "pad %s: frames without caps", kPadNames[side]);
       return GST_FLOW_NOT_NEGOTIATED;
     }
-  if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self),
-          rangecast::guarded ("stereo", [&] { return configure_core (priv, has_third); }));
-      flow != GST_FLOW_OK)
-    return flow;
-  const GstVideoInfo &left = *priv->inputs[kLeft].info;
-  const auto info = gstrange::make_info ({{priv->core.range_view ()}}, left.fps_n, left.fps_d);
+  gstrange::RangeInfo info;
+  const Status configured = rangecast::guarded ("stereo", [&] {
+    const Status status = configure_core (priv, has_third);
+    const GstVideoInfo &left = *priv->inputs[kLeft].info;
+    if (status.ok ())
+      info = gstrange::make_info ({{priv->core.range_view ()}}, left.fps_n, left.fps_d);
+    return status;
+  });
+  if (!configured.ok ())
+    return gst_range_flow_return (GST_ELEMENT (self), configured);
   GstCaps *caps = gstrange::make_range_caps (info);
   GST_INFO_OBJECT (self, "output caps %" GST_PTR_FORMAT, caps);
   const View &view = info.rig.views.front ();
@@ -456,6 +464,8 @@ match_images (GstStereoDepth *self, bool with_third, GstBuffer *output)
   if (!frame.status ().ok ())
     return frame.status ();
   const Status status = priv->core.match (frame.views ()[0]);
+  if (!status.ok ())
+    return status;
   const GstClockTime elapsed = gst_util_get_timestamp () - begin;
   GST_LOG_OBJECT (self, "pair at %" GST_TIME_FORMAT ": matched %dx%d at (%d, %d)%s in %.1f ms",
       GST_TIME_ARGS (priv->pair.running), roi.width, roi.height, roi.x, roi.y,
@@ -465,7 +475,7 @@ match_images (GstStereoDepth *self, bool with_third, GstBuffer *output)
   priv->counters.restricted_frames += restricted;
   priv->counters.third_frames += with_third;
   priv->counters.match_time += elapsed;
-  return status;
+  return {};
 }
 
 /* @param third  may be null */
@@ -474,31 +484,25 @@ match_pair (GstStereoDepth *self, GstBuffer *third, GstBuffer *output)
 {
   GstStereoDepthPrivate *priv = self->priv;
   GstBuffer *buffers[] = {priv->pair.buffers.first, priv->pair.buffers.second, third};
-  Status status;
-  int open = 0;
-  for (; open < 3 && buffers[open]; open++)
-    if (!priv->inputs[open].reader.open (buffers[open])) {
-      status = {StatusCode::kBadData,
-          std::string ("pad ") + kPadNames[open] + ": a buffer is smaller than its caps require"};
-      break;
-    }
-  if (status.ok ())
-    status = match_images (self, third != nullptr, output);
-  while (open-- > 0)
-    priv->inputs[open].reader.close ();
-  return status;
+  for (int i = 0; i < 3 && buffers[i]; i++)
+    if (!priv->inputs[i].reader.open (buffers[i]))
+      return {StatusCode::kBadData,
+          std::string ("pad ") + kPadNames[i] + ": a buffer is smaller than its caps require"};
+  return match_images (self, third != nullptr, output);
 }
 
-/* What was learnt from earlier images is of no use where the stream is broken: where the left
- * image's time goes back, or on by more than a second after a discontinuity. A lost image or two
- * are not that much; matching everything again would lose a host under load even more. */
+/* Forgets earlier images where time goes back, or on by more than a second and two frames. Shorter
+ * gaps keep the history: matching whole images again would make an overloaded host lose more
+ * frames. */
 static void
 reset_after_break (GstStereoDepthPrivate *priv)
 {
-  const GstBuffer *left = priv->pair.buffers.first;
-  const GstClockTime before = priv->last_pts, now = priv->last_pts = GST_BUFFER_PTS (left);
+  const GstClockTime before = priv->last_pts, now = GST_BUFFER_PTS (priv->pair.buffers.first),
+                     duration = frame_duration (priv->inputs[kLeft].info);
+  priv->last_pts = now;
+  const GstClockTime limit = GST_SECOND + (GST_CLOCK_TIME_IS_VALID (duration) ? 2 * duration : 0);
   if (GST_CLOCK_TIME_IS_VALID (before) && GST_CLOCK_TIME_IS_VALID (now) &&
-      (now < before || (GST_BUFFER_IS_DISCONT (left) && now - before > GST_SECOND)))
+      (now < before || now - before > limit))
     priv->core.reset ();
 }
 
@@ -516,6 +520,8 @@ push_pair (GstStereoDepth *self, GstBuffer *third)
   reset_after_break (priv);
   flow = gst_range_flow_return (GST_ELEMENT (self),
       rangecast::guarded ("stereo", [&] { return match_pair (self, third, output); }));
+  for (Input &input : priv->inputs)
+    input.reader.close ();
   if (flow != GST_FLOW_OK) {
     gst_buffer_unref (output);
     return flow;

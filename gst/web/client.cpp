@@ -422,6 +422,14 @@ Client::send (const AudioPacket &packet)
 }
 
 void
+Client::set_audio (bool available)
+{
+  if (entered_ && hello_.audio)
+    send_text (
+        std::string ("{\"type\":\"audio\",\"available\":") + (available ? "true}" : "false}"));
+}
+
+void
 Client::end ()
 {
   rig_units_.reset ();

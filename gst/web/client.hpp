@@ -30,7 +30,7 @@ struct FrameSet {
 
 /** A packet of Opus (RFC 6716) on its way to the clients that want to hear. */
 struct AudioPacket {
-  BytesPtr data; ///< null: none
+  BytesPtr data;
   guint32 number;
   gint64 captured_us; ///< on g_get_monotonic_time()
 };
@@ -67,6 +67,8 @@ public:
   void send (const AudioPacket &packet);
   /** The stream has ended; what is sent next begins another one. */
   void end ();
+  /** Tells a client that wants to hear whether there is speech. */
+  void set_audio (bool available);
   /** Sends a text message, if the client was let in. */
   void send_text (const std::string &json);
   void close (gushort code, const std::string &reason);

@@ -104,7 +104,7 @@ gst_range_web_sink_set_caps (GstBaseSink *base, GstCaps *caps)
   priv->reporter.set_views (info.rig);
   std::vector<guint8> rig;
   rangecast::write_rig_units ({info.rig, info.fps_n, info.fps_d}, rig);
-  current_server (priv)->set_rig (std::string (rig.begin (), rig.end ()));
+  current_server (priv)->stream ().set_rig (std::string (rig.begin (), rig.end ()));
   return TRUE;
 }
 
@@ -144,7 +144,7 @@ gst_range_web_sink_render (GstBaseSink *base, GstBuffer *buffer)
   gst_buffer_extract_dup (buffer, 0, gst_buffer_get_size (buffer), &units, &size);
   GST_LOG_OBJECT (base, "%" G_GSIZE_FORMAT " bytes of %" GST_TIME_FORMAT, size,
       GST_TIME_ARGS (GST_BUFFER_PTS (buffer)));
-  current_server (priv)->push (web::BytesPtr (g_bytes_new_take (units, size)),
+  current_server (priv)->stream ().push (web::BytesPtr (g_bytes_new_take (units, size)),
       !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT), is_discontinuity (priv, buffer),
       monotonic_us (GST_ELEMENT (base), capture_time_of (buffer)));
   priv->reporter.passed (GST_ELEMENT (base), buffer);
@@ -159,14 +159,14 @@ gst_range_web_sink_event (GstBaseSink *base, GstEvent *event)
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
     priv->last_pts = GST_CLOCK_TIME_NONE;
     if (const auto server = current_server (priv))
-      server->flush ();
+      server->stream ().flush ();
   }
   /* waits until the last frame set was rendered */
   const gboolean handled =
       GST_BASE_SINK_CLASS (gst_range_web_sink_parent_class)->event (base, event);
   if (ended && handled) {
     if (const auto server = current_server (priv))
-      server->end ();
+      server->stream ().end ();
     priv->reporter.finish ();
   }
   return handled;
@@ -201,7 +201,7 @@ gst_range_web_sink_audio_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
   if (!server)
     return GST_FLOW_FLUSHING;
   if (captured_us >= 0)
-    server->push_audio (std::move (packet), captured_us);
+    server->stream ().push_audio (std::move (packet), captured_us);
   else
     GST_DEBUG_OBJECT (parent, "dropping a packet of speech: it is not known when it was captured");
   return GST_FLOW_OK;
@@ -233,7 +233,7 @@ gst_range_web_sink_request_pad (
   gst_pad_set_active (pad, GST_STATE (element) > GST_STATE_READY);
   gst_element_add_pad (element, pad);
   if (const auto server = current_server (priv))
-    server->set_audio (true);
+    server->stream ().set_audio (true);
   return pad;
 }
 
@@ -243,7 +243,7 @@ gst_range_web_sink_release_pad (GstElement *element, GstPad *pad)
   gst_pad_set_active (pad, FALSE);
   gst_element_remove_pad (element, pad);
   if (const auto server = current_server (GST_RANGE_WEB_SINK (element)->priv))
-    server->set_audio (false);
+    server->stream ().set_audio (false);
 }
 
 /* On the server's thread, which does not wait for what upstream does with the event. */
@@ -301,7 +301,7 @@ gst_range_web_sink_start (GstElement *element)
       gst_range_flow_return (element, status) != GST_FLOW_OK)
     return false;
   if (GstPad *audio = gst_element_get_static_pad (element, "audio")) {
-    server->set_audio (true);
+    server->stream ().set_audio (true);
     gst_object_unref (audio);
   }
   {

@@ -20,9 +20,6 @@ namespace web {
 
 namespace {
 
-/** Frame sets that wait for the server's thread; more would be late. */
-constexpr std::ptrdiff_t kMaxQueue = 8;
-constexpr std::size_t kMaxAudioQueue = 100; /* items, when a packet of speech comes */
 constexpr guint kTick_ms = 1000, kStats_ms = 250;
 /** A client that reads nothing for so long is disconnected. */
 constexpr gint kMaxUnread_ms = 30000;
@@ -136,7 +133,8 @@ add_timer (GMainContext *context, guint interval_ms, GSourceFunc call, gpointer 
 Server::Server (GstObject *element, Settings settings, RequestKey request_key)
     : element_ (element), settings_ (std::move (settings)), request_key_ (request_key),
       context_ (g_main_context_new ()), loop_ (g_main_loop_new (context_, FALSE)),
-      page_ (settings_.root), key_requested_us_ (g_get_monotonic_time () - G_MAXINT32)
+      page_ (settings_.root), key_requested_us_ (g_get_monotonic_time () - G_MAXINT32),
+      stream_ (element, context_, [this] (const StreamItem &item) { deliver (item); })
 {
 }
 
@@ -630,7 +628,7 @@ Server::welcome ()
 {
   std::string json = "{\"type\":\"welcome\",\"version\":" + std::to_string (kProtocolVersion) +
                      ",\"window\":" + std::to_string (settings_.window) +
-                     ",\"audio\":" + (has_audio_ ? "true" : "false") +
+                     ",\"audio\":" + (stream_.has_audio () ? "true" : "false") +
                      ",\"rtc\":" + (rtc_ ? "true" : "false");
   if (rtc_)
     json += ",\"iceServers\":" + ice_servers (settings_);
@@ -689,93 +687,19 @@ Server::tick ()
 /* ---- the stream ---- */
 
 void
-Server::set_rig (std::string rig_units)
+Server::deliver (const StreamItem &item)
 {
-  std::lock_guard guard (lock_);
-  rig_units_ = std::make_shared<const std::string> (std::move (rig_units));
-}
-
-void
-Server::push (BytesPtr units, bool key, bool discontinuity, gint64 captured_us)
-{
-  std::lock_guard guard (lock_);
-  discontinuity |= std::exchange (flushed_, false);
-  counters_.frame_sets++;
-  const guint32 number = next_number_++;
-  const auto is_frame_set = [] (const Item &item) { return !item.is_end && !item.audio.data; };
-  if (std::ranges::count_if (queue_, is_frame_set) >= kMaxQueue) {
-    GST_DEBUG_OBJECT (element_, "the server is busy; dropping frame set %u", number);
-    return;
+  for (auto at = clients_.begin (); at != clients_.end ();) {
+    Client &client = **at++; /* it may leave */
+    if (const auto frame_set = std::get_if<FrameSet> (&item))
+      client.send (*frame_set);
+    else if (const auto packet = std::get_if<AudioPacket> (&item))
+      client.send (*packet);
+    else if (const auto speech = std::get_if<SpeechChange> (&item))
+      client.set_audio (speech->available);
+    else
+      client.end ();
   }
-  queue_.push_back ({{std::move (units), rig_units_, key, discontinuity, number, captured_us}});
-  wake ();
-}
-
-void
-Server::push_audio (BytesPtr packet, gint64 captured_us)
-{
-  std::lock_guard guard (lock_);
-  const guint32 number = next_audio_++;
-  if (queue_.size () >= kMaxAudioQueue) {
-    GST_DEBUG_OBJECT (element_, "the server is busy; dropping packet %u of speech", number);
-    return;
-  }
-  queue_.push_back ({{}, false, {std::move (packet), number, captured_us}});
-  wake ();
-}
-
-void
-Server::end ()
-{
-  std::lock_guard guard (lock_);
-  queue_.push_back ({{}, true});
-  wake ();
-}
-
-void
-Server::flush ()
-{
-  std::lock_guard guard (lock_);
-  std::erase_if (queue_, [] (const Item &item) { return !item.is_end && !item.audio.data; });
-  flushed_ = true;
-}
-
-/* With the lock held. Not g_main_context_invoke(), which may call at once. */
-void
-Server::wake ()
-{
-  if (std::exchange (woken_, true))
-    return;
-  GSource *source = g_idle_source_new ();
-  const auto call = [] (gpointer self) -> gboolean {
-    static_cast<Server *> (self)->deliver ();
-    return G_SOURCE_REMOVE;
-  };
-  g_source_set_priority (source, G_PRIORITY_DEFAULT);
-  g_source_set_callback (source, call, this, nullptr);
-  g_source_attach (source, context_);
-  g_source_unref (source);
-}
-
-void
-Server::deliver ()
-{
-  std::deque<Item> items;
-  {
-    std::lock_guard guard (lock_);
-    items.swap (queue_);
-    woken_ = false;
-  }
-  for (const Item &item : items)
-    for (auto at = clients_.begin (); at != clients_.end ();) {
-      Client &client = **at++; /* it may leave */
-      if (item.is_end)
-        client.end ();
-      else if (item.audio.data)
-        client.send (item.audio);
-      else
-        client.send (item.frame_set);
-    }
 }
 
 /* ---- statistics ---- */
@@ -813,7 +737,9 @@ Server::Counters
 Server::counters ()
 {
   std::lock_guard guard (lock_);
-  return counters_;
+  Counters counters = counters_;
+  counters.frame_sets = stream_.frame_sets ();
+  return counters;
 }
 
 void

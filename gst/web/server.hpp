@@ -5,7 +5,6 @@
 #include <libsoup/soup.h>
 
 #include <atomic>
-#include <deque>
 #include <functional>
 #include <list>
 #include <memory>
@@ -20,12 +19,13 @@
 #include "pagefiles.hpp"
 #include "settings.hpp"
 #include "statsboard.hpp"
+#include "streamqueue.hpp"
 
 namespace web {
 
 /** Serves the page, and frame sets to its clients, on a thread and a main context of its own.
  *
- *  Locking: `lock_` guards what the streaming thread and the server's thread share. It is never
+ *  Locking: `lock_` guards counters and statistics, which any thread reads. It is never
  *  held while anything is sent, and the server's thread holds no lock when it calls `request_key`.
  */
 class Server : private Client::Host {
@@ -36,8 +36,6 @@ public:
 
   /** @param element  for the log and `request_key`; outlives the server */
   Server (GstObject *element, Settings settings, RequestKey request_key);
-  /** Sets whether the welcome message announces speech. Any thread. */
-  void set_audio (bool has_audio) { has_audio_ = has_audio; }
   /** Waits until stop() is complete: clients have half a second to confirm that they are closed. */
   ~Server () override;
   Server (const Server &) = delete;
@@ -52,16 +50,8 @@ public:
   /** Address of the page. After start(). */
   [[nodiscard]] const std::string &url () const { return url_; }
 
-  /** @name From the streaming thread; they do not wait @{ */
-  void set_rig (std::string rig_units);
-  /** Takes the frame set; the server numbers it. @param captured_us, discontinuity  see FrameSet */
-  void push (BytesPtr units, bool key, bool discontinuity, gint64 captured_us);
-  /** Takes a packet of speech. @param captured_us  on g_get_monotonic_time() */
-  void push_audio (BytesPtr packet, gint64 captured_us);
-  void end ();
-  /** Drops the frame sets that wait; the next one does not continue them. */
-  void flush ();
-  /** @} */
+  /** What clients are sent. */
+  [[nodiscard]] StreamQueue &stream () { return stream_; }
 
   struct Counters {
     guint clients = 0;
@@ -76,11 +66,6 @@ public:
 private:
   /** Connections of WebSockets that are not closed yet; may outlive the server. */
   using ConnectionCount = std::shared_ptr<std::atomic<int>>;
-  struct Item { /* a frame set, a packet of speech, or the end of the stream */
-    FrameSet frame_set;
-    bool is_end = false;
-    AudioPacket audio{};
-  };
 
   Admission admit (
       const std::string &address, const std::string &token, std::string &name) override;
@@ -99,8 +84,7 @@ private:
   void run_for (gint64 time_us, const std::function<bool ()> &happened);
   void stop_listening ();
   void close_all ();
-  void wake ();
-  void deliver ();
+  void deliver (const StreamItem &item);
   void upgrade (SoupServerMessage *message, const char *path);
   void accept (SoupServerMessage *message);
   void drop_waiting_client ();
@@ -128,19 +112,14 @@ private:
   std::list<std::unique_ptr<Client>> clients_;
   ConnectionCount connections_ = std::make_shared<std::atomic<int>> (0);
   bool rtc_ = false; /* data channels are offered */
-  std::atomic<bool> has_audio_ = false;
-  PageFiles page_; /* server's thread */
+  PageFiles page_;   /* server's thread */
   gint64 key_requested_us_;
   guint64 gone_bytes_ = 0; /* of clients that left */
   GuessLimiter guesses_;
   StatsBoard board_;
+  StreamQueue stream_;
 
   std::mutex lock_;
-  std::deque<Item> queue_;
-  bool woken_ = false;
-  bool flushed_ = false; /* since the last frame set */
-  std::shared_ptr<const std::string> rig_units_;
-  guint32 next_number_ = 0, next_audio_ = 0;
   Counters counters_;
   std::vector<GstStructure *> client_stats_;
 };

@@ -21,6 +21,7 @@ export class Connection {
   //   speech (packet): see readSpeech (), with captured in ms of this clock
   //   say (text, kind): a sentence about the connection; '' removes it
   //   state (name): connecting, waiting (for frame sets), receiving, ended, closed, token
+  //   audio (available): speech may be heard, or no longer
   //   welcome (message), stats (rows), signal (message): from the server
   constructor ({ url, token, want = ['stream'], on }) {
     Object.assign (this, { url, token, want, on });
@@ -104,6 +105,8 @@ export class Connection {
       this.giveUp (`The server sent '${type}' before 'welcome'.`);
     else if (type === 'pong' && Number.isFinite (message.time) && Number.isFinite (message.server))
       this.clock.add (message.time, this.now (), message.server / 1000);
+    else if (type === 'audio')
+      this.emit ('audio', message.available === true);
     else if (type === 'end')
       this.end ();
     else if (type === 'stats' && Array.isArray (message.rows))
@@ -121,6 +124,7 @@ export class Connection {
     this.said = null; // hides whatever was said before
     this.say ('');
     this.emit ('welcome', message);
+    this.emit ('audio', message.audio === true);
     this.measureClock ();
     this.watchSilence ();
   }

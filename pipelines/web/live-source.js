@@ -20,7 +20,8 @@ export class LiveSource {
       frameSet: (frameSet) => this.receive (frameSet),
       say: (text, kind) => stage.say (text, kind),
       state: (name) => this.handleState (name),
-      welcome: (message) => stage.post ({ type: 'welcome', audio: message.audio === true, rtc: message.rtc === true, iceServers: message.iceServers }),
+      audio: (available) => stage.post ({ type: 'audio', available }),
+      welcome: (message) => stage.post ({ type: 'welcome', rtc: message.rtc === true, iceServers: message.iceServers }),
       signal: (message) => stage.post ({ type: 'signal', message }),
     } });
   }

@@ -100,8 +100,8 @@ class Page {
       this.closeChannel ();
   }
   hear ({ packet }) { this.speech.add (packet); }
-  welcome ({ audio, rtc, iceServers }) {
-    element ('sound').hidden = !audio;
+  audio ({ available }) { element ('sound').hidden = !available; }
+  welcome ({ rtc, iceServers }) {
     if (rtc && parameters.get ('transport') === 'webrtc')
       this.openChannel (iceServers, 3);
   }

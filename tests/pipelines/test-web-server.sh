@@ -46,8 +46,8 @@ stop_server () {
   trap - EXIT
 }
 
-# usage: watch URL TOKEN FRAME-SETS [WANT [CA-FILE]]: a client that prints the server's texts and "frame sets N" and ends with
-# that many, or with the server's texts if that is 0; with CLOSED and its code if the server refuses it.
+# usage: watch URL TOKEN FRAME-SETS [WANT [CA-FILE]]: a client that prints the server's texts, "frame sets N" and, if speech came,
+# "speech N" and by how many ms the latest was captured after the latest frame set; it ends with so many frame sets, or with the server's texts if that is 0; with CLOSED and its code if the server refuses it.
 watch () {
   timeout 40 python3 - "$@" <<'END'
 import base64, json, os, socket, ssl, struct, sys, urllib.parse
@@ -66,9 +66,9 @@ while file.readline().strip():
 def send(message):
     text = json.dumps(message).encode()
     stream.sendall(struct.pack("!BBH4x", 0x81, 0xfe, len(text)) + text if len(text) > 125 else struct.pack("!BB4x", 0x81, 0x80 | len(text)) + text)
-hello = {"type": "hello", "version": 1, "want": [sys.argv[4] if len(sys.argv) > 4 else "stream"]}
+hello = {"type": "hello", "version": 1, "want": (sys.argv[4] if len(sys.argv) > 4 else "stream").split(",")}
 send(hello | {"token": token} if token else hello)
-count = 0
+count = speech = heard = seen = 0
 while True:
     first, size = file.read(2)
     if size >= 126:
@@ -78,8 +78,13 @@ while True:
         print(data.decode(), flush=True)
         if most == 0 and '"welcome"' not in data.decode() or '"end"' in data.decode():
             break
+    elif first == 0x82 and data[0] == 2:
+        speech += 1
+        heard = struct.unpack_from("<Q", data, 8)[0]
     elif first == 0x82:
         count += 1
+        delay, sent = struct.unpack_from("<IQ", data, 20)
+        seen = sent - delay
         send({"type": "ack", "frameSet": struct.unpack_from("<I", data, 4)[0]})
         if count == most:
             break
@@ -87,6 +92,8 @@ while True:
         print("CLOSED", int.from_bytes(data[:2], "big"), data[2:].decode())
         break
 print("frame sets", count)
+if speech:
+    print("speech", speech, (heard - seen) // 1000)
 END
 }
 # usage: gets FRAME-SETS watch...: it must print that many
@@ -119,6 +126,9 @@ test_errors_name_the_option () {
   need_server
   local script=$pipelines/web-server.sh
   expect_error "unknown option '--no-such-option'" "$script" --no-such-option
+  expect_error "--audio: expected with --listen" "$script" --audio 6000
+  expect_error "--clock: expected with --audio" "$script" --listen 6000 --clock 127.0.0.1:1
+  expect_error "--audio: port 6000 is that of --listen" "$script" --listen 6000 --audio 6000
   expect_error "option --port needs a value" "$script" --port
   expect_error "--port: expected a whole number from 0 to 65535" "$script" --port 65536
   expect_error "--port: expected a whole number" "$script" --port http
@@ -276,6 +286,24 @@ test_launch_string_and_rtp_are_served () {
   stop_server
   kill "$sender"
   wait "$sender" || true
+}
+
+test_speech_beside_rtp_is_served_with_its_capture_times () {
+  need_server
+  local port=$((ports + 3)) host difference
+  rangecast-run avatartestsrc views=2 num-buffers=1 rig-export=rig.yaml ! fakesink
+  "$pipelines/camera-host.sh" --view 0 --rig rig.yaml --input range --size 160x120 --fps 15 --learn 5 --to "127.0.0.1:$port" \
+    --audio "audiotestsrc is-live=true wave=silence" --audio-to "127.0.0.1:$((port + 1))" >camera.log 2>&1 &
+  host=$!
+  serve --listen "$port" --audio $((port + 1)) --jitter 20
+  watch "${links[0]}" "" 60 stream,audio >watched.txt || fail "$(cat watched.txt)"
+  grep -q '"audio":true' watched.txt || fail "$(cat watched.txt)"
+  grep -qE '^speech [0-9]{2,} ' watched.txt || fail "$(cat watched.txt camera.log)"
+  difference=$(awk '/^speech/ { print $3 }' watched.txt)
+  [ "$difference" -gt -300 ] && [ "$difference" -lt 300 ] || fail "speech is $difference ms later than pictures"
+  stop_server
+  kill "$host"
+  wait "$host" || true
 }
 
 test_statistics_reach_the_dashboard () {

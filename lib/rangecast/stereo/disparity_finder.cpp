@@ -230,19 +230,15 @@ DisparityFinder::find (const cv::Mat &left, const cv::Mat &right, const Roi &roi
 {
   if (Status s = choose_range (near_m, far_m); !s.ok ())
     return s;
-  try {
-    place_window (roi);
-    choose_parts (parts);
-    for (int i = 0; i < 2; i++) {
-      cv::cvtColor ((i ? right : left) (window_at_), grey_, cv::COLOR_RGBA2GRAY);
-      cv::copyMakeBorder (grey_, window_[i], 0, 0, missing_[0], missing_[1], cv::BORDER_REPLICATE);
-    }
-    if (Status s = match (); !s.ok ())
-      return s;
-    filter (left);
-  } catch (const cv::Exception &) {
-    return {StatusCode::kNoSpace, "stereo: OpenCV failed to match the images"};
+  place_window (roi);
+  choose_parts (parts);
+  for (int i = 0; i < 2; i++) {
+    cv::cvtColor ((i ? right : left) (window_at_), grey_, cv::COLOR_RGBA2GRAY);
+    cv::copyMakeBorder (grey_, window_[i], 0, 0, missing_[0], missing_[1], cv::BORDER_REPLICATE);
   }
+  if (Status s = match (); !s.ok ())
+    return s;
+  filter (left);
   write_disparity (roi);
   return {};
 }

@@ -49,7 +49,8 @@ public:
   /** Forgets the background that was seen in earlier images. */
   void reset () { background_.reset (); }
 
-  /** @param left, right  CV_8UC4, R G B x, of the pair's size
+  /** Throws cv::Exception.
+   *  @param left, right  CV_8UC4, R G B x, of the pair's size
    *  @param roi          inside the image, not empty
    *  @param parts        rectangles one below the other in which to match; null = the whole ROI
    *  @param near_m, far_m  depth range, 0 = unlimited; with limits, background that was seen beyond

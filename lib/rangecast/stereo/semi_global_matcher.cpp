@@ -33,7 +33,7 @@ static_assert (kMaxCost + kJump < kNever && kNever + kStep < 256);
 
 constexpr int kSide = 32;    /* of a tile, pixels */
 constexpr int kOverlap = 16; /* rows in which paths converge */
-/* Of two bytes each; exceeded only where two bands of tiles have more. */
+/* Costs of a stripe, two bytes each; more only where two bands of tiles have more. */
 constexpr std::size_t kMaxCells = 36 << 20;
 constexpr int kMinBands = 2;         /* one has no rows without overlap */
 constexpr int kMaxDisparities = 512; /* of a tile; if there are more, the nearest are searched */
@@ -764,13 +764,16 @@ SemiGlobalMatcher::add_bands (Stripe &stripe)
   std::size_t at = 0;
   tiles_.clear ();
   stripe.bands = stripe.rows = 0;
-  while (
-      stripe.y0 + stripe.rows < stripe.left.rows && (at < kMaxCells || stripe.bands < kMinBands)) {
+  while (stripe.y0 + stripe.rows < stripe.left.rows) {
     for (int i = 0; i < stripe.across; i++) {
       Tile &tile = tiles_.emplace_back ();
       choose_disparities (stripe.x0 + i * kSide, stripe.y0 + stripe.rows, tile);
       tile.at = at;
       at = end_of (tile);
+    }
+    if (stripe.bands >= kMinBands && at > kMaxCells) {
+      tiles_.resize (tiles_.size () - std::size_t (stripe.across));
+      return;
     }
     stripe.bands++;
     stripe.rows = std::min (stripe.rows + kSide, stripe.left.rows - stripe.y0);

@@ -4,8 +4,10 @@
 #include "silhouette_filter.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
+#include <numeric>
 #include <opencv2/core/hal/intrin.hpp>
 
 #include "../base/simd.hpp"
@@ -207,7 +209,11 @@ SilhouetteFilter::likely (const Settings &settings, const cv::Vec4b &own, int x,
     weights = weights + cv::v_dotprod (counting, one);
   });
   const int total = cv::v_reduce_sum (weights);
-  return total < kEnough ? settings.min - 1 : cv::v_reduce_sum (sum) / total;
+  if (total < kEnough)
+    return settings.min - 1;
+  std::array<int, 4> sums; /* all four together may exceed an int */
+  cv::v_store (sums.data (), sum);
+  return int (std::accumulate (sums.begin (), sums.end (), std::int64_t{0}) / total);
 }
 
 /* Marks pixels of a row that may change: at a step to farther pixels, or without disparity near

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "../base/guarded.hpp"
 #include "../base/simd.hpp"
 #include "../opencv/image.hpp"
 #include "histogram_range.hpp"
@@ -56,7 +57,7 @@ StereoDepth::rectify (
   for (const auto &picture : {left, right, has_third_ ? third : left})
     if (picture.width != view_.width || picture.height != view_.height)
       return {StatusCode::kBadSize, "stereo: an image does not have the view's size"};
-  try {
+  return guarded ("stereo", [&] () -> Status {
     for (int i = 0; i < 2; i++) {
       raw_[i] = pictures_[i] = opencv_image (i ? right : left);
       if (!rectifier_.is_identity ()) {
@@ -67,10 +68,8 @@ StereoDepth::rectify (
     if (has_third_)
       third_.rectify (raw_[0], opencv_image (third));
     changes_.update (pictures_[0]);
-  } catch (const cv::Exception &) {
-    return {StatusCode::kNoSpace, "stereo: OpenCV failed to rectify"};
-  }
-  return {};
+    return {};
+  });
 }
 
 /* Records the depth range and coverage of the last ROI, without 0.5 % at both ends, which may be
@@ -200,16 +199,20 @@ StereoDepth::match (const RangeImage &image)
   if (pictures_[0].empty () || roi.empty () || roi.x < 0 || roi.y < 0 ||
       roi.x + roi.width > view_.width || roi.y + roi.height > view_.height)
     return {StatusCode::kBadSize, "stereo: the ROI does not lie in the view"};
+  return guarded ("stereo", [&] { return match_inside (image); });
+}
+
+/* The same, of a ROI that lies in the view. */
+Status
+StereoDepth::match_inside (const RangeImage &image)
+{
+  const Roi &roi = image.roi;
   const cv::Mat to (roi.height, roi.width, CV_8UC4, image.colour.data,
       static_cast<std::size_t> (image.colour.stride));
-  try {
-    pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)).copyTo (to);
-    for (int i = 0; i < 2; i++)
-      matched_[i] = settings_.average > 1 ? still_[i].add (pictures_[i], finder_.needed (roi, i))
-                                          : pictures_[i];
-  } catch (const cv::Exception &) {
-    return {StatusCode::kNoSpace, "stereo: OpenCV failed to crop the images"};
-  }
+  pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)).copyTo (to);
+  for (int i = 0; i < 2; i++)
+    matched_[i] = settings_.average > 1 ? still_[i].add (pictures_[i], finder_.needed (roi, i))
+                                        : pictures_[i];
   const bool whole = roi.width == view_.width && roi.height == view_.height;
   if (whole) {
     changes_.set_reference ();

@@ -73,6 +73,7 @@ public:
       still.reset ();
     occupancy_.reset ();
     finder_.reset ();
+    third_.reset ();
     near_now_m_ = far_now_m_ = seen_share_ = 0;
     last_roi_ = {};
   }
@@ -82,6 +83,7 @@ public:
   [[nodiscard]] ImageView<const std::uint16_t> disparity () const;
 
 private:
+  Status match_inside (const RangeImage &image);
   Status find (const RangeImage &image, bool everywhere);
   void clear_rims_of_third (const Roi &roi);
   void check_mirror ();

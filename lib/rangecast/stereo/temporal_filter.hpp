@@ -19,7 +19,12 @@ public:
    *  @param steady         0 (off) to 1: the weight of new depth is 1 - 0.9 * steady
    *  @param focal_baseline focal length times baseline, pixels times depth units */
   void set (int width, int height, double steady, double focal_baseline);
-  void reset () { held_.setTo (0); }
+  void reset ()
+  {
+    held_.setTo (0);
+    grey_.setTo (0);
+    blocks_.assign (blocks_.size (), {});
+  }
 
   /** @param image  its depth is replaced; motion is detected in its colour */
   void apply (const RangeImage &image);

@@ -22,6 +22,9 @@ public:
   Status set (const View &view, const View &range_view, double focal_baseline,
       const StereoSettings &settings);
 
+  /** Forgets the background that was seen in earlier images. */
+  void reset () { finder_.reset (); }
+
   /** @param left, third  CV_8UC4, of the view's size, not rectified */
   void rectify (const cv::Mat &left, const cv::Mat &third);
 

@@ -101,24 +101,36 @@ GST_START_TEST (test_everything_is_matched_after_a_break_and_not_after_a_lost_pi
   Stereo s (std::string (kProperties) + " refresh-interval=100");
   struct {
     GstClockTime pts;
-    bool discont, full;
-  } const frames[] = {{0, true, true}, {kFrame, false, false}, {3 * kFrame, true, false},
-      {4 * kFrame, false, false}, {3 * GST_SECOND, true, true},
-      {3 * GST_SECOND + kFrame, false, false}, {10 * GST_SECOND, false, false},
-      {2 * kFrame, true, true}, {3 * kFrame, false, false}};
+    bool full;
+  } const frames[] = {{0, true}, {kFrame, false}, {3 * kFrame, false}, {4 * kFrame, false},
+      {3 * GST_SECOND, true}, {3 * GST_SECOND + kFrame, false}, {2 * kFrame, true},
+      {3 * kFrame, false}};
   for (const auto &frame : frames) {
-    for (GstHarness *h : {s.left, s.right}) {
-      GstBuffer *picture = Stereo::dots (h == s.right, frame.pts);
-      if (frame.discont)
-        GST_BUFFER_FLAG_SET (picture, GST_BUFFER_FLAG_DISCONT);
-      gst_harness_push (h, picture);
-    }
+    s.push (s.left, frame.pts);
+    s.push (s.right, frame.pts);
     GstBuffer *output = gst_harness_pull (s.left);
     fail_unless_equals_int (gst_buffer_get_range_meta (output, 0)->width, frame.full ? 160 : 60);
     gst_buffer_unref (output);
     if (frame.pts == 0)
       want (s, 50, 20, 60, 70);
   }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_first_pair_after_a_picture_without_partner_is_discontinuous)
+{
+  Stereo s;
+  for (int i = 0; i < 4; i++) {
+    if (i == 2) /* the partner of left's next picture comes first: the one that waits has none */
+      s.push (s.left, i * kFrame - kFrame / 2 - GST_MSECOND);
+    s.push (s.right, i * kFrame);
+    s.push (s.left, i * kFrame);
+    GstBuffer *output = gst_harness_pull (s.left);
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (output), i * kFrame);
+    fail_unless_equals_int (GST_BUFFER_IS_DISCONT (output) != 0, i == 2);
+    gst_buffer_unref (output);
+  }
+  fail_unless_equals_uint64 (s.stat ("dropped-left"), 1);
 }
 GST_END_TEST;
 
@@ -591,6 +603,7 @@ stereodepth_suite ()
   tcase_add_test (tc, test_capture_time_is_the_left_cameras);
   tcase_add_test (tc, test_only_the_wanted_part_is_matched_until_the_refresh);
   tcase_add_test (tc, test_everything_is_matched_after_a_break_and_not_after_a_lost_picture);
+  tcase_add_test (tc, test_first_pair_after_a_picture_without_partner_is_discontinuous);
   tcase_add_test (tc, test_a_change_outside_the_wanted_part_is_matched_at_once);
   tcase_add_test (tc, test_every_format_and_padded_rows_give_the_same_depth);
   tcase_add_test (tc, test_flush_forgets_the_picture_that_waited);

@@ -136,8 +136,8 @@ TEST (SemiGlobalMatcher, both_surfaces_are_found_at_half_the_size_first)
   }
 }
 
-/* A tile at the edge of a near surface spans more disparities than are searched at once. */
-TEST (SemiGlobalMatcher, near_surface_is_found_at_any_number_of_disparities)
+/* A tile at the edge of a near surface spans more disparities than a tile may search. */
+TEST (SemiGlobalMatcher, nearest_disparities_of_a_tile_are_searched_if_it_spans_too_many)
 {
   constexpr int kVeryNear = 700, kAll = 720;
   const cv::Rect surface (1010, 16, 200, 96); /* its edges lie within tiles */
@@ -156,6 +156,8 @@ TEST (SemiGlobalMatcher, near_surface_is_found_at_any_number_of_disparities)
   matcher.match (left, right, 0, kAll, 2, disparity);
   EXPECT_GT (share_right (disparity, {1020, 26, 180, 76}, kVeryNear), 0.95);
   EXPECT_GT (share_right (disparity, {1250, 10, 140, 108}, kFar), 0.95);
+  /* In the tile of the surface's right edge, the background is too far to be searched. */
+  EXPECT_EQ (share_right (disparity, {1214, 26, 14, 76}, kFar), 0);
 }
 
 TEST (SemiGlobalMatcher, rungs_agree_at_any_number_of_disparities)

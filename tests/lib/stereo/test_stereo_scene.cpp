@@ -132,6 +132,40 @@ TEST (StereoScene, every_rung_of_the_cpu_finds_the_same_depth)
   }
 }
 
+/* Another scene after a break is matched as if nothing had been before. */
+TEST (StereoScene, reset_forgets_all_that_was_seen)
+{
+  const auto before = make_scene (), after = make_scene (1, {}, 0.6);
+  StereoSettings settings;
+  settings.steady = 0.8;
+  settings.average = 4;
+  StereoDepth used, fresh;
+  Depth of_used, of_fresh;
+  for (bool third : {false, true}) {
+    ASSERT_TRUE (used.set (after->rig ().views[0], settings, third).ok ());
+    ASSERT_TRUE (fresh.set (after->rig ().views[0], settings, third).ok ());
+    for (int i = 0; i < 4; i++) {
+      Shot shot (*before, 0.04 * i, i == 0);
+      ASSERT_TRUE (of_used.match (used, shot, i < 2 ? kWhole : shot.box (), third).ok ());
+    }
+    used.reset ();
+    for (int i = 0; i < 4; i++) {
+      Shot shot (*after, 0.04 * i);
+      const Roi part = i == 0 || i == 2 ? kWhole : shot.box ();
+      if (i == 0) {
+        ASSERT_TRUE (used.rectify (shot.left.view (), shot.right.view ()).ok ());
+        EXPECT_TRUE (used.changed_outside (shot.box ()));
+      }
+      ASSERT_TRUE (of_used.match (used, shot, part, third).ok ());
+      ASSERT_TRUE (of_fresh.match (fresh, shot, part, third).ok ());
+      for (int y = 0; y < kHeight; y++)
+        for (int x = 0; x < kWidth; x++)
+          ASSERT_EQ (of_used.depth.view ().at (x, y), of_fresh.depth.view ().at (x, y))
+              << "picture " << i << " at " << x << ", " << y << (third ? ", third camera" : "");
+    }
+  }
+}
+
 TEST (StereoScene, hardly_any_pixel_hangs_in_the_air)
 {
   const auto scene = make_scene ();
