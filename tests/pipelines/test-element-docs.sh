@@ -37,7 +37,7 @@ run_page () {
 
 for page in "$pages"/*.md; do
   name=$(basename "$page" .md)
-  ! grep -q '^```sh run$' "$page" && [ "$name" = rangecastdeviceprovider ] && continue
+  ! grep -q '^```sh run$' "$page" && [[ "$name" = *provider ]] && continue
   case $name in
     stereocamsrc) need='need_command fake-cameras' ;;
     rigcalibrate) need='need_boards' ;;

@@ -73,6 +73,7 @@ rangedepth stereodepth roiextract rangecombine
 rangemux rangemux rangedemux capturesync
 rangerender cylinderfilter striprender rangerender
 rangetestsrc avatartestsrc
+rangewebcam stereowebcamprovider
 rtpneighbourcode rtpneighbourcodepay rtpneighbourcodedepay rtpneighbourcodeguard rtcpreports
 END
 }

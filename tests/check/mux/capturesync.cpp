@@ -200,6 +200,20 @@ GST_START_TEST (test_recording_starts_with_the_first_key_frame_set)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_recording_does_not_start_with_a_frame_set_before_its_segment)
+{
+  Step step ("sink_0");
+  const GstClockTime begin = 900 * GST_SECOND;
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.start = 100 * kMs;
+  gst_harness_push_event (step.picture, gst_event_new_segment (&segment));
+  fail_if (GST_CLOCK_TIME_IS_VALID (pass (step.picture, 33 * kMs, begin, kFrameSet)));
+  fail_unless_equals_uint64 (pass (step.picture, 133 * kMs, begin + 100 * kMs, kFrameSet), 0);
+  fail_unless_equals_uint64 (pass (step.sound, 70 * kMs, begin + 120 * kMs, kRtp), 20 * kMs);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_recording_leaves_out_what_another_clock_captured)
 {
   Step step ("sink_0");
@@ -311,6 +325,7 @@ capturesync_suite ()
   tcase_add_test (tc, test_streams_of_different_clocks_pass_with_one_warning);
   tcase_add_test (tc, test_buffers_without_capture_time_pass_with_one_warning);
   tcase_add_test (tc, test_recording_starts_with_the_first_key_frame_set);
+  tcase_add_test (tc, test_recording_does_not_start_with_a_frame_set_before_its_segment);
   tcase_add_test (tc, test_recording_leaves_out_what_another_clock_captured);
   tcase_add_test (tc, test_stream_that_has_ended_holds_nobody_up);
   tcase_add_test (tc, test_streams_whose_clocks_part_are_discontinuous);

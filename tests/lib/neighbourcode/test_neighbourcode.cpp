@@ -333,6 +333,21 @@ TEST (Units, rig_of_64_views_travels_in_small_units_in_any_order)
   EXPECT_EQ (collector.generation (), 1u) << "the same rig again is no news";
 }
 
+TEST (Units, frame_rate_is_news_if_its_value_changes)
+{
+  RigCollector collector;
+  unsigned generation = 0;
+  for (const auto &[fps_n, fps_d, is_news] : {std::tuple{15, 1, true}, {30, 2, false},
+           {30, 1, true}, {0, 1, true}, {30, 1, true}, {60, 2, false}}) {
+    std::vector<std::uint8_t> bytes;
+    write_rig_units ({ring_rig (2), fps_n, fps_d}, bytes);
+    for (const auto &unit : units_of (bytes))
+      ASSERT_TRUE (collector.add (unit).ok ());
+    generation += is_news;
+    EXPECT_EQ (collector.generation (), generation) << fps_n << "/" << fps_d;
+  }
+}
+
 TEST (Units, changed_rig_is_news_once_it_is_complete)
 {
   StreamInfo info = {ring_rig (2), 15, 1};
