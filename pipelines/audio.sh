@@ -44,7 +44,8 @@ send_audio () {
   else
     audio+=(speech.send_rtp_src ! multiudpsink "clients=$2" "${audio_udp[@]}" speech.send_rtcp_src)
   fi
-  audio+=(! multiudpsink "clients=$audio_rtcp" "${audio_udp[@]}")
+  # rtpsession ends its RTCP only if sending BYE takes longer than its handling of EOS (GStreamer 1.22).
+  audio+=(! identity sleep-time=5000 ! multiudpsink "clients=$audio_rtcp" "${audio_udp[@]}")
 }
 audio_filter=()
 
@@ -77,6 +78,7 @@ hear_audio=(! queue max-size-time=2000000000 max-size-buffers=0 ! opusdec plc=tr
 
 # usage: speech_beside RECORDING: prints the name of the file with its speech
 speech_beside () {
-  local name=${1##*/}
-  echo "${1:0:${#1}-${#name}}${name%.*}.opus"
+  local name=${1##*/} saved=
+  [[ "$name" != *'~' ]] || { name=${name%'~'} saved='~'; } # record.sh's copy of the one before
+  echo "${1:0:${#1}-${#name}-${#saved}}${name%.*}.opus$saved"
 }

@@ -56,6 +56,7 @@ need_option "$rig" --rig
 views=$(count_views "$rig")
 [ "$views" -gt 0 ] || die "--rig: '$rig' has no views; expected a rig file, as calibrate.sh writes"
 need_number "$port" --port 1 $((65535 - 10 - views))
+[[ "$peer" != *:* ]] || die "--peer: expected a name or IPv4 address, got '$peer'"
 split_address "$peer:$port" --peer
 [ -z "$fec" ] || need_number "$fec" --fec 1 100
 rtp_key=$key rtp_check sender

@@ -81,6 +81,25 @@ if [ -n "$audio_port" ]; then
   need_own_port $((audio_port + 1)) --audio
   pass_audio_on "$audio_port" "$audio_to"
 fi
+# usage: need_another HOST:PORT[,...] option: none may be a port of this parent
+need_another () {
+  local one port
+  split_addresses "$1" "$2"
+  for one in "${addresses[@]}"; do
+    port=${one##*:}
+    [[ "$one" == 127.* || "$one" == localhost:* ]] || continue
+    [[ $port -lt $listen || $port -ge $((listen + views)) ]] &&
+      [[ -z "$audio_port" || $port -lt $audio_port || $port -gt $((audio_port + 1)) ]] ||
+      die "$2: '$one' is a port of this parent itself"
+  done
+}
+need_another "$to" --to
+if [ -n "$audio_to" ]; then
+  need_another "$audio_to" --audio-to
+  for one in "${addresses[@]}"; do
+    [[ ",$to," != *",$one,"* ]] || die "--audio-to: '$one' is in --to as well; expected a port of its own"
+  done
+fi
 feedbacks=()
 if [ -n "$cameras_feedback" ]; then
   split_addresses "$cameras_feedback" --cameras
@@ -93,6 +112,12 @@ rtp_check sender
 if [ -n "$rtp_feedback" ]; then
   need_own_port "$rtp_feedback" --feedback
   [ "$rtp_feedback" != "$clock_port" ] || die "--feedback: port $rtp_feedback is used by --clock-port"
+fi
+if [ -n "$audio_port" ]; then
+  for one in "$rtp_feedback --feedback" "$clock_port --clock-port"; do
+    [ "${one%% *}" != "$audio_port" ] && [ "${one%% *}" != $((audio_port + 1)) ] ||
+      die "${one#* }: port ${one%% *} is used by --audio (RTP, and RTCP at the next one)"
+  done
 fi
 send_rtp "$to"
 viewers=("${rtp[@]}")

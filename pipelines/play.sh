@@ -47,6 +47,7 @@ fi
 
 split_elements "$speaker" autoaudiosink --speaker
 speech=$(speech_beside "$file")
+[ -z "$film" ] || [ ! "$film" -ef "$speech" ] || die "--film: '$film' is the recorded speech; expected another file"
 if [ -f "$speech" ] && [ "$speech" != "$file" ]; then
   audio=(filesrc "location=$speech" ! oggdemux ! opusparse)
   if [ -n "$film" ]; then

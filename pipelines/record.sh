@@ -58,6 +58,7 @@ need_picture "$size" --size 4096
 [ -z "$group" ] || [ -n "$listen" ] || die "--multicast: expected with --listen"
 [ -z "$group" ] || need_group "$group"
 [ -z "$audio_port" ] || [ -n "$listen" ] || die "--audio: expected with --listen"
+[ -z "$rtp_fec$rtp_rtx$rtp_key$rtp_feedback" ] || [ -n "$listen" ] || die "options of RTP: expected with --listen"
 
 if [ -n "$listen" ]; then
   need_number "$listen" --listen 1 65535
@@ -81,8 +82,16 @@ else
     ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1"
     ! neighbourcodeenc profile=entropy temporal=true key-interval=2000)
 fi
-# If nothing arrives, an existing recording must not be lost.
-[ ! -s "$file" ] || mv -f -- "$file" "$file~"
+# If nothing arrives, an existing recording must not be lost; nor may another record.sh's. The lock is passed on to what runs below.
+lock () {
+  exec {locked}>>"$file" || exit 2
+  flock -n "$locked" || die "'$file' is being recorded; expected another name"
+}
+lock
+if [ -s "$file" ]; then
+  mv -f -- "$file" "$file~"
+  lock # the new file
+fi
 [ "$speech" = "$file" ] || [ ! -s "$speech" ] || mv -f -- "$speech" "$speech~" # of the recording before
 drop_empty "$file" "${listen:+nothing came to port $listen (no coded frame set); $file was not written}"
 [ -z "$audio_port" ] || [[ "${RANGECAST_LAUNCH:-}" != rangecast-run* ]] || RANGECAST_LAUNCH+=" --drop-empty $(printf %q "$speech")"

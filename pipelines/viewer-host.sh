@@ -77,7 +77,7 @@ if [ "$talk" != none ]; then
   fi
   audio_filter+=(! volume name=microphone)
   send_audio "$talk" "$talk_to" --talk
-  talking=("${audio[@]}")
+  talking=("${audio[@]}") audio=()
   audio_clock "$talk_clock"
 fi
 # Without speech, pictures are shown as soon as they are drawn; with it, when they are due.

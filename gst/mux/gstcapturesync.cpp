@@ -50,6 +50,7 @@ struct Stream {
   bool warned = false; /* of missing capture times */
   /* with start-with */
   bool started = false;         /* its segment was sent */
+  bool dropped = false;         /* something */
   bool warned_of_clock = false; /* of capture times of another clock */
 
   CaptureAlignment::Stream timing{}; /* under the element's lock */
@@ -98,15 +99,14 @@ stream_of (GstPad *pad)
 /* ---- times ---- */
 
 static void
-warn_missing_capture_time (GstCaptureSync *self, Stream &stream)
+warn_missing_capture_time (GstCaptureSync *self, Stream &stream, const char *consequence)
 {
   if (!std::exchange (stream.warned, true))
     GST_ELEMENT_WARNING (self, STREAM, FORMAT,
-        ("%s: buffers without a capture time pass as they are; expected a "
-         "GstReferenceTimestampMeta "
+        ("%s: buffers without a capture time %s; expected a GstReferenceTimestampMeta "
          "timestamp/x-range-capture (frame sets) or timestamp/x-ntp (RTP with the header extension "
          "ntp-64)",
-            GST_PAD_NAME (stream.sink)),
+            GST_PAD_NAME (stream.sink), consequence),
         (nullptr));
 }
 
@@ -138,7 +138,7 @@ align (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
   const GstClockTime running =
       gst_segment_to_running_time (&stream.segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
   if (!GST_CLOCK_TIME_IS_VALID (capture))
-    warn_missing_capture_time (self, stream);
+    warn_missing_capture_time (self, stream, "pass as they are");
   GST_LOG_OBJECT (stream.sink, "captured %" GST_TIME_FORMAT ", running time %" GST_TIME_FORMAT,
       GST_TIME_ARGS (capture), GST_TIME_ARGS (running));
   const bool placed = GST_CLOCK_TIME_IS_VALID (capture) && GST_CLOCK_TIME_IS_VALID (running);
@@ -215,7 +215,7 @@ restart (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
 {
   const GstClockTime capture = capture_time_of (buffer);
   if (!GST_CLOCK_TIME_IS_VALID (capture))
-    warn_missing_capture_time (self, stream);
+    warn_missing_capture_time (self, stream, "are dropped");
   bool other_clock = false;
   const GstClockTime start = find_start (self->priv, stream, buffer, capture,
       gst_segment_to_running_time (&stream.segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer)),
@@ -227,6 +227,7 @@ restart (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
     GST_DEBUG_OBJECT (stream.sink, "%s: dropping %" GST_PTR_FORMAT,
         other_clock ? "another clock" : "before the start", buffer);
     gst_buffer_unref (buffer);
+    stream.dropped = true;
     return nullptr;
   }
   buffer = gst_buffer_make_writable (buffer);
@@ -239,6 +240,17 @@ restart (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
     GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
   }
   return buffer;
+}
+
+static void
+warn_if_all_was_dropped (GstCaptureSync *self, const Stream &stream)
+{
+  if (stream.dropped && !stream.started)
+    GST_ELEMENT_WARNING (self, STREAM, FAILED,
+        ("%s: all buffers were dropped; expected buffers with capture times after the first key "
+         "frame set (or packet of speech) of the pad that start-with names",
+            GST_PAD_NAME (stream.sink)),
+        (nullptr));
 }
 
 static bool
@@ -300,6 +312,8 @@ gst_capture_sync_sink_event (GstPad *pad, GstObject *parent, GstEvent *event)
   switch (GST_EVENT_TYPE (event)) {
     case GST_EVENT_STREAM_START:
     case GST_EVENT_EOS: { /* holds nobody up any more */
+      if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
+        warn_if_all_was_dropped (self, stream);
       std::lock_guard guard (self->priv->lock);
       stream.timing = {};
       break;
@@ -421,9 +435,35 @@ gst_capture_sync_release_pad (GstElement *element, GstPad *sink)
 
 /* ---- life ---- */
 
+/* Whether start-with is empty or the name of a sink pad; posts an error if not. */
+static bool
+names_a_pad (GstCaptureSync *self)
+{
+  GstCaptureSyncPrivate *priv = self->priv;
+  std::string name, pads;
+  {
+    std::lock_guard guard (priv->lock);
+    name = priv->settings.start_with;
+    if (name.empty ())
+      return true;
+    for (const auto &stream : priv->streams) {
+      if (name == GST_PAD_NAME (stream->sink))
+        return true;
+      pads += std::string (pads.empty () ? "" : ", ") + GST_PAD_NAME (stream->sink);
+    }
+  }
+  GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
+      ("start-with: no pad '%s'; expected one of %s", name.c_str (),
+          pads.empty () ? "sink_0, sink_1 and so on" : pads.c_str ()),
+      (nullptr));
+  return false;
+}
+
 static GstStateChangeReturn
 gst_capture_sync_change_state (GstElement *element, GstStateChange transition)
 {
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !names_a_pad (GST_CAPTURE_SYNC (element)))
+    return GST_STATE_CHANGE_FAILURE;
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS (gst_capture_sync_parent_class)->change_state (element, transition);
   if (transition != GST_STATE_CHANGE_PAUSED_TO_READY)
@@ -433,7 +473,7 @@ gst_capture_sync_change_state (GstElement *element, GstStateChange transition)
   priv->alignment = {};
   for (const auto &stream : priv->streams) {
     gst_segment_init (&stream->segment, GST_FORMAT_UNDEFINED);
-    stream->warned = stream->started = stream->warned_of_clock = false;
+    stream->warned = stream->started = stream->dropped = stream->warned_of_clock = false;
     stream->timing = {};
     priv->alignment.add (&stream->timing);
   }

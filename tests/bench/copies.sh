@@ -8,6 +8,7 @@ set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 source "$here/../../pipelines/env.sh"
 frames=${1:-20}
+need_number "$frames" FRAMES 1 100000
 dir=$(mktemp -d)
 trap 'rm -rf "$dir"' EXIT
 

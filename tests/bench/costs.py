@@ -251,8 +251,13 @@ def compare(old, new, percent):
 
 def read(path):
     try:
-        return json.loads(Path(path).read_text())
-    except (OSError, ValueError) as error:
+        tables = json.loads(Path(path).read_text())
+        for rows in tables.values():
+            for values in rows.values():
+                for cost in values.values():
+                    float(cost["median"]), float(cost["spread"])
+        return tables
+    except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
         sys.exit(f"costs.py: {path}: {error}; expected a file that costs.py wrote")
 
 
@@ -267,12 +272,20 @@ def main():
     if len(options.files) != (2 if options.compare else 1):
         parser.error("expected OLD.json NEW.json after --compare" if options.compare else "expected one output file")
     if options.compare:
-        sys.exit(compare(read(options.files[0]), read(options.files[1]), options.percent))
-    unknown = set(options.tables.split(",")) - set(TABLES)
-    if unknown or options.rounds < 1:
-        parser.error(f"--tables: expected some of {','.join(TABLES)}; --rounds: at least 1")
+        old, new = map(read, options.files)
+        if not old:
+            sys.exit(f"costs.py: {options.files[0]}: has no costs to compare")
+        sys.exit(compare(old, new, options.percent))
+    if unknown := set(options.tables.split(",")) - set(TABLES):
+        parser.error(f"--tables: no table {', '.join(sorted(unknown))}; expected some of {','.join(TABLES)}")
+    if options.rounds < 1:
+        parser.error(f"--rounds: expected at least 1, got {options.rounds}")
     out = Path(options.files[0])
     numbers = read(out) if out.exists() else {}
+    try:
+        out.write_text(json.dumps(numbers, indent=1) + "\n") # fails now rather than after the measurement
+    except OSError as error:
+        sys.exit(f"costs.py: {out}: {error.strerror}")
     with tempfile.TemporaryDirectory() as folder:
         for name in options.tables.split(","):
             try:

@@ -171,7 +171,20 @@ test_ports_that_are_taken_twice_are_named () {
   local parent=("$pipelines/parent-host.sh" --views 4 --listen 5000 --to 127.0.0.1:6000)
   expect_error "--feedback: port 5002 is used by view 2" "${parent[@]}" --feedback 5002
   expect_error "--clock-port: port 5003 is used by view 3" "${parent[@]}" --clock-port 5003
+  expect_error "--clock-port: port 5301 is used by --audio" "${parent[@]}" --clock-port 5301 --audio 5300 --audio-to 127.0.0.1:6002
+  expect_error "--feedback: port 5300 is used by --audio" "${parent[@]}" --feedback 5300 --audio 5300 --audio-to 127.0.0.1:6002
+  expect_error "--audio-to: '127.0.0.1:5301' is a port of this parent itself" "${parent[@]}" --audio 5300 --audio-to 127.0.0.1:5301
+  expect_error "--audio-to: '127.0.0.1:6000' is in --to as well" "${parent[@]}" --audio 5300 --audio-to 127.0.0.1:6000
+  expect_error "--to: '127.0.0.1:5002' is a port of this parent itself" "$pipelines/parent-host.sh" --views 4 --listen 5000 \
+    --to 192.0.2.1:5002,127.0.0.1:5002
   expect_error "--feedback: port 5100 is used by --clock-port" "${parent[@]}" --clock-port 5100 --feedback 5100
+}
+
+test_addresses_without_a_port_or_of_IPv6_are_named () {
+  local address parent=("$pipelines/parent-host.sh" --views 1 --listen 5000)
+  for address in ::1:5901 '[::1]:5901' 127.0.0.1:7777:5901 127.0.0.1 :5901; do
+    expect_error "--to: expected HOST:PORT, with a name or IPv4 address, got '$address'" "${parent[@]}" --to "$address"
+  done
 }
 
 test_a_comma_too_many_is_named () {
