@@ -12,8 +12,21 @@ audio_clock () {
   RANGECAST_LAUNCH="${RANGECAST_LAUNCH:-rangecast-run} --clock $(printf %q "$1")"
 }
 
-# usage: need_audio_port PORT option: the port and the next one
-need_audio_port () { need_number "$1" "$2" 1 65534; }
+# usage: need_audio_port PORT option [OTHER-PORT]: the port and the next one, neither of which may be the other port
+need_audio_port () {
+  need_number "$1" "$2" 1 65534
+  [ -z "${3:-}" ] || { [ "$3" != "$1" ] && [ "$3" != $(($1 + 1)) ]; } || die "$2: port $1, or the next one for RTCP, is that of --listen"
+}
+
+# usage: need_other_places HOST:PORT[,...] HOST:PORT[,...]: speech must not go where pictures go
+need_other_places () {
+  local one
+  IFS=, read -ra addresses <<<"$1"
+  for one in "${addresses[@]}"; do
+    [[ ",$2," != *",$one,"* && ",$2," != *",${one%:*}:$((${one##*:} + 1)),"* ]] ||
+      die "--audio-to: '$one', or the next port for RTCP, is in --to as well; expected ports of their own"
+  done
+}
 
 # usage: split_audio_addresses HOST:PORT[,...] option -> checks them; sets `audio_rtcp` to the addresses of RTCP, `audio_udp` to properties of sinks
 split_audio_addresses () {

@@ -118,6 +118,7 @@ send_rtp "$to"
 if [ -n "$audio_source" ]; then
   need_option "$audio_to" --audio-to
   send_audio "$audio_source" "$audio_to"
+  need_other_places "$audio_to" "$to"
   audio_clock "${clock_server:-system}"
 fi
 [ -f "$rig" ] || die "--rig: no file '$rig'"

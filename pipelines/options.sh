@@ -38,7 +38,7 @@ split_address () {
   [[ "$1" == *:* && -n "$host" && "$host" != *:* && "$port" =~ ^[0-9]+$ ]] || die "$2: expected HOST:PORT, with a name or IPv4 address, got '$1'"
   [[ "$port" =~ ^0*[0-9]{1,5}$ ]] && ((10#$port >= 1 && 10#$port <= 65535)) || die "$2: expected a port from 1 to 65535, got '$1'"
   ! [[ "$host" =~ ^[0-9.]+$ ]] || is_ipv4 "$host" || die "$2: expected four numbers up to 255, got '$host'"
-  [[ "$host" =~ ^[0-9.]+$ ]] || getent ahosts "$host" >/dev/null || # udpsink would say nothing
+  [[ "$host" =~ ^[0-9.]+$ ]] || getent ahosts -- "$host" >/dev/null 2>&1 || # udpsink would say nothing
     die "$2: no host named '$host'"
 }
 

@@ -96,9 +96,7 @@ need_another () {
 need_another "$to" --to
 if [ -n "$audio_to" ]; then
   need_another "$audio_to" --audio-to
-  for one in "${addresses[@]}"; do
-    [[ ",$to," != *",$one,"* ]] || die "--audio-to: '$one' is in --to as well; expected a port of its own"
-  done
+  need_other_places "$audio_to" "$to"
 fi
 feedbacks=()
 if [ -n "$cameras_feedback" ]; then

@@ -67,8 +67,7 @@ if [ -n "$listen" ]; then
   receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
   source=("${rtp[@]}")
   if [ -n "$audio_port" ]; then
-    need_audio_port "$audio_port" --audio
-    [ "$audio_port" != "$listen" ] || die "--audio: port $audio_port is that of --listen"
+    need_audio_port "$audio_port" --audio "$listen"
     receive_audio "$audio_port" "$jitter" "$group"
     [ "$speech" != "$file" ] || die "$file: expected another name than *.opus with --audio"
     # Both files begin with the first key frame set; silence where no speech came.
@@ -87,12 +86,14 @@ lock () {
   exec {locked}>>"$file" || exit 2
   flock -n "$locked" || die "'$file' is being recorded; expected another name"
 }
+before=
 lock
 if [ -s "$file" ]; then
+  before="; the recording before is $file~"
   mv -f -- "$file" "$file~"
   lock # the new file
 fi
 [ "$speech" = "$file" ] || [ ! -s "$speech" ] || mv -f -- "$speech" "$speech~" # of the recording before
-drop_empty "$file" "${listen:+nothing came to port $listen (no coded frame set); $file was not written}"
+drop_empty "$file" "${listen:+nothing came to port $listen (no coded frame set); $file was not written$before}"
 [ -z "$audio_port" ] || [[ "${RANGECAST_LAUNCH:-}" != rangecast-run* ]] || RANGECAST_LAUNCH+=" --drop-empty $(printf %q "$speech")"
 launch "${source[@]}" ! neighbourcodeparse ! filesink async=false "location=$file" "${audio[@]}"

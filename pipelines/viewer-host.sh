@@ -68,6 +68,8 @@ need_degrees "$orbit" --orbit
 rtp_check receiver
 receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
 
+[ "$talk" != none ] || [ -z "$talk_to" ] || die "--talk-to: expected with --talk"
+[ -z "$echo_cancel" ] || [ -n "$audio_port" ] || die "--echo-cancel: expected with --audio"
 if [ "$talk" != none ]; then
   need_option "$talk_to" --talk-to
   # The filter finds the delay between loudspeaker and microphone itself.
@@ -80,11 +82,11 @@ if [ "$talk" != none ]; then
   talking=("${audio[@]}") audio=()
   audio_clock "$talk_clock"
 fi
+[ -n "$audio_port" ] || [ "$speaker" = autoaudiosink ] || [ "$speaker" = none ] || die "--speaker: expected with --audio"
 # Without speech, pictures are shown as soon as they are drawn; with it, when they are due.
 sync=false
 if [ -n "$audio_port" ]; then
-  need_audio_port "$audio_port" --audio
-  [ "$audio_port" != "$listen" ] || die "--audio: port $audio_port is that of --listen"
+  need_audio_port "$audio_port" --audio "$listen"
   split_elements "$speaker" autoaudiosink --speaker
   receive_audio "$audio_port" "$jitter" "$group"
   # Silence while no speech arrives, for which sinks and the muxer would wait.

@@ -122,8 +122,7 @@ if [ -n "$listen" ]; then
   receive_rtp 0 "$listen" "${jitter:-30}" 4194304 "$group"
   source=("${rtp[@]}") sync=false
   if [ -n "$audio_port" ]; then
-    need_audio_port "$audio_port" --audio
-    [ "$audio_port" != "$listen" ] || die "--audio: port $audio_port is that of --listen"
+    need_audio_port "$audio_port" --audio "$listen"
     receive_audio "$audio_port" "${jitter:-30}" "$group"
     audio+=(! web.audio) # the page plays it when it shows what was captured at the same time
     audio_clock "${clock:-system}"

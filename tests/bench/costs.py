@@ -7,7 +7,7 @@ usage: costs.py OUT.json [--rounds N] [--tables views,pixels,viewers,memory,star
 
 Prints Markdown tables (tests/bench/results/costs.md) and writes all numbers to OUT.json; a table that is not measured
 again keeps the numbers that OUT.json had. --compare prints the costs that grew by more than P per cent (5) and by more
-than both measurements' spread, and exits with 1 if there are any.
+than both measurements' spread, and exits with 1 if there are any, with 2 if a file is not one of these.
 
 Tables views and pixels: the CPU time, user and system, that an element adds to a frame set. In each round every launch
 string runs twice, with a long and with a short stream, so that starting and ending do not count; the cost of an element
@@ -18,6 +18,7 @@ gst-launch-1.0 with each string. Table startup: from start to end of each progra
 import argparse
 import importlib.util
 import json
+import math
 import os
 import shlex
 import shutil
@@ -255,10 +256,18 @@ def read(path):
         for rows in tables.values():
             for values in rows.values():
                 for cost in values.values():
-                    float(cost["median"]), float(cost["spread"])
+                    if not math.isfinite(cost["median"]) or not math.isfinite(cost["spread"]):
+                        raise ValueError
         return tables
-    except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
-        sys.exit(f"costs.py: {path}: {error}; expected a file that costs.py wrote")
+    except OSError as error:
+        refuse(f"{path}: {error.strerror}")
+    except (ValueError, AttributeError, KeyError, TypeError):
+        refuse(f"{path}: expected a file that costs.py wrote")
+
+
+def refuse(text):
+    print(f"costs.py: {text}", file=sys.stderr)
+    sys.exit(2)
 
 
 def main():
@@ -271,10 +280,12 @@ def main():
     options = parser.parse_args()
     if len(options.files) != (2 if options.compare else 1):
         parser.error("expected OLD.json NEW.json after --compare" if options.compare else "expected one output file")
+    if not options.percent >= 0:
+        parser.error(f"--percent: expected a number of at least 0, got {options.percent}")
     if options.compare:
         old, new = map(read, options.files)
         if not old:
-            sys.exit(f"costs.py: {options.files[0]}: has no costs to compare")
+            refuse(f"{options.files[0]}: has no costs to compare")
         sys.exit(compare(old, new, options.percent))
     if unknown := set(options.tables.split(",")) - set(TABLES):
         parser.error(f"--tables: no table {', '.join(sorted(unknown))}; expected some of {','.join(TABLES)}")
@@ -285,7 +296,7 @@ def main():
     try:
         out.write_text(json.dumps(numbers, indent=1) + "\n") # fails now rather than after the measurement
     except OSError as error:
-        sys.exit(f"costs.py: {out}: {error.strerror}")
+        refuse(f"{out}: {error.strerror}")
     with tempfile.TemporaryDirectory() as folder:
         for name in options.tables.split(","):
             try:

@@ -32,6 +32,16 @@ test_comparison_names_what_grew_by_more_than_its_spread () {
 
 test_bad_input_is_refused () {
   expect_error "none.json" "$costs" --compare none.json none.json
-  expect_error "expected some of views" "$costs" out.json --tables nonsense
+  table NaN 0 >nan.json
+  echo '[]' >list.json
+  echo '{"views": {"decode": 3}}' >flat.json
+  table 1 0 >old.json
+  for bad in nan list flat; do
+    expect_error "$bad.json: expected a file that costs.py wrote" "$costs" --compare old.json $bad.json
+  done
+  expect_error "no table nonsense; expected some of views" "$costs" out.json --tables nonsense
+  expect_error "--rounds: expected at least 1, got 0" "$costs" out.json --rounds 0
+  expect_error "--percent: expected a number of at least 0, got nan" "$costs" --compare --percent nan old.json old.json
+  expect_error "nowhere/out.json: No such file" "$costs" nowhere/out.json --tables startup
   expect_error "expected one output file" "$costs" a.json b.json
 }

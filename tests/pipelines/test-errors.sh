@@ -174,7 +174,7 @@ test_ports_that_are_taken_twice_are_named () {
   expect_error "--clock-port: port 5301 is used by --audio" "${parent[@]}" --clock-port 5301 --audio 5300 --audio-to 127.0.0.1:6002
   expect_error "--feedback: port 5300 is used by --audio" "${parent[@]}" --feedback 5300 --audio 5300 --audio-to 127.0.0.1:6002
   expect_error "--audio-to: '127.0.0.1:5301' is a port of this parent itself" "${parent[@]}" --audio 5300 --audio-to 127.0.0.1:5301
-  expect_error "--audio-to: '127.0.0.1:6000' is in --to as well" "${parent[@]}" --audio 5300 --audio-to 127.0.0.1:6000
+  expect_error "--audio-to: '127.0.0.1:6000', or the next port for RTCP, is in --to as well" "${parent[@]}" --audio 5300 --audio-to 127.0.0.1:6000
   expect_error "--to: '127.0.0.1:5002' is a port of this parent itself" "$pipelines/parent-host.sh" --views 4 --listen 5000 \
     --to 192.0.2.1:5002,127.0.0.1:5002
   expect_error "--feedback: port 5100 is used by --clock-port" "${parent[@]}" --clock-port 5100 --feedback 5100

@@ -256,7 +256,12 @@ test_wrong_options_are_named () {
   expect_error "--audio-to: expected a whole number from 1 to 65534" "${camera[@]}" --audio pulsesrc --audio-to 127.0.0.1:65535
   expect_error "--audio-to is required" "${parent[@]}" --audio 5300
   expect_error "--audio: port 5001 is used by view 1" "${parent[@]}" --audio 5001 --audio-to 127.0.0.1:6002
-  expect_error "--audio: port 6000 is that of --listen" "$pipelines/viewer-host.sh" --listen 6000 --audio 6000
+  expect_error "--audio: port 6000, or the next one for RTCP, is that of --listen" "$pipelines/viewer-host.sh" --listen 6000 --audio 6000
+  expect_error "--audio: port 5999, or the next one for RTCP, is that of --listen" "$pipelines/viewer-host.sh" --listen 6000 --audio 5999
+  expect_error "--talk-to: expected with --talk" "$pipelines/viewer-host.sh" --listen 6000 --talk-to 127.0.0.1:7000
+  expect_error "--speaker: expected with --audio" "$pipelines/viewer-host.sh" --listen 6000 --speaker fakesink
+  expect_error "--echo-cancel: expected with --audio" "$pipelines/viewer-host.sh" --listen 6000 --echo-cancel
+  expect_error "--audio-to: '127.0.0.1:4999', or the next port" "${camera[@]}" --audio pulsesrc --audio-to 127.0.0.1:4999
   expect_error "--talk-to is required" "$pipelines/viewer-host.sh" --listen 6000 --audio 6002 --talk pulsesrc
   expect_error "--audio: expected with --listen" "$pipelines/record.sh" x.rcnc --audio 6002
   expect_error "another name than *.opus" "$pipelines/record.sh" x.opus --listen 6000 --audio 6002

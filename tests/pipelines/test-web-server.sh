@@ -128,7 +128,7 @@ test_errors_name_the_option () {
   expect_error "unknown option '--no-such-option'" "$script" --no-such-option
   expect_error "--audio: expected with --listen" "$script" --audio 6000
   expect_error "--clock: expected with --audio" "$script" --listen 6000 --clock 127.0.0.1:1
-  expect_error "--audio: port 6000 is that of --listen" "$script" --listen 6000 --audio 6000
+  expect_error "--audio: port 6000, or the next one for RTCP, is that of --listen" "$script" --listen 6000 --audio 6000
   expect_error "option --port needs a value" "$script" --port
   expect_error "--port: expected a whole number from 0 to 65535" "$script" --port 65536
   expect_error "--port: expected a whole number" "$script" --port http
