@@ -76,6 +76,28 @@ GST_START_TEST (test_welcome_comes_before_there_is_a_stream)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_clients_that_want_to_hear_are_told_when_speech_begins_and_ends)
+{
+  WebSink sink;
+  WebClient hears (sink), deaf (sink);
+  hears.enter (R"("want":["stream","audio"])");
+  deaf.enter ();
+  fail_unless_contains (hears.texts[0], R"("audio":false)");
+  GstPad *pad = gst_element_request_pad_simple (sink.h->element, "audio");
+  fail_unless_happens (hears.texts.size () == 2);
+  fail_unless_equals_string (hears.texts[1].c_str (), R"({"type":"audio","available":true})");
+  WebClient late (sink);
+  late.enter ();
+  fail_unless_contains (late.texts[0], R"("audio":true)");
+  gst_element_release_request_pad (sink.h->element, pad);
+  gst_object_unref (pad);
+  fail_unless_happens (hears.texts.size () == 3);
+  fail_unless_equals_string (hears.texts[2].c_str (), R"({"type":"audio","available":false})");
+  deaf.round_trip ();
+  fail_unless_equals_int (deaf.texts.size (), 1);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_frame_sets_arrive_whole_whatever_size_they_have)
 {
   WebSink sink ("max-queued-bytes=1"); /* one goes, however large */
@@ -632,6 +654,7 @@ rangewebsinkstream_suite ()
   tcase_add_test (tc, test_first_frame_set_of_a_client_begins_with_the_rig);
   tcase_add_test (tc, test_frame_sets_have_the_same_number_for_all_clients);
   tcase_add_test (tc, test_welcome_comes_before_there_is_a_stream);
+  tcase_add_test (tc, test_clients_that_want_to_hear_are_told_when_speech_begins_and_ends);
   tcase_add_test (tc, test_frame_sets_arrive_whole_whatever_size_they_have);
   tcase_add_test (tc, test_memories_of_a_buffer_arrive_as_one);
   tcase_add_test (tc, test_delay_is_since_the_capture_time_if_that_is_known);
