@@ -45,6 +45,8 @@ send_audio () {
   local words
   split_audio_addresses "$2" "${3:---audio}-to"
   split_elements "$1" pulsesrc "${3:---audio}"
+  # These would be read as fast as the disk allows; the others are live.
+  [[ ! " ${words[*]} " =~ \ (filesrc|audiotestsrc|uri[a-z0-9]*bin)\  ]] || words+=(! identity sync=true)
   audio=("${words[@]}" ! queue max-size-time=200000000 max-size-buffers=0 leaky=downstream ! audioconvert ! audioresample
     ! audio/x-raw,format=S16LE,rate=48000,channels=1)
   audio+=("${audio_filter[@]}" ! opusenc audio-type=voice tolerance=5000000 bitrate=32000

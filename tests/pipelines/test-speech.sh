@@ -219,6 +219,17 @@ test_senders_of_speech_end_at_once () {
   [ "$late" = 0 ] || { kill -KILL "${senders[@]}" 2>/dev/null || true; fail "$late of 6 senders did not end"; }
 }
 
+test_speech_from_a_file_is_sent_at_its_own_pace () {
+  export_rig 1
+  gst-launch-1.0 -q audiotestsrc num-buffers=600 ! wavenc ! filesink location="my speech.wav" # 14 s
+  "$pipelines/camera-host.sh" --view 0 --rig rig.yaml --input range --size 160x120 --learn 5 --to "127.0.0.1:$((ports + 60))" \
+    --audio 'filesrc location="my speech.wav" ! decodebin' --audio-to "127.0.0.1:$((ports + 80))" >camera.log 2>&1 &
+  camera=$!
+  timeout 20 gst-launch-1.0 -q udpsrc port=$((ports + 80)) num-buffers=150 ! filesink location=packets.bin || fail "$(tail -n 5 camera.log)"
+  kill -0 "$camera" || fail "150 packets of 20 ms came, and the file has ended"
+  stop_all "$camera"
+}
+
 test_speech_is_sent_without_any_to_hear () {
   export RANGECAST_LAUNCH=echo
   "$pipelines/viewer-host.sh" --listen $((ports + 20)) --talk "$silence" --talk-to 127.0.0.1:7000 >launch.txt
