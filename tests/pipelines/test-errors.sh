@@ -277,7 +277,7 @@ test_ports_up_to_the_last_one_are_taken () {
   expect_error "--listen: expected a whole number from 1 to 65534, got '65535'" "${parent[@]}" --listen 65535 --to 127.0.0.1:1
   expect_error "--to: expected a port from 1 to 65535, got 'localhost:70000'" "${parent[@]}" --listen 5000 --to localhost:70000
   expect_error "--to: expected a port from 1 to 65535, got 'localhost:0'" "${parent[@]}" --listen 5000 --to localhost:0
-  RANGECAST_LAUNCH=echo "${parent[@]}" --listen 65534 --to 127.0.0.1:65535 >parent.txt
+  RANGECAST_LAUNCH=echo "${parent[@]}" --listen 65534 --to 192.0.2.1:65535 >parent.txt
   grep -q 'port=65535' parent.txt || fail "$(cat parent.txt)"
 }
 
