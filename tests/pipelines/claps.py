@@ -6,19 +6,20 @@ usage: claps.py LOG [--running]
 
 Prints for each clap that was both seen and heard: its time in s, and by how many ms the sound comes after the picture
 (negative: before). By the clock; with --running by running time, for files. The beginnings of picture and sound are where
-brightness and loudness rise over the middle of their range."""
+brightness and loudness rise over the middle between what they are most of the time and their greatest."""
 import sys
 
 APART_S = 0.5  # claps are 2 s apart
 
 
 def beginnings(points):
-    """Times in s at which a level rises over the middle between its extremes."""
+    """Times in s at which a level rises over the middle between its median and its maximum; where packets are lost, it falls."""
     if not points:
         return []
     levels = sorted(level for _, level in points)
-    middle = (levels[0] + levels[-1]) / 2
-    if levels[-1] - levels[0] < 0.05 * levels[-1]:
+    usual = levels[len(levels) // 2]
+    middle = (usual + levels[-1]) / 2
+    if levels[-1] - usual < 0.05 * levels[-1]:
         return []
     result, above = [], True  # what begins loud did not begin here
     for time, level in points:
