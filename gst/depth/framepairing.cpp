@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <gstrange/gstrangepairing.hpp>
+#include <utility>
 
 using gstrange::gap_end;
 using gstrange::is_gap;
@@ -58,8 +59,11 @@ PairMatcher::pop_pair (GstClockTime frame_duration, Pair &pair)
   }
   pair.first = gst_aggregator_pad_pop_buffer (pads_[0]);
   pair.second = gst_aggregator_pad_pop_buffer (pads_[1]);
-  if (pair.first && pair.second)
+  if (pair.first && pair.second) {
+    pair.discont = std::exchange (discont_, false) || GST_BUFFER_IS_DISCONT (pair.first) ||
+                   GST_BUFFER_IS_DISCONT (pair.second);
     return GST_FLOW_OK;
+  }
   gst_clear_buffer (&pair.first); /* flushed in between */
   gst_clear_buffer (&pair.second);
   return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -86,6 +90,7 @@ PairMatcher::drop (const Front (&fronts)[2], int side, GstClockTime tolerance)
         MS_ARGS (other.time - front.time), MS_ARGS (tolerance));
   if (!front.gap)
     dropped_[side]++;
+  discont_ |= GST_BUFFER_IS_DISCONT (front.buffer);
   if ((front.gap || other.gap) && GST_CLOCK_TIME_IS_VALID (front.time)) {
     const GstClockTime length = GST_BUFFER_DURATION_IS_VALID (front.buffer)
                                     ? GST_BUFFER_DURATION (front.buffer)

@@ -20,6 +20,7 @@ public:
   struct Pair {
     GstBuffer *first = nullptr;  ///< transfer full
     GstBuffer *second = nullptr; ///< transfer full
+    bool discont = false;        ///< it, or what was dropped before it, has the flag DISCONT
   };
 
   /** Takes the next pair off the pads. Buffers whose running times differ by no more than
@@ -63,6 +64,7 @@ private:
   GstClockTime gap_begin_ = GST_CLOCK_TIME_NONE, gap_end_ = 0; /* NONE: no gap found */
   GstClockTime output_end_ = 0;
   bool segment_sent_ = false;
+  bool discont_ = false; /* of the buffers dropped since the last pair */
 };
 
 /** Takes the buffer of a further pad that belongs to a pair. Older ones are dropped and logged; a

@@ -466,7 +466,7 @@ push_pair (GstRangeCombine *self, const PairMatcher::Pair &pair)
   gstrange::stamp (aggregator, output, running, duration, capture);
   GST_LOG_OBJECT (self, "pair at %" GST_TIME_FORMAT, GST_TIME_ARGS (running));
   priv->matcher->record_output (running, duration);
-  if (GST_BUFFER_IS_DISCONT (pair.first))
+  if (pair.discont)
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
   {
     std::lock_guard guard (priv->lock);

@@ -537,7 +537,7 @@ push_pair (GstStereoDepth *self, GstBuffer *third)
                                     ? GST_BUFFER_DURATION (left)
                                     : frame_duration (priv->inputs[kLeft].info);
   gstrange::stamp (aggregator, output, pair.running, duration, pair.capture);
-  if (GST_BUFFER_IS_DISCONT (left) || priv->discont)
+  if (pair.buffers.discont || priv->discont)
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
   priv->discont = false;
   priv->matcher->record_output (pair.running, duration);

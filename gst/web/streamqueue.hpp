@@ -24,7 +24,7 @@ using StreamItem = std::variant<FrameSet, AudioPacket, EndOfStream, SpeechChange
 /** Hands frame sets and speech from the streaming threads to the server's thread. What is pushed
  *  does not wait for that thread; if too much waits there, it is dropped.
  *
- *  Locking: `lock_` guards all members but the constants; nothing is called with it held. */
+ *  Locking: `lock_` guards all members but the constants; `deliver` is called without it. */
 class StreamQueue {
 public:
   using Deliver = std::function<void (const StreamItem &)>;

@@ -112,8 +112,9 @@ make_stereo_webcam (GstDevice *camera)
 
 struct _GstStereoWebcamProvider {
   GstDeviceProvider parent;
-  GstDeviceProvider *cameras;              /* started; null while stopped, or where there is none */
-  std::mutex *lock;                        /* guards `devices`; never held while announcing */
+  GstDeviceProvider *cameras; /* started; null while stopped, or where there is none */
+  std::mutex *lock;           /* guards what follows; never held while announcing */
+  gboolean is_started;
   std::vector<GstStereoWebcam *> *devices; /* announced; the base class owns them */
 };
 
@@ -146,7 +147,8 @@ gst_stereo_webcam_provider_probe (GstDeviceProvider *provider)
   return g_list_reverse (devices);
 }
 
-/* A camera that is listed and announced at the same time is added once. */
+/* A camera that is listed and announced at the same time is added once; one that is announced while
+ * the provider stops, not at all. */
 static void
 add_camera (GstStereoWebcamProvider *self, GstDevice *camera)
 {
@@ -155,8 +157,8 @@ add_camera (GstStereoWebcamProvider *self, GstDevice *camera)
     return;
   {
     const std::lock_guard guard (*self->lock);
-    if (std::ranges::find (*self->devices, camera, &GstStereoWebcam::camera) !=
-        self->devices->end ()) {
+    const auto at = std::ranges::find (*self->devices, camera, &GstStereoWebcam::camera);
+    if (!self->is_started || at != self->devices->end ()) {
       gst_object_unref (gst_object_ref_sink (device));
       return;
     }
@@ -210,6 +212,14 @@ on_camera_message (GstBus *, GstMessage *message, gpointer data)
 }
 
 static void
+set_started (GstStereoWebcamProvider *self, gboolean is_started)
+{
+  const std::lock_guard guard (*self->lock);
+  self->is_started = is_started;
+  self->devices->clear ();
+}
+
+static void
 disconnect_cameras (GstStereoWebcamProvider *self)
 {
   GstBus *bus = gst_device_provider_get_bus (self->cameras);
@@ -225,6 +235,7 @@ gst_stereo_webcam_provider_start (GstDeviceProvider *provider)
   self->cameras = find_camera_provider (provider);
   if (!self->cameras)
     return TRUE;
+  set_started (self, TRUE);
   GstBus *bus = gst_device_provider_get_bus (self->cameras);
   gst_bus_enable_sync_message_emission (bus);
   g_signal_connect (bus, "sync-message", G_CALLBACK (on_camera_message), self);
@@ -232,6 +243,7 @@ gst_stereo_webcam_provider_start (GstDeviceProvider *provider)
   if (gst_device_provider_can_monitor (self->cameras) &&
       !gst_device_provider_start (self->cameras)) {
     GST_WARNING_OBJECT (self, "could not start %" GST_PTR_FORMAT, self->cameras);
+    set_started (self, FALSE);
     disconnect_cameras (self);
     gst_clear_object (&self->cameras);
     return FALSE;
@@ -248,14 +260,13 @@ static void
 gst_stereo_webcam_provider_stop (GstDeviceProvider *provider)
 {
   auto self = GST_STEREO_WEBCAM_PROVIDER (provider);
+  set_started (self, FALSE);
   if (self->cameras) {
     disconnect_cameras (self);
     if (gst_device_provider_can_monitor (self->cameras))
       gst_device_provider_stop (self->cameras);
     gst_clear_object (&self->cameras);
   }
-  const std::lock_guard guard (*self->lock);
-  self->devices->clear ();
 }
 
 static void

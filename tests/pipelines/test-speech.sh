@@ -354,6 +354,7 @@ echo_level () { # elements before webrtcdsp's place: dB of what is sent while on
     grep -o 'rms=(GValueArray)< *[-0-9.]*' | tail -n 2 | grep -o '[-0-9.]*$' | sort -n | head -n 1)
   echo "${level%.*}"
 }
+
 # By 11 to 13 dB, from one run to another.
 test_echo_is_cancelled () {
   gst-inspect-1.0 --exists webrtcdsp || skip "no webrtcdsp (Debian package gstreamer1.0-plugins-bad)"
