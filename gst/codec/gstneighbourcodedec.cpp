@@ -4,7 +4,8 @@
  * @title: neighbourcodedec
  *
  * Decodes neighbour-coded range images. Lost or damaged slices leave invalid pixels (or repeat the
- * last ones, see #GstNeighbourCodeDec:conceal) and are never an error.
+ * last ones, see #GstNeighbourCodeDec:conceal) and are never an error. The first damaged slices of
+ * a stream are a warning message; lost ones are not.
  *
  * Frame sets may refer to earlier ones (neighbourcodeenc temporal=true). Pixels that refer to lost
  * data are treated as lost, and the decoder requests a key frame set from upstream
@@ -86,6 +87,7 @@ struct GstNeighbourCodeDecPrivate {
   GstBufferPool *pool = nullptr;
   Concealment concealment;
   GstClockTime last_request = GST_CLOCK_TIME_NONE; /* PTS of the frame set that caused it */
+  bool warned_damage = false;                      /* of this stream */
   std::vector<guint8> slices;                      /* alignment=slice: of the frame set so far */
   GstBuffer *first = nullptr; /* its first slice, which gives times and flags */
   bool complete = false;      /* its last slice has come */
@@ -149,6 +151,7 @@ reset_stream (GstNeighbourCodeDecPrivate *priv)
   reset_slices (priv);
   reset_references (priv);
   priv->concealment.reset ();
+  priv->warned_damage = false;
 }
 
 static gboolean
@@ -238,6 +241,26 @@ update_is_temporal (GstNeighbourCodeDecPrivate *priv)
     priv->is_temporal = std::ranges::any_of (views, is_reference);
 }
 
+/* Posts the first damage of a stream only: a hostile sender could cause a message a packet. */
+static void
+warn_damage (GstNeighbourCodeDec *self, GstBuffer *input, const DecoderResult &result)
+{
+  GstNeighbourCodeDecPrivate *priv = self->priv;
+  if (result.bad_slices == 0)
+    return;
+  GST_WARNING_OBJECT (
+      self, "dropping %" G_GUINT64_FORMAT " damaged slices", guint64{result.bad_slices});
+  if (priv->warned_damage)
+    return;
+  priv->warned_damage = true;
+  GST_ELEMENT_WARNING (self, STREAM, DECODE,
+      ("%" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT " slices of the frame set at %" GST_TIME_FORMAT
+       " are damaged or do not belong to it; further ones are only counted (bad-slices of `stats`)",
+          guint64{result.bad_slices}, guint64{result.bad_slices + result.slices},
+          GST_TIME_ARGS (GST_BUFFER_PTS (input))),
+      (nullptr));
+}
+
 /* Times, flags and capture time of the output. */
 static void
 copy_metadata (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer *output)
@@ -286,9 +309,7 @@ decode_frame_set (
   }
   update_is_temporal (priv);
   request_key_unit (self, input, result, settings.request_key_units);
-  if (result.bad_slices > 0)
-    GST_WARNING_OBJECT (
-        self, "dropping %" G_GUINT64_FORMAT " damaged slices", guint64{result.bad_slices});
+  warn_damage (self, input, result);
   if (result.missing_pixels + result.unknown_pixels > 0)
     GST_DEBUG_OBJECT (self,
         "%" G_GUINT64_FORMAT " pixels were not received, %" G_GUINT64_FORMAT
@@ -424,6 +445,8 @@ gst_neighbour_code_dec_sink_event (GstBaseTransform *base, GstEvent *event)
   }
   if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
     self->priv->reporter.finish ();
+  if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
+    self->priv->warned_damage = false;
   return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)->sink_event (base, event);
 }
 

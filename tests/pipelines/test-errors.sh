@@ -69,7 +69,8 @@ for i in range(200):
     data[random.randrange(2000, len(data))] ^= 1 << random.randrange(8)
 open("bad.rcnc", "wb").write(data)
 open("short.rcnc", "wb").write(open("good.rcnc", "rb").read()[: len(data) * 2 // 3])'
-  run filesrc location=bad.rcnc ! neighbourcodeparse ! neighbourcodedec ! plyenc ! multifilesink location=bad-%05d.ply
+  run filesrc location=bad.rcnc ! neighbourcodeparse ! neighbourcodedec ! plyenc ! multifilesink location=bad-%05d.ply 2>bad.log
+  [ "$(grep -c 'WARNING: neighbourcodedec0: .* are damaged' bad.log)" = 1 ] || fail "expected one warning of the damage: $(cat bad.log)"
   [ "$(find . -name 'bad-*.ply' | wc -l)" -ge 5 ] || fail "a few flipped bits cost more than half the frame sets: $(ls)"
   run filesrc location=short.rcnc ! neighbourcodeparse ! neighbourcodedec ! plyenc ! multifilesink location=short-%05d.ply
   [ "$(find . -name 'short-*.ply' | wc -l)" -ge 6 ] || fail "a cut file lost more than its end: $(ls)"

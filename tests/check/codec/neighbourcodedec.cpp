@@ -265,6 +265,40 @@ GST_START_TEST (test_conceal_last_shows_the_last_good_pixels_of_damaged_slices)
 }
 GST_END_TEST;
 
+static std::string
+next_warning (GstBus *bus)
+{
+  return next_message_text (bus, GST_MESSAGE_WARNING, 0);
+}
+
+GST_START_TEST (test_first_damage_of_a_stream_is_a_warning_and_losses_are_not)
+{
+  const Rig rig = ring_rig (1);
+  const auto good = encoded_units (rig, make_frame_set (rig));
+  auto lossy = good, bad = good;
+  lossy.erase (lossy.begin () + 3);
+  bad[3].push_back (0); /* a byte left over */
+  bad[3][2]++;
+  GstHarness *h = decoder_harness (rig);
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (h->element, bus);
+  gst_buffer_unref (gst_harness_push_and_pull (h, buffer_of (good)));
+  gst_buffer_unref (gst_harness_push_and_pull (h, buffer_of (lossy, GST_SECOND)));
+  fail_unless_equals_string (next_warning (bus).c_str (), "");
+  gst_buffer_unref (gst_harness_push_and_pull (h, buffer_of (bad, 2 * GST_SECOND)));
+  fail_unless_contains (next_warning (bus),
+      "1 of " + std::to_string (bad.size ()) + " slices of the frame set at 0:00:02.000000000");
+  gst_buffer_unref (gst_harness_push_and_pull (h, buffer_of (bad, 3 * GST_SECOND)));
+  fail_unless_equals_string (next_warning (bus).c_str (), "");
+  gst_harness_push_event (h, gst_event_new_stream_start ("another"));
+  gst_buffer_unref (gst_harness_push_and_pull (h, buffer_of (bad, 4 * GST_SECOND)));
+  fail_unless_contains (next_warning (bus), "0:00:04.000000000");
+  gst_element_set_bus (h->element, nullptr);
+  gst_object_unref (bus);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_discont_of_a_lost_packet_does_not_stop_concealment_but_a_jump_in_time_does)
 {
   const Rig rig = ring_rig (1);
@@ -742,6 +776,7 @@ neighbourcodedec_suite ()
   tcase_add_test (tc, test_new_caps_in_the_stream_are_taken);
   tcase_add_test (tc, test_works_again_after_null);
   tcase_add_test (tc, test_conceal_last_shows_the_last_good_pixels_of_damaged_slices);
+  tcase_add_test (tc, test_first_damage_of_a_stream_is_a_warning_and_losses_are_not);
   tcase_add_test (
       tc, test_discont_of_a_lost_packet_does_not_stop_concealment_but_a_jump_in_time_does);
   tcase_add_test (tc, test_stray_slice_that_comes_first_costs_only_itself);
