@@ -27,6 +27,7 @@
 #include <optional>
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/codedunits.hpp"
@@ -44,11 +45,13 @@ enum : guint { PROP_STATS_INTERVAL = 1, PROP_SETTINGS };
 
 namespace {
 
+constexpr guint kMinPayloadType = 96;
+
 /* The minimum of neighbourcodeenc's max-slice-size. */
 constexpr gsize kMinSliceLimit = 256;
 
 struct Settings {
-  int config_interval = 1; /* s; 0: never, -1: with every frame set */
+  int config_interval = 1; /* s; 0: only a changed rig, -1: with every frame set */
 };
 
 } // namespace
@@ -61,6 +64,7 @@ struct GstRtpNeighbourCodePayPrivate {
 
   /* streaming thread only */
   std::vector<guint8> rig_units;
+  bool rig_changed = false;                       /* and has not been sent since */
   GstClockTime last_config = GST_CLOCK_TIME_NONE; /* running time */
   bool by_slices = false;                         /* alignment of the input */
   bool within_frame_set = false;                  /* more slices of it may follow */
@@ -116,8 +120,14 @@ gst_rtp_neighbour_code_pay_set_caps (GstRTPBasePayload *base, GstCaps *caps)
   priv->reporter.set_views (info.rig);
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
     return FALSE;
-  priv->rig_units.clear ();
+  if (const guint pt = GST_RTP_BASE_PAYLOAD_PT (base); pt < kMinPayloadType) {
+    GST_ELEMENT_ERROR (base, LIBRARY, SETTINGS,
+        ("pt=%u: expected a dynamic payload type, 96 to 127", pt), (nullptr));
+    return FALSE;
+  }
+  const std::vector<guint8> before = std::exchange (priv->rig_units, {});
   rangecast::write_rig_units ({info.rig, info.fps_n, info.fps_d}, priv->rig_units);
+  priv->rig_changed |= !before.empty () && before != priv->rig_units;
   priv->last_config = GST_CLOCK_TIME_NONE;
   const GstStructure *structure = gst_caps_get_structure (caps, 0);
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
@@ -129,6 +139,13 @@ gst_rtp_neighbour_code_pay_set_caps (GstRTPBasePayload *base, GstCaps *caps)
 /* ---- packets ---- */
 
 namespace {
+
+/* Other units belong to files. */
+bool
+is_sent (const UnitHeader &header)
+{
+  return header.type == guint8 (UnitType::kSlice) || header.type == guint8 (UnitType::kRigView);
+}
 
 /* Makes packets of an access unit that share its memory. */
 struct Packer {
@@ -150,18 +167,25 @@ struct Packer {
   /* @return the first unit that is too long for a packet, if any */
   std::optional<UnitHeader> pack (GstBuffer *buffer)
   {
-    gsize begin = 0, end = 0;
+    gsize begin = 0, end = 0; /* of the units for the next packet */
     std::optional<UnitHeader> too_long;
     Status damage; /* what follows it is left out */
+    const auto flush = [&] {
+      if (end > begin)
+        add (buffer, begin, end - begin);
+      begin = end;
+    };
     const auto handle = [&] (gsize offset, std::span<const guint8> unit, const UnitHeader &header) {
+      if (!is_sent (header))
+        return true;
       if (unit.size () > room) {
         too_long = header;
         return false;
       }
-      if (end - begin + unit.size () > room) {
-        add (buffer, begin, end - begin);
-        begin = end;
-      }
+      if (offset != end || end - begin + unit.size () > room)
+        flush ();
+      if (begin == end)
+        begin = offset;
       end = offset + unit.size ();
       return true;
     };
@@ -172,8 +196,8 @@ struct Packer {
     if (!damage.ok ())
       GST_DEBUG_OBJECT (
           base, "dropping the rest of an access unit: %s", damage.message ().c_str ());
-    if (!too_long && end > begin)
-      add (buffer, begin, end - begin);
+    if (!too_long)
+      flush ();
     return too_long;
   }
 };
@@ -240,13 +264,16 @@ config_is_due (GstRtpNeighbourCodePay *self, GstClockTime running)
     std::lock_guard guard (priv->lock);
     interval = priv->settings.config_interval;
   }
-  if (interval == 0)
+  if (interval == 0 && !priv->rig_changed)
     return false;
-  const bool due = interval < 0 || !GST_CLOCK_TIME_IS_VALID (priv->last_config) ||
+  const bool due = priv->rig_changed || interval < 0 ||
+                   !GST_CLOCK_TIME_IS_VALID (priv->last_config) ||
                    !GST_CLOCK_TIME_IS_VALID (running) || running < priv->last_config ||
                    running - priv->last_config >= GstClockTime (interval) * GST_SECOND;
-  if (due)
+  if (due) {
     priv->last_config = running;
+    priv->rig_changed = false;
+  }
   return due;
 }
 
@@ -278,9 +305,7 @@ advice (const UnitHeader &unit, gsize room, gsize mtu_needed)
 static GstFlowReturn
 refuse_long_unit (GstRTPBasePayload *base, const UnitHeader &unit, guint mtu, gsize room)
 {
-  const char *name = unit.type == guint8 (UnitType::kSlice)     ? "slice"
-                     : unit.type == guint8 (UnitType::kRigView) ? "rig view"
-                                                                : "unit";
+  const char *name = unit.type == guint8 (UnitType::kSlice) ? "slice" : "rig view";
   const gsize mtu_needed = unit.size + GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->header_size;
   GST_ELEMENT_ERROR (base, LIBRARY, SETTINGS,
       ("A %s of %d bytes does not fit into RTP packets of mtu=%u; expected %s", name,
@@ -376,6 +401,8 @@ gst_rtp_neighbour_code_pay_change_state (GstElement *element, GstStateChange tra
   GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (element)->priv;
   if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
     priv->frame_sets = priv->packets = priv->bytes = 0;
+    priv->rig_units.clear ();
+    priv->rig_changed = false;
     priv->reporter.start (element, collect_stats);
   }
   const GstStateChangeReturn result = GST_ELEMENT_CLASS (gst_rtp_neighbour_code_pay_parent_class)
@@ -391,8 +418,8 @@ pay_properties ()
   using P = PropertyTable<Settings>;
   static P table = {
       P::number<&Settings::config_interval> ("config-interval", "Config interval",
-          "Interval in seconds at which the rig is repeated in band (0 = never, -1 = with every "
-          "frame set)",
+          "Interval in seconds at which the rig is repeated in band (0 = never, but a changed rig "
+          "is sent once; -1 = with every frame set)",
           -1, 3600, kMutablePlaying),
   };
   return table;

@@ -315,6 +315,61 @@ GST_START_TEST (test_new_rig_is_sent_at_once)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_without_config_interval_only_a_changed_rig_is_sent_and_once)
+{
+  const Rig one = ring_rig (1, 64, 48), two = ring_rig (2, 128, 96);
+  GstHarness *h = payloader (one, "config-interval=0");
+  gst_harness_push (h, access_unit (one));
+  fail_unless_equals_int (count (pull_packets (h), UnitType::kRigView), 0);
+  gst_harness_set_src_caps (h, coded_caps (two));
+  gst_harness_push (h, access_unit (two));
+  const auto packets = pull_packets (h);
+  fail_unless_equals_int (packets[0].count (UnitType::kRigView), 2);
+  for (const GstClockTime time : {GST_SECOND, 10 * GST_SECOND})
+    gst_harness_push (h, access_unit (two, time));
+  gst_element_set_state (h->element, GST_STATE_NULL); /* another stream */
+  gst_harness_play (h);
+  gst_harness_set_src_caps (h, coded_caps (one));
+  gst_harness_push (h, access_unit (one));
+  fail_unless_equals_int (count (pull_packets (h), UnitType::kRigView), 0);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_units_that_belong_to_files_are_not_sent)
+{
+  const Rig rig = ring_rig (1);
+  const auto units = encoded_units (rig, make_frame_set (rig));
+  auto of_file = units;
+  for (const std::size_t at : {std::size_t{0}, units.size () / 2, units.size ()}) {
+    std::vector<guint8> unit = {kBitstreamVersion << 4 | 3, 0, 4, 0};
+    of_file.insert (of_file.begin () + std::ptrdiff_t (at), unit);
+  }
+  GstHarness *h = payloader (rig, "config-interval=0");
+  gst_harness_push (h, buffer_of (of_file));
+  std::vector<std::vector<guint8>> sent;
+  const auto packets = pull_packets (h);
+  for (const Packet &packet : packets)
+    sent.insert (sent.end (), packet.units.begin (), packet.units.end ());
+  fail_unless (sent == units);
+  fail_unless (packets.back ().marker);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_static_payload_type_is_an_error_that_names_the_range)
+{
+  GstHarness *h = gst_harness_new_parse ("rtpneighbourcodepay pt=50");
+  {
+    ErrorCounter errors (h);
+    gst_harness_set_src_caps (h, coded_caps (ring_rig (1)));
+    fail_unless_contains (next_message_text (errors.bus, GST_MESSAGE_ERROR),
+        "pt=50: expected a dynamic payload type");
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_config_interval_may_change_while_playing)
 {
   const Rig rig = ring_rig (1);
@@ -444,6 +499,9 @@ rtpneighbourcodepay_suite ()
   tcase_add_test (tc, test_eos_and_gap_go_by);
   tcase_add_test (tc, test_goes_on_after_a_flush);
   tcase_add_test (tc, test_new_rig_is_sent_at_once);
+  tcase_add_test (tc, test_without_config_interval_only_a_changed_rig_is_sent_and_once);
+  tcase_add_test (tc, test_units_that_belong_to_files_are_not_sent);
+  tcase_add_test (tc, test_static_payload_type_is_an_error_that_names_the_range);
   tcase_add_test (tc, test_config_interval_may_change_while_playing);
   tcase_add_test (tc, test_latency_is_that_of_upstream);
   tcase_add_test (tc, test_empty_rois_are_one_packet_with_a_marker);
