@@ -13,7 +13,7 @@ class Stage {
     this.source = null;
     this.view = null; // what the page looks from
     this.drawing = false; // the page has a frame set that it has not drawn yet
-    this.waiting = null; // facts about the newest frame set, not shown yet
+    this.waiting = null; // of the newest frame set, not shown yet: due, held (it has been shown from elsewhere)
     this.skipped = 0;
     this.decodeTime = 0;
     this.network = null; // of a live source: transport, dropped (by the server), lost (messages, by the network)
@@ -42,7 +42,7 @@ class Stage {
   show () {
     if (!this.waiting || this.drawing || !this.view)
       return;
-    const { due } = this.waiting, begin = performance.now ();
+    const { waiting } = this, begin = performance.now ();
     this.waiting = null;
     if (!this.build ())
       return;
@@ -61,7 +61,7 @@ class Stage {
     }
     const state = this.state ();
     this.drawing = true;
-    postMessage ({ type: 'frame', mode: this.view.mode, layers, state, ...core.frame (), due, skipped: this.skipped,
+    postMessage ({ type: 'frame', mode: this.view.mode, layers, state, ...core.frame (), ...waiting, skipped: this.skipped,
       network: this.network, decodeTime: this.decodeTime, buildTime: performance.now () - begin }, [...transfer, state]);
     this.skipped = this.decodeTime = 0;
   }
@@ -94,7 +94,7 @@ class Stage {
   }
   again () {
     if (!this.waiting && this.core.frame ().views > 0)
-      this.waiting = { due: performance.timeOrigin + performance.now () };
+      this.waiting = { due: performance.timeOrigin + performance.now (), held: true };
     this.show ();
   }
   async open ({ recording, live, paused, time }) {

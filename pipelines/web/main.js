@@ -7,6 +7,7 @@ import { BLEND, Core, STRIPS } from './core.js';
 import { DataChannel } from './data-channel.js';
 import { followPointers } from './pointers.js';
 import { Renderer } from './renderer.js';
+import { Resolution } from './resolution.js';
 import { findServer, storeToken, readToken } from './server.js';
 import { Speech } from './speech.js';
 import { Stats } from './stats.js';
@@ -41,26 +42,28 @@ const timeText = (ms) => {
 };
 
 const CHANNEL_WAIT = 10000; // ms until another data channel is tried
+const REST = 500; // ms without a new picture until the last one is drawn at full resolution
 
 class Page {
-  constructor (module) {
+  // worker: of decoder.js
+  constructor (module, worker) {
+    this.worker = worker;
+    this.worker.onmessage = ({ data }) => this[data.type] (data);
+    this.worker.postMessage ({ type: 'start', module });
     this.camera = new Core (module);
     this.renderer = new Renderer (canvas, (number) => this.camera.text (this.camera.call ('rc_shader', number)));
-    this.worker = new Worker ('decoder.js', { type: 'module' });
-    this.worker.onmessage = ({ data }) => this[data.type] (data);
-    this.worker.onerror = (event) => say (`The decoder could not be started: ${event.message ?? 'its file could not be loaded'}.`);
-    this.worker.postMessage ({ type: 'start', module });
     this.speech = new Speech (say, (wait) => this.worker.postMessage ({ type: 'hold', wait }));
     this.stats = new Stats (element ('stats'), parameters.has ('stats'), (latency) => this.speech.follow (latency));
     this.pending = null; // the newest frame set, not uploaded yet
-    this.wanted = false;
+    this.resolution = new Resolution ();
+    this.wanted = this.painting = false; // another picture; one is under way
     this.server = null; // { url, token }
     this.headset = new Headset (this, element ('headset'), say);
     this.channel = null;
     if (parameters.has ('azimuth') || parameters.has ('elevation'))
       this.camera.call ('rc_set_orbit', Number (parameters.get ('azimuth') ?? 0), Number (parameters.get ('elevation') ?? 0), 0, 0, 0, 0, 0);
     this.watch ();
-    this.resize ();
+    this.draw ();
   }
 
   // ---- from the worker ----
@@ -69,6 +72,8 @@ class Page {
     if (this.pending)
       this.stats.skip ();
     this.pending = frame;
+    if (!frame.held)
+      this.resolution.follow (frame);
     this.draw ();
   }
   // The camera's default position, or what surrounds the scene, has changed.
@@ -141,18 +146,37 @@ class Page {
   }
 
   draw () {
-    if (this.wanted || this.headset.session)
-      return; // a headset asks for its pictures itself
     this.wanted = true;
-    requestAnimationFrame (() => {
-      this.wanted = false;
-      this.paint ();
-    });
+    if (this.painting || this.headset.session) // a headset asks for its pictures itself
+      return;
+    this.painting = true;
+    requestAnimationFrame (() => this.drawNext ());
+  }
+  // The next picture has to wait until the GPU has drawn this one, so that it is of the newest frame set.
+  async drawNext () {
+    clearTimeout (this.rest);
+    this.wanted = false;
+    const { scale } = this.resolution, begin = performance.now ();
+    this.setSize (scale);
+    const frame = this.paint ();
+    await this.renderer.drawn ();
+    this.resolution.drawn (performance.now () - begin);
+    this.shown (frame, begin);
+    this.painting = false;
+    if (this.wanted)
+      this.draw ();
+    else if (scale < 1)
+      this.rest = setTimeout (() => this.drawWhole (), REST);
+  }
+  drawWhole () {
+    const begin = performance.now ();
+    this.setSize (1);
+    this.shown (this.paint (), begin);
   }
 
-  // show: draws one picture, or one for each eye
+  // show: draws one picture, or one for each eye. Returns the frame set that is new in it, if any.
   paint (show = () => this.renderer.draw (this.picture ('rc_camera_picture', canvas.width, canvas.height, this.renderer.largest))) {
-    const begin = performance.now (), frame = this.pending;
+    const frame = this.pending;
     this.pending = null;
     try {
       if (frame) {
@@ -163,12 +187,16 @@ class Page {
     } catch (error) {
       say (error.message);
     }
-    if (frame) {
-      this.worker.postMessage ({ type: 'shown' });
-      this.stats.shown (frame, performance.now () - begin);
-      document.body.dataset.frameSets = Number (document.body.dataset.frameSets ?? 0) + 1;
-    }
     this.postView ();
+    return frame;
+  }
+  // begin: when its drawing began
+  shown (frame, begin) {
+    if (!frame)
+      return;
+    this.worker.postMessage ({ type: 'shown' });
+    this.stats.shown (frame, performance.now () - begin, this.resolution.scale);
+    document.body.dataset.frameSets = Number (document.body.dataset.frameSets ?? 0) + 1;
   }
 
   picture (name, ...args) {
@@ -180,7 +208,7 @@ class Page {
 
   // The camera decides which views are reduced, and the shape of the picture what fits.
   postView () {
-    const view = { ...this.camera.record ('rc_orbit'), aspect: canvas.width / canvas.height, ...settings };
+    const view = { ...this.camera.record ('rc_orbit'), aspect: (canvas.clientWidth || 1) / (canvas.clientHeight || 1), ...settings };
     const text = JSON.stringify (view);
     if (text !== this.postedView)
       this.worker.postMessage ({ type: 'view', view });
@@ -200,12 +228,14 @@ class Page {
     this.worker.postMessage ({ type: 'open', recording, paused: parameters.has ('paused'), time: Number (parameters.get ('time') ?? 0) });
   }
 
-  resize () {
-    const ratio = window.devicePixelRatio || 1;
-    const side = this.renderer.largest;
-    canvas.width = Math.max (1, Math.min (side, Math.round (canvas.clientWidth * ratio)));
-    canvas.height = Math.max (1, Math.min (side, Math.round (canvas.clientHeight * ratio)));
-    this.draw ();
+  // scale: of the resolution of the screen
+  setSize (scale) {
+    const ratio = scale * (window.devicePixelRatio || 1);
+    for (const [side, length] of [['width', canvas.clientWidth], ['height', canvas.clientHeight]]) {
+      const pixels = Math.max (1, Math.min (this.renderer.largest, Math.round (length * ratio)));
+      if (canvas[side] !== pixels)
+        canvas[side] = pixels;
+    }
   }
 
   move (name, ...args) {
@@ -232,7 +262,7 @@ class Page {
   }
 
   watch () {
-    new ResizeObserver (() => this.resize ()).observe (canvas);
+    new ResizeObserver (() => this.draw ()).observe (canvas);
     followPointers (canvas, (name, ...args) => this.move (name, ...args));
     addEventListener ('keydown', (event) => this.key (event));
     canvas.addEventListener ('webglcontextlost', (event) => {
@@ -254,7 +284,10 @@ class Page {
       this.speech.toggle ();
       element ('sound').textContent = this.speech.isOn ? 'Sound off' : 'Sound on';
     };
-    element ('save-picture').onclick = () => canvas.toBlob ((blob) => blob && save (blob, 'rangecast.png'));
+    element ('save-picture').onclick = () => {
+      this.drawWhole ();
+      canvas.toBlob ((blob) => blob && save (blob, 'rangecast.png'));
+    };
     element ('save-points').onclick = () => this.worker.postMessage ({ type: 'points' });
     element ('token').onsubmit = (event) => {
       event.preventDefault ();
@@ -287,22 +320,26 @@ const loadModule = async () => {
   });
 };
 
+// A stream to show at once: { url, title }, or null.
+const findStream = async () => {
+  if (parameters.has ('src'))
+    return null;
+  return parameters.has ('server') ? { url: new URL (parameters.get ('server'), location).href.replace (/^http/, 'ws') } : findServer ();
+};
+
 try {
-  const page = new Page (await loadModule ());
+  const worker = new Worker ('decoder.js', { type: 'module' });
+  worker.onerror = (event) => say (`The decoder could not be started: ${event.message ?? 'its file could not be loaded'}.`);
+  const [module, stream] = await Promise.all ([loadModule (), findStream ()]);
+  const page = new Page (module, worker);
   window.rangecastPage = page; // for tests and for the curious
+  document.title = stream?.title || document.title;
   if (parameters.has ('src'))
     page.open (new URL (parameters.get ('src'), location).href);
-  else if (parameters.has ('server')) {
-    const url = new URL (parameters.get ('server'), location).href.replace (/^http/, 'ws');
-    page.openLive (url, readToken (url));
-  } else {
-    const server = await findServer ();
-    if (server) {
-      document.title = server.title || document.title;
-      page.openLive (server.url, readToken (server.url));
-    } else
-      element ('welcome').hidden = false;
-  }
+  else if (stream)
+    page.openLive (stream.url, readToken (stream.url));
+  else
+    element ('welcome').hidden = false;
 } catch (error) {
   say (error.message);
 }

@@ -2,8 +2,10 @@
 // Mouse, touch and wheel move the camera, as in striprender: left button or one finger orbits; other buttons, Shift, or two fingers pan;
 // wheel or the distance of two fingers zooms. move (name, ...arguments) calls a function of rangecast.wasm.
 export const followPointers = (canvas, move) => {
-  const down = new Map (); // by pointer: place in pixels of the picture
-  const place = (event) => ({ x: event.clientX * canvas.width / canvas.clientWidth, y: event.clientY * canvas.height / canvas.clientHeight });
+  const down = new Map (); // by pointer: place, in pixels of the screen
+  const place = (event) => ({ x: event.clientX, y: event.clientY });
+  // From a to b, in pixels of the picture, whose resolution changes
+  const way = (a, b) => [(b.x - a.x) * canvas.width / canvas.clientWidth, (b.y - a.y) * canvas.height / canvas.clientHeight];
 
   canvas.addEventListener ('pointerdown', (event) => {
     if (down.size >= 2)
@@ -15,10 +17,10 @@ export const followPointers = (canvas, move) => {
     const before = down.get (event.pointerId);
     if (!before)
       return;
-    const now = place (event), dx = now.x - before.x, dy = now.y - before.y;
+    const now = place (event), [dx, dy] = way (before, now);
     const other = [...down].find (([id]) => id !== event.pointerId)?.[1];
     if (other)
-      move ('rc_pinch', dx / 2, dy / 2, Math.hypot (before.x - other.x, before.y - other.y), Math.hypot (now.x - other.x, now.y - other.y));
+      move ('rc_pinch', dx / 2, dy / 2, Math.hypot (...way (before, other)), Math.hypot (...way (now, other)));
     else
       move (before.pans ? 'rc_pan_by' : 'rc_orbit_by', dx, dy);
     Object.assign (before, now);

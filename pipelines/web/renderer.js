@@ -12,20 +12,28 @@ class Program {
   constructor (gl, vertex, fragment) {
     this.gl = gl;
     this.program = gl.createProgram ();
-    for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    this.shaders = [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]].map (([type, source]) => {
       const shader = gl.createShader (type);
       gl.shaderSource (shader, source);
       gl.compileShader (shader);
       gl.attachShader (this.program, shader);
-      if (!gl.getShaderParameter (shader, gl.COMPILE_STATUS) && !gl.isContextLost ())
-        throw new Error (`A shader does not compile: ${gl.getShaderInfoLog (shader)}`);
-    }
+      return shader;
+    });
     gl.linkProgram (this.program);
-    if (!gl.getProgramParameter (this.program, gl.LINK_STATUS) && !gl.isContextLost ())
-      throw new Error (`A shader does not link: ${gl.getProgramInfoLog (this.program)}`);
     this.places = new Map ();
   }
-  use () { this.gl.useProgram (this.program); }
+  use () {
+    if (this.shaders)
+      this.check ();
+    this.gl.useProgram (this.program);
+  }
+  // At the first use: who asks earlier waits for the compiler.
+  check () {
+    const gl = this.gl;
+    if (!gl.getProgramParameter (this.program, gl.LINK_STATUS) && !gl.isContextLost ())
+      throw new Error (`A shader does not compile or link: ${this.shaders.map ((shader) => gl.getShaderInfoLog (shader)).join (' ')} ${gl.getProgramInfoLog (this.program)}`);
+    this.shaders = null;
+  }
   at (name) {
     if (!this.places.has (name))
       this.places.set (name, this.gl.getUniformLocation (this.program, name));
@@ -154,6 +162,22 @@ export class Renderer {
         this.drawStrips (picture);
     }
     gl.disable (gl.SCISSOR_TEST);
+  }
+  // Resolves when the GPU has drawn what it was told to.
+  drawn () {
+    const { gl } = this, fence = gl.fenceSync (gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush ();
+    return new Promise ((resolve) => {
+      const look = () => {
+        if (!gl.isContextLost () && gl.getSyncParameter (fence, gl.SYNC_STATUS) !== gl.SIGNALED)
+          setTimeout (look, 0);
+        else {
+          gl.deleteSync (fence);
+          resolve ();
+        }
+      };
+      setTimeout (look, 0); // its state does not change before
+    });
   }
   get size () { return { width: this.canvas.width, height: this.canvas.height }; }
 

@@ -13,7 +13,7 @@ export class Stats {
     this.begin = performance.now ();
     this.count = this.skipped = this.bytes = this.decode = this.build = this.draw = 0;
   }
-  // latency: ms until the frame after the draw calls
+  // latency: ms until the frame after it was drawn
   seen (latency) {
     this.onSeen (latency);
     this.latencies.push (latency);
@@ -23,8 +23,8 @@ export class Stats {
   // A frame set that a newer one replaced before it was drawn.
   skip () { this.skipped++; }
 
-  // drawing: milliseconds on the main thread
-  shown (frame, drawing) {
+  // drawing: milliseconds until it was on the canvas; scale: of the resolution
+  shown (frame, drawing, scale) {
     this.count++;
     this.skipped += frame.skipped;
     this.bytes += frame.bytes;
@@ -40,7 +40,7 @@ export class Stats {
       `${(1000 * this.count / elapsed).toFixed (1)} frame sets/s shown, ${this.skipped} skipped`,
       `${frame.views} views, ${frame.points} points, ${(this.bytes / this.count / 1024).toFixed (1)} KiB`,
       `missing ${frame.missingPixels}, unknown ${frame.unknownPixels} pixels; ${frame.badSlices} damaged slices`,
-      `decode ${mean (this.decode)}, geometry ${mean (this.build)}, draw ${mean (this.draw)}`,
+      `decode ${mean (this.decode)}, geometry ${mean (this.build)}, draw ${mean (this.draw)}${scale < 1 ? `, at ${Math.round (100 * scale)} % of the resolution` : ''}`,
       `latency ${(this.latencies.at (-1) ?? 0).toFixed (0)} ms from ${frame.network ? 'capture' : 'due'} to drawn`,
       ...frame.network ? [`${frame.network.transport}: ${frame.network.dropped} frame sets dropped by the server, ${frame.network.lost} messages lost`] : [],
     ].join ('\n');

@@ -6,7 +6,7 @@ const product = (a, b) => Float32Array.from ({ length: 16 }, (_, i) =>
   [0, 1, 2, 3].reduce ((sum, k) => sum + a[4 * k + i % 4] * b[4 * (i - i % 4) / 4 + k], 0));
 
 export class Headset {
-  // page: its renderer, camera and paint (); button: hidden where there is no headset
+  // page: its renderer, camera, paint () and shown (); button: hidden where there is no headset
   constructor (page, button, say) {
     Object.assign (this, { page, button, say, session: null });
     button.onclick = () => this.session ? this.session.end () : this.enter ();
@@ -25,9 +25,9 @@ export class Headset {
       const space = await session.requestReferenceSpace ('local');
       const show = (_, frame) => {
         session.requestAnimationFrame (show);
-        const pose = frame.getViewerPose (space);
+        const begin = performance.now (), pose = frame.getViewerPose (space);
         if (pose)
-          this.page.paint (() => this.draw (pose, layer));
+          this.page.shown (this.page.paint (() => this.draw (pose, layer)), begin);
       };
       session.requestAnimationFrame (show);
       this.button.textContent = 'Leave VR';

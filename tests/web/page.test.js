@@ -219,6 +219,14 @@ test ('on a phone one finger orbits, and every pixel of the screen is used', asy
   await page.close ();
 });
 
+test ('a GPU that is too slow for the window draws fewer pixels of moving pictures, and all of one that stands still', async () => {
+  const page = await open ('src=moving.rcnc', { width: 2400, height: 1800 }); // SwiftShader cannot do that 15 times a second
+  const size = 'document.body.dataset.state, document.getElementById (\'picture\').width, document.getElementById (\'picture\').height';
+  await page.waitForFunction (`((state, width, height) => width < 2400 && height < 1800) (${size})`);
+  await page.waitForFunction (`((state, width, height) => state === 'paused' && width === 2400 && height === 1800) (${size})`);
+  await page.close ();
+});
+
 test ('memory stays the same over many frame sets', async () => {
   const page = await open ('src=moving.rcnc&paused');
   await framesShown (page, 1);
