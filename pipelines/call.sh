@@ -61,6 +61,18 @@ split_address "$peer:$port" --peer
 [ -z "$fec" ] || need_number "$fec" --fec 1 100
 rtp_key=$key rtp_check sender
 
+# usage: check SCRIPT OPTION...: whether it takes them; its error is about an option of this script
+check () {
+  local said
+  said=$(RANGECAST_LAUNCH=true "$@" 2>&1) || die "$(sed 's/^[a-z-]*\.sh: //; s/--talk:/--microphone:/' <<<"$said")"
+}
+viewer=("$here/viewer-host.sh" --listen "$port" --audio $((port + 2)) --speaker "$speaker" ${window:+"$window"}
+  ${out:+--out "$out"} ${fec:+--fec} ${key:+--key "$key"})
+[ "$microphone" = none ] || viewer+=(${echo_cancel:+"$echo_cancel"} --talk "$microphone" --talk-to "$peer:$((port + 2))")
+camera=("$here/camera-host.sh" --rig "$rig" --input "$input" "${camera[@]}" ${key:+--key "$key"})
+check "${viewer[@]}"
+check "${camera[@]}" --view 0 --to "127.0.0.1:$((port + 10))"
+
 # Ends what is still running, and says which part failed first.
 parts=() names=() control=()
 hang_up () {
@@ -81,13 +93,11 @@ start () { # name command...
   parts+=($!)
 }
 
-start viewer "$here/viewer-host.sh" --listen "$port" --audio $((port + 2)) --speaker "$speaker" $window \
-  ${out:+--out "$out"} ${fec:+--fec} ${key:+--key "$key"} $echo_cancel --talk "$microphone" --talk-to "$peer:$((port + 2))"
+start viewer "${viewer[@]}"
 start parent "$here/parent-host.sh" --views "$views" --listen $((port + 10)) --to "$peer:$port" \
   ${fec:+--fec "$fec"} ${key:+--key "$key"}
 for ((i = 0; i < views; i++)); do
-  start "camera host of view $i" "$here/camera-host.sh" --view "$i" --rig "$rig" --input "$input" "${camera[@]}" \
-    --to "127.0.0.1:$((port + 10 + i))" ${key:+--key "$key"}
+  start "camera host of view $i" "${camera[@]}" --view "$i" --to "127.0.0.1:$((port + 10 + i))"
 done
 
 # Keys are read in the background of the wait for the first part that ends.

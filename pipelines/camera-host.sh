@@ -113,6 +113,10 @@ rtp_check sender
 [[ ! "${encoder,,}" =~ adaptive-bitrate\ *=\ *[\"\']?(true|t|yes|1)([^a-z0-9]|$) ]] || rtp_adaptive=yes
 [ -z "$rtp_adaptive" ] || [ -n "$rtp_feedback" ] ||
   echo "camera-host.sh: --encoder: adaptive-bitrate has no effect without --feedback, because no receiver reports arrive" >&2
+split_properties "$depth" algorithm=bm --depth stereodepth
+depth=("${words[@]}")
+split_properties "$encoder" profile=entropy --encoder neighbourcodeenc
+encoder=("${words[@]}")
 send_rtp "$to"
 [ -z "$audio_source$audio_to" ] || need_option "$audio_source" --audio
 if [ -n "$audio_source" ]; then
@@ -175,7 +179,6 @@ read_cameras () {
   done
 }
 
-read -ra depth <<<"$depth"
 depth=(stereodepth name=depth "rig=$rig" "view-id=$view" "${depth[@]}" !)
 case "$input" in
   range)
@@ -202,7 +205,6 @@ case "$input" in
     cameras+=("${side[@]}" ! queue ! depth.right) ;;
 esac
 
-read -ra encoder <<<"$encoder"
 launch "${cameras[@]}" \
   "${depth[@]}" \
   roiextract "background-frames=$learn" \

@@ -14,6 +14,14 @@ die () { echo "$(basename "$0"): $*" >&2; exit 2; }
 # usage: need_option VALUE option: an option without a default
 need_option () { [ -n "$1" ] || die "$2 is required"; }
 
+# usage: refuse REASON OPTION...: ends with an error if one of them is in `given`, the options that a script got, with spaces round each
+refuse () {
+  local one
+  for one in "${@:2}"; do
+    [[ "$given" != *" $one "* ]] || die "$one: $1"
+  done
+}
+
 # usage: split_words TEXT option: quotes and backslashes keep spaces within a word; nothing is expanded -> sets the array `words`
 split_words () {
   mapfile -d '' words < <(xargs -r printf '%s\0' <<<"$1" 2>/dev/null)
@@ -24,6 +32,32 @@ split_words () {
 split_elements () {
   split_words "$1" "$3"
   [ ${#words[@]} -gt 0 ] || die "$3: expected elements in gst-launch-1.0 syntax, e.g. $2"
+  [[ ! " ! ${words[*]} ! " =~ \ !\ +!\  ]] || die "$3: expected an element before and after each '!', got '$1'"
+}
+
+# usage: numeric_range PROPERTY VALUE <output of gst-inspect-1.0: prints the range if the value is a number outside it
+numeric_range () {
+  awk -v name="$1" -v value="$2" '
+    /^  [a-z]/ { inside = $1 == name || $1 == name ":" }
+    inside && match($0, /Range: *[^ ]+ - +[^ ]+/) {
+      split(substr($0, RSTART, RLENGTH), part)
+      if (part[2] ~ /^-?[0-9.e+]+$/ && value ~ /^-?[0-9]+(\.[0-9]*)?$/ && (value + 0 < part[2] + 0 || value + 0 > part[4] + 0))
+        print part[2] " to " part[4]
+    }'
+}
+
+# usage: split_properties TEXT example option ELEMENT -> sets the array `words` to properties of the element, NAME=VALUE. Only a
+# warning of GLib would report a number out of range.
+split_properties () {
+  local one known range
+  split_words "$1" "$3"
+  [ ${#words[@]} -gt 0 ] || return 0
+  known=$(LC_ALL=C gst-inspect-1.0 "$4" 2>/dev/null) || known= # launching says that it is not there
+  for one in "${words[@]}"; do
+    [[ "$one" =~ ^[a-z][a-z0-9-]*=. ]] || die "$3: expected properties of $4, e.g. $2, got '$one'"
+    range=$(numeric_range "${one%%=*}" "${one#*=}" <<<"$known")
+    [ -z "$range" ] || die "$3: $one: expected $range"
+  done
 }
 
 is_ipv4 () { # 192.0.2.1

@@ -30,9 +30,9 @@ From the cameras:
 END
 }
 
-views= listen= to= jitter=30 latency=60 clock_port= rig= cameras_feedback= camera_fec= camera_rtx= audio_port= audio_to= audio=()
+given=' ' views= listen= to= jitter=30 latency=60 clock_port= rig= cameras_feedback= camera_fec= camera_rtx= audio_port= audio_to= audio=()
 while [ $# -gt 0 ]; do
-  option=$1
+  option=$1 given+="$1 "
   rtp_option sender "$1" "${2:-}"
   if [ $taken -gt 0 ]; then
     shift $taken || die "option $1 needs a value"
@@ -67,7 +67,7 @@ need_number "$rtp_ttl" --ttl 0 255
 need_number "$jitter" --jitter 0 10000
 need_number "$latency" --latency 0 10000
 [ -z "$clock_port" ] || need_number "$clock_port" --clock-port 1 65535
-[ -z "$rtp_interface" ] || [[ "$to" =~ (^|,)(22[4-9]|23[0-9])\. ]] || die "--interface: expected with a multicast group in --to"
+[[ "$to,$audio_to" =~ (^|,)(22[4-9]|23[0-9])\. ]] || refuse "expected with a multicast group in --to or --audio-to" --interface --ttl
 # usage: need_own_port PORT option: must differ from the ports that cameras send to
 need_own_port () {
   [ "$1" -lt "$listen" ] || [ "$1" -ge $((listen + views)) ] || die "$2: port $1 is used by view $(($1 - listen)) (--listen $listen)"

@@ -16,9 +16,9 @@ Speech that was recorded with it, x.opus beside x.rcnc, is played, too.
 END
 }
 
-file= film= orbit=30 size=640x480 speaker=autoaudiosink audio=()
+given=' ' file= film= orbit=30 size=640x480 speaker=autoaudiosink audio=()
 while [ $# -gt 0 ]; do
-  option=$1
+  option=$1 given+="$1 "
   case "$1" in
     --film) film=${2:-}; shift ;;
     --orbit) orbit=${2:-}; shift ;;
@@ -35,6 +35,7 @@ done
 need_picture "$size" --size
 need_degrees "$orbit" --orbit
 if [ -n "$film" ]; then
+  refuse "expected without --film" --speaker
   need_place "$film"
   [ ! "$film" -ef "$file" ] || die "--film: '$film' is the recording itself; expected another file"
 fi

@@ -24,9 +24,9 @@ END
   rtp_usage_receiver
 }
 
-file= listen= views=4 size=320x240 frames=60 group= jitter=50 audio_port= audio=()
+given=' ' file= listen= views=4 size=320x240 frames=60 group= jitter=50 audio_port= audio=()
 while [ $# -gt 0 ]; do
-  option=$1
+  option=$1 given+="$1 "
   rtp_option receiver "$1" "${2:-}"
   if [ $taken -gt 0 ]; then
     shift $taken || die "option $1 needs a value"
@@ -55,12 +55,9 @@ need_number "$frames" --frames 1 1000000
 need_picture "$size" --size 4096
 
 [ -z "$rtp_interface" ] || [ -n "$group" ] || die "--interface: expected with --multicast"
-[ -z "$group" ] || [ -n "$listen" ] || die "--multicast: expected with --listen"
 [ -z "$group" ] || need_group "$group"
-[ -z "$audio_port" ] || [ -n "$listen" ] || die "--audio: expected with --listen"
-[ -z "$rtp_fec$rtp_rtx$rtp_key$rtp_feedback" ] || [ -n "$listen" ] || die "options of RTP: expected with --listen"
-
-if [ -n "$listen" ]; then
+if [[ "$given" = *" --listen "* ]]; then
+  refuse "expected without --listen" --views --size --frames
   need_number "$listen" --listen 1 65535
   need_number "$jitter" --jitter 0 10000
   rtp_check receiver
@@ -77,6 +74,7 @@ if [ -n "$listen" ]; then
       ! oggmux ! filesink async=false "location=$speech")
   fi
 else
+  refuse "expected with --listen" --audio --jitter --multicast --fec --feedback --rtx --key
   source=(avatartestsrc "views=$views" "num-buffers=$frames" range-person-only=true
     ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1"
     ! neighbourcodeenc profile=entropy temporal=true key-interval=2000)

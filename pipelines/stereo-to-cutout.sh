@@ -18,7 +18,7 @@ usage: stereo-to-cutout.sh LEFT RIGHT OUT-DIR --rig FILE [options]
 END
 }
 
-files=() rig= view=0 size= fps= settle=0 learn=30 stereo=() roi=()
+files=() rig= view=0 size= fps= settle=0 learn=30 stereo= roi=
 while [ $# -gt 0 ]; do
   option=$1
   case "$1" in
@@ -28,8 +28,8 @@ while [ $# -gt 0 ]; do
     --fps) fps=${2:-}; shift ;;
     --settle) settle=${2:-}; shift ;;
     --learn) learn=${2:-}; shift ;;
-    --stereo) read -ra stereo <<<"${2:-}"; shift ;;
-    --roi) read -ra roi <<<"${2:-}"; shift ;;
+    --stereo) stereo=${2:-}; shift ;;
+    --roi) roi=${2:-}; shift ;;
     -h | --help) usage; exit 0 ;;
     -*) usage >&2; die "unknown option '$1'" ;;
     *) files+=("$1") ;;
@@ -43,6 +43,10 @@ done
 need_number "$view" --view 0 63
 need_number "$settle" --settle 0 100000
 need_number "$learn" --learn 1 10000
+split_properties "$stereo" algorithm=bm --stereo stereodepth
+stereo=("${words[@]}")
+split_properties "$roi" margin=8 --roi roiextract
+roi=("${words[@]}")
 prepare=()
 if [ -n "$fps" ]; then
   need_number "$fps" --fps 1 1000

@@ -28,10 +28,10 @@ END
   rtp_usage_receiver
 }
 
-listen= out= window= orbit=0 size=640x480 jitter=30 group= audio_port= speaker=autoaudiosink audio=() step=() talk=none talk_to= talk_clock=system
+given=' ' listen= out= window= orbit=0 size=640x480 jitter=30 group= audio_port= speaker=autoaudiosink audio=() step=() talk=none talk_to= talk_clock=system
 echo_cancel= talking=() render= hear_echo=()
 while [ $# -gt 0 ]; do
-  option=$1
+  option=$1 given+="$1 "
   rtp_option receiver "$1" "${2:-}"
   if [ $taken -gt 0 ]; then
     shift $taken || die "option $1 needs a value"
@@ -63,17 +63,19 @@ need_number "$listen" --listen 1 65535
 need_number "$jitter" --jitter 0 10000
 need_picture "$size" --size
 need_degrees "$orbit" --orbit
+split_properties "$render" mode=strips --render striprender
+render=("${words[@]}")
 [ -z "$group" ] || need_group "$group"
 [ -z "$rtp_interface" ] || [ -n "$group" ] || die "--interface: expected with --multicast"
 rtp_check receiver
 receive_rtp 0 "$listen" "$jitter" 4194304 "$group"
 
-[ "$talk" != none ] || [ -z "$talk_to" ] || die "--talk-to: expected with --talk"
-[ -z "$echo_cancel" ] || [ -n "$audio_port" ] || die "--echo-cancel: expected with --audio"
+[ "$talk" != none ] || refuse "expected with --talk" --talk-to --talk-clock --echo-cancel
+[ -n "$audio_port" ] || refuse "expected with --audio" --speaker --echo-cancel
 if [ "$talk" != none ]; then
   need_option "$talk_to" --talk-to
   # The filter finds the delay between loudspeaker and microphone itself.
-  if [ -n "$echo_cancel" ] && [ -n "$audio_port" ] && [ "$speaker" != none ]; then
+  if [ -n "$echo_cancel" ] && [ "$speaker" != none ]; then
     audio_filter=(! webrtcdsp probe=heard)
     hear_echo=(! audio/x-raw,format=S16LE,rate=48000,channels=1 ! webrtcechoprobe name=heard)
   fi
@@ -82,7 +84,6 @@ if [ "$talk" != none ]; then
   talking=("${audio[@]}") audio=()
   audio_clock "$talk_clock"
 fi
-[ -n "$audio_port" ] || [ "$speaker" = autoaudiosink ] || [ "$speaker" = none ] || die "--speaker: expected with --audio"
 # Without speech, pictures are shown as soon as they are drawn; with it, when they are due.
 sync=false
 if [ -n "$audio_port" ]; then
@@ -108,7 +109,6 @@ if [ -n "$out" ]; then
     keyframe-max-dist=60 ! webmmux name=film ! filesink "location=$out/avatar.webm")
 fi
 
-read -ra render <<<"$render"
 launch "${rtp[@]}" "${step[@]}" \
   ! queue max-size-buffers=4 leaky=downstream ! neighbourcodedec name=decoder \
   ! queue max-size-buffers=1 leaky=downstream ! cylinderfilter name=cylinder ! striprender name=view "auto-orbit=$orbit" "${render[@]}" \

@@ -51,6 +51,8 @@ case "$packing" in
   *) die "--packing: expected side-by-side or top-bottom, got '$packing'" ;;
 esac
 [ -z "$png" ] || need_place "$png"
+split_properties "$depth" near=0.4 --depth stereodepth
+depth=("${words[@]}")
 if [ -z "$input" ]; then
   [ -c "$device" ] || die "--device: no camera '$device'; gst-device-monitor-1.0 Video/Source lists cameras"
   # Most cameras have their larger sizes as JPEG only.
@@ -64,7 +66,6 @@ if [ ! -e "$rig" ]; then
   "$(dirname "$0")/calibrate.sh" "--$packing" "${calibrate:-$input}" --out "$rig" "${window[@]}" "$@"
 fi
 
-read -ra depth <<<"$depth"
 split_elements "$input" v4l2src --input
 person=()
 [ "$learn" = 0 ] || person=(! roiextract "background-frames=$learn")

@@ -215,6 +215,39 @@ test_elements_in_options_are_words_and_not_run () {
   grep -qF 'filesrc location=a b ! $(touch run) ! `touch run`; touch run ! *' words.txt || fail "$(cat words.txt)"
 }
 
+test_properties_in_options_are_named () {
+  local camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml --to 127.0.0.1:6000) viewer=("$pipelines/viewer-host.sh" --listen 6000)
+  make_rig
+  export RANGECAST_LAUNCH=echo
+  expect_error "--render: a quote is not closed in 'a \"'" "${viewer[@]}" --render 'a "'
+  expect_error "--depth: a quote is not closed in 'a \"'" "${camera[@]}" --depth 'a "'
+  expect_error "--render: expected properties of striprender, e.g. mode=strips, got 'strips'" "${viewer[@]}" --render strips
+  expect_error "--depth: expected properties of stereodepth, e.g. algorithm=bm, got '!'" "${camera[@]}" --depth 'near=1 ! fakesink'
+  expect_error "--encoder: n-threads=1000: expected 0 to 64" "${camera[@]}" --encoder "profile=entropy n-threads=1000"
+  expect_error "--depth: near=-1: expected 0" "${camera[@]}" --depth near=-1
+  expect_error "--talk: expected an element before and after each '!'" "${viewer[@]}" --talk 'pulsesrc !' --talk-to 127.0.0.1:7000
+  "${viewer[@]}" --render 'mode=strips camera-target="0 1 0"' | grep -q 'mode=strips camera-target=0 1 0' || fail "the properties are not there"
+}
+
+test_options_without_effect_are_refused () {
+  local option viewer=("$pipelines/viewer-host.sh" --listen 6000) parent=("$pipelines/parent-host.sh" --views 1 --listen 5000)
+  for option in "--views 2" "--size 160x120" "--frames 3"; do
+    # shellcheck disable=SC2086
+    expect_error "record.sh: ${option% *}: expected without --listen" "$pipelines/record.sh" none.rcnc --listen 6000 $option
+  done
+  for option in "--audio 6002" "--jitter 10" "--multicast 239.255.7.1" "--key x" --fec --rtx "--feedback 127.0.0.1:7000"; do
+    # shellcheck disable=SC2086
+    expect_error "record.sh: ${option% *}: expected with --listen" "$pipelines/record.sh" none.rcnc $option
+  done
+  touch some.rcnc
+  expect_error "--speaker: expected without --film" "$pipelines/play.sh" some.rcnc --film film.webm --speaker fakesink
+  expect_error "--talk-clock: expected with --talk" "${viewer[@]}" --talk-clock 127.0.0.1:7000
+  expect_error "--echo-cancel: expected with --talk" "${viewer[@]}" --audio 6002 --echo-cancel
+  expect_error "--speaker: expected with --audio" "${viewer[@]}" --speaker none
+  expect_error "--ttl: expected with a multicast group in --to or --audio-to" "${parent[@]}" --to 127.0.0.1:6000 --ttl 2
+  RANGECAST_LAUNCH=echo "${parent[@]}" --to 127.0.0.1:6000 --audio 5300 --audio-to 239.255.7.1:6002 --ttl 2 | grep -q 'ttl-mc=2' || fail "not for speech"
+}
+
 # rtpsession keeps every packet that it sends until transport-wide feedback comes; the parent has no use for that.
 test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
   local camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml --input range --to 127.0.0.1:6000 --feedback 5100)

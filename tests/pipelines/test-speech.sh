@@ -271,7 +271,7 @@ test_wrong_options_are_named () {
   expect_error "--audio: port 5999, or the next one for RTCP, is that of --listen" "$pipelines/viewer-host.sh" --listen 6000 --audio 5999
   expect_error "--talk-to: expected with --talk" "$pipelines/viewer-host.sh" --listen 6000 --talk-to 127.0.0.1:7000
   expect_error "--speaker: expected with --audio" "$pipelines/viewer-host.sh" --listen 6000 --speaker fakesink
-  expect_error "--echo-cancel: expected with --audio" "$pipelines/viewer-host.sh" --listen 6000 --echo-cancel
+  expect_error "--echo-cancel: expected with --audio" "$pipelines/viewer-host.sh" --listen 6000 --echo-cancel --talk pulsesrc --talk-to 127.0.0.1:7000
   expect_error "--audio-to: '127.0.0.1:4999', or the next port" "${camera[@]}" --audio pulsesrc --audio-to 127.0.0.1:4999
   expect_error "--talk-to is required" "$pipelines/viewer-host.sh" --listen 6000 --audio 6002 --talk pulsesrc
   expect_error "--audio: expected with --listen" "$pipelines/record.sh" x.rcnc --audio 6002
@@ -282,6 +282,10 @@ test_wrong_options_are_named () {
   expect_error "--rig is required" "$pipelines/call.sh" --peer 127.0.0.1
   echo none >empty.yaml
   expect_error "'empty.yaml' has no views" "$pipelines/call.sh" --peer 127.0.0.1 --rig empty.yaml
+  local call=("$pipelines/call.sh" --peer 127.0.0.1 --rig rig.yaml --input range --no-window)
+  expect_error "call.sh: --microphone: a quote is not closed in 'a \"'" "${call[@]}" --microphone 'a "'
+  expect_error "call.sh: --speaker: a quote is not closed in 'a \"'" "${call[@]}" --microphone none --speaker 'a "'
+  expect_error "call.sh: --fps: expected a whole number from 1 to 1000, got '0'" "${call[@]}" --microphone none --fps 0
 }
 
 # ---- calls ----
