@@ -109,6 +109,7 @@ if [ -n "$out" ]; then
     keyframe-max-dist=60 ! webmmux name=film ! filesink "location=$out/avatar.webm")
 fi
 
+[ -z "$out" ] || drop_empty "$out/avatar.webm" "nothing came to port $listen (no coded frame set); $out/avatar.webm was not written"
 launch "${rtp[@]}" "${step[@]}" \
   ! queue max-size-buffers=4 leaky=downstream ! neighbourcodedec name=decoder \
   ! queue max-size-buffers=1 leaky=downstream ! cylinderfilter name=cylinder ! striprender name=view "auto-orbit=$orbit" "${render[@]}" \

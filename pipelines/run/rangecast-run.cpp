@@ -14,6 +14,7 @@
 #include <clocale>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "clock.hpp"
 #include "common/dump-graph.hpp"
@@ -209,12 +210,22 @@ add_sources (Runner &runner)
     g_timeout_add_seconds (5, memory, &runner);
 }
 
-void
-remove_empty (const char *path)
+/* A file without a byte, or WebM without a cluster: webmmux writes a header even without frames. */
+bool
+is_empty (const char *path)
 {
+  constexpr goffset kMaxHeader = 4096;
   GStatBuf file;
-  if (g_stat (path, &file) == 0 && S_ISREG (file.st_mode) && file.st_size == 0)
-    g_remove (path);
+  gchar *contents = nullptr;
+  gsize size = 0;
+  if (g_stat (path, &file) != 0 || !S_ISREG (file.st_mode) || file.st_size > kMaxHeader ||
+      !g_file_get_contents (path, &contents, &size, nullptr))
+    return false;
+  const std::string_view bytes (contents, size);
+  const bool empty = bytes.empty () || (bytes.starts_with ("\x1a\x45\xdf\xa3") &&
+                                           bytes.find ("\x1f\x43\xb6\x75") == bytes.npos);
+  g_free (contents);
+  return empty;
 }
 
 /* Reads the results while the pipeline still has them, and stops it. */
@@ -228,7 +239,8 @@ finish (Runner &runner)
     runner.failed = !write_snapshot (runner.pipeline, *runner.measure, options.snapshot);
   gst_element_set_state (runner.pipeline, GST_STATE_NULL);
   for (gchar **path = options.drop_empty; path && *path; path++)
-    remove_empty (*path);
+    if (is_empty (*path))
+      g_remove (*path);
   if (runner.trace && !runner.trace->write (options.trace)) {
     g_printerr ("rangecast-run: %s: cannot be written\n", options.trace);
     runner.failed = true;

@@ -248,6 +248,20 @@ test_options_without_effect_are_refused () {
   RANGECAST_LAUNCH=echo "${parent[@]}" --to 127.0.0.1:6000 --audio 5300 --audio-to 239.255.7.1:6002 --ttl 2 | grep -q 'ttl-mc=2' || fail "not for speech"
 }
 
+test_a_film_of_a_stream_that_did_not_come_is_not_left () {
+  need_gl
+  local i viewer
+  "$pipelines/viewer-host.sh" --listen $((ports + 209)) --out film --size 160x120 >viewer.log 2>&1 &
+  viewer=$!
+  for ((i = 0; i < 150; i++)); do [ ! -e film/avatar.webm ] || break; sleep 0.2; done
+  [ -e film/avatar.webm ] || fail "it never began: $(cat viewer.log)"
+  kill -INT $viewer
+  await_end $viewer
+  [ ! -e film/avatar.webm ] || fail "an empty film is left"
+  for ((i = 0; i < 100; i++)); do ! grep -q 'nothing came' viewer.log || break; sleep 0.1; done
+  grep -q "nothing came to port $((ports + 209))" viewer.log || fail "it said: $(cat viewer.log)"
+}
+
 # rtpsession keeps every packet that it sends until transport-wide feedback comes; the parent has no use for that.
 test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
   local camera=("$pipelines/camera-host.sh" --view 0 --rig rig.yaml --input range --to 127.0.0.1:6000 --feedback 5100)
