@@ -282,7 +282,7 @@ class Page {
     element ('mode').onclick = () => this.toggleMode ();
     element ('sound').onclick = () => {
       this.speech.toggle ();
-      element ('sound').textContent = this.speech.isOn ? 'Sound off' : 'Sound on';
+      element ('sound').textContent = this.speech.isOn ? 'Mute' : 'Sound';
     };
     element ('save-picture').onclick = () => {
       this.drawWhole ();
