@@ -2,20 +2,24 @@
 /* Speech beside the frame sets: from the stream, from RTP, or from the file beside a recording. */
 #include "viewer.hpp"
 
+#include <filesystem>
+
 namespace {
 
 const char kSpeechCaps[] =
     "application/x-rtp,media=audio,clock-rate=48000,encoding-name=OPUS,payload=111,"
     "extmap-2=(string)urn:ietf:params:rtp-hdrext:ntp-64";
 
-/* The name of the file with the speech of a recording: x.opus beside x.rcnc. */
+/* The name of the file with the speech of a recording: x.opus beside x.rcnc, and x.opus~ beside
+ * x.rcnc~, which record.sh keeps of the recording before. */
 std::string
-speech_beside (const char *recording)
+speech_beside (std::string recording)
 {
-  const std::string path = recording;
-  const auto slash = path.rfind ('/'), dot = path.rfind ('.');
-  const bool has_suffix = dot != path.npos && (slash == path.npos || dot > slash);
-  return path.substr (0, has_suffix ? dot : path.npos) + ".opus";
+  const bool saved = recording.ends_with ('~');
+  if (saved)
+    recording.pop_back ();
+  return std::filesystem::path (recording).replace_extension (".opus").string () +
+         (saved ? "~" : "");
 }
 
 } // namespace

@@ -198,6 +198,9 @@ test_window_plays_speech () {
   gst-launch-1.0 -q avatartestsrc num-buffers=40 ! video/x-range,width=160,height=120 ! neighbourcodeenc ! filesink location=talk.rcnc
   gst-launch-1.0 -q audiotestsrc num-buffers=60 ! opusenc ! oggmux ! filesink location=talk.opus
   view 30 volume0:sink talk.rcnc --once
+  mv talk.rcnc talk.rcnc~
+  mv talk.opus talk.opus~
+  view 30 volume0:sink talk.rcnc~ --once
 }
 
 # rtpsession 1.22 forgets to end its RTCP where it sends BYE quickly; audio.sh works around it.
