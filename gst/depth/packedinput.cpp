@@ -5,6 +5,9 @@
 
 namespace {
 
+constexpr const char *kLinked = "images of two views, but the other sink pad is linked";
+constexpr const char *kOneStream = "both views in one stream, or packing=none";
+
 Packing
 packing_of (const GstVideoInfo &info)
 {
@@ -67,6 +70,12 @@ PackedInput::watch (GstElement *element, GstPad *first, GstPad *second)
         return static_cast<PackedInput *> (self)->handle (info);
       },
       this, nullptr);
+  const auto linked = [] (GstPad *pad, GstPad *, gpointer self) {
+    if (auto input = static_cast<PackedInput *> (self);
+        input->is_packed_ && GST_PAD_IS_ACTIVE (pad))
+      input->post (kLinked, kOneStream);
+  };
+  g_signal_connect (second, "linked", G_CALLBACK (+linked), this);
 }
 
 void
@@ -97,12 +106,18 @@ PackedInput::handle (GstPadProbeInfo *info)
 
 /* ---- caps ---- */
 
-GstPadProbeReturn
-PackedInput::refuse (GstPadProbeInfo *info, const std::string &what, const std::string &expected)
+void
+PackedInput::post (const std::string &what, const std::string &expected)
 {
   GST_ELEMENT_ERROR (element_, STREAM, FORMAT,
       ("pad %s: %s; expected %s", GST_PAD_NAME (first_), what.c_str (), expected.c_str ()),
       (nullptr));
+}
+
+GstPadProbeReturn
+PackedInput::refuse (GstPadProbeInfo *info, const std::string &what, const std::string &expected)
+{
+  post (what, expected);
   is_refused_ = true;
   gst_mini_object_unref (GST_MINI_OBJECT (GST_PAD_PROBE_INFO_DATA (info)));
   return GST_PAD_PROBE_HANDLED;
@@ -125,8 +140,7 @@ PackedInput::handle_caps (GstPadProbeInfo *info)
   if (saw_one_view_)
     return refuse (info, "images of two views after images of one", "the same packing");
   if (gst_pad_is_linked (second_))
-    return refuse (info, "images of two views, but the other sink pad is linked",
-        "both views in one stream, or packing=none");
+    return refuse (info, kLinked, kOneStream);
   if (!has_plain_layout (video.finfo))
     return refuse (info, "this format cannot be divided into two views", "I420, NV12, YUY2 or RGB");
   const bool beside = packing == Packing::kSideBySide;

@@ -13,7 +13,7 @@ enum class Packing { kAuto, kNone, kSideBySide, kTopBottom };
  * and all events, go on to another sink pad, which is not linked. Images are not copied. */
 class PackedInput {
 public:
-  /** Adds a probe to pad `first`. For instance_init, once; both pads are the element's. */
+  /** Watches both pads. For instance_init, once; both pads are the element's. */
   void watch (GstElement *element, GstPad *first, GstPad *second);
   /** Before the pads are activated. kAuto: as field multiview-mode of the caps says. */
   void start (Packing packing);
@@ -24,6 +24,7 @@ private:
   GstPadProbeReturn handle (GstPadProbeInfo *info);
   GstPadProbeReturn handle_caps (GstPadProbeInfo *info);
   GstPadProbeReturn handle_buffer (GstPadProbeInfo *info);
+  void post (const std::string &what, const std::string &expected);
   GstPadProbeReturn refuse (
       GstPadProbeInfo *info, const std::string &what, const std::string &expected);
   GstBuffer *make_view (GstBuffer *packed, bool first) const;

@@ -141,6 +141,27 @@ stereo_properties ()
   return table;
 }
 
+namespace {
+
+/* A focal length in millimetres, or in image widths, is a common mistake. */
+Status
+check_disparity (const StereoDepthSettings &settings)
+{
+  const ViewSettings &v = settings.view;
+  const double near = v.near > 0 ? v.near : View{}.near_m;
+  const double disparity = v.focal_length * settings.baseline / near;
+  if (disparity >= 1)
+    return {};
+  char text[200];
+  g_snprintf (text, sizeof text,
+      "focal-length=%g and baseline=%g give a disparity of %.2g pixels at %g m: expected "
+      "focal-length in pixels (of the order of the width) and baseline in metres",
+      v.focal_length, settings.baseline, disparity, near);
+  return {StatusCode::kBadValue, text};
+}
+
+} // namespace
+
 Status
 make_stereo_view (const StereoDepthSettings &settings, int width, int height, View &view)
 {
@@ -150,7 +171,10 @@ make_stereo_view (const StereoDepthSettings &settings, int width, int height, Vi
       return s;
   } else if (v.focal_length <= 0 || settings.baseline <= 0) {
     return {StatusCode::kNotFound,
-        "no calibration: expected property rig, or focal-length and baseline for rectified images"};
+        "no calibration: expected property rig, or focal-length (pixels) "
+        "and baseline (metres), both above 0, for rectified images"};
+  } else if (Status s = check_disparity (settings); !s.ok ()) {
+    return s;
   } else {
     view = make_pinhole_view (v, v.focal_length, width, height);
     view.right.emplace ();

@@ -326,6 +326,7 @@ GST_START_TEST (test_bad_settings_are_one_error_that_names_them)
   const char *larger = "video/x-raw,format=RGBx,width=80,height=240,framerate=25/1";
   fail_unless_contains (error_of (kProperties, larger), "pad right is 80x240");
   fail_unless_contains (error_of ("", same), "focal-length");
+  fail_unless_contains (error_of ("focal-length=0.8 baseline=0.1", same), "focal-length in pixels");
   fail_unless_contains (error_of ("rig=/no/rig.yaml", same), "/no/rig.yaml");
   fail_unless_contains (error_of ("focal-length=160 baseline=0.1 near=0.05", same), "near");
   fail_unless_contains (error_of (std::string (kProperties) + " block-size=4", same), "block size");

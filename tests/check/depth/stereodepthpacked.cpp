@@ -210,6 +210,29 @@ GST_START_TEST (test_what_cannot_be_divided_is_one_error)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_other_pad_linked_while_images_come_is_one_error)
+{
+  GstElement *pipeline = gst_parse_launch (
+      ("videotestsrc is-live=true ! video/x-raw,width=640,height=240 ! d.left " + kDepth +
+          "packing=side-by-side name=d ! appsink sync=false name=packed  videotestsrc name=other")
+          .c_str (),
+      nullptr);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  GstElement *other = gst_bin_get_by_name (GST_BIN (pipeline), "other");
+  GstElement *depth = gst_bin_get_by_name (GST_BIN (pipeline), "d");
+  gst_element_set_locked_state (other, TRUE);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  gst_sample_unref (pull (pipeline, "packed"));
+  fail_unless (gst_element_link_pads (other, "src", depth, "right"));
+  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "the other sink pad is linked");
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (depth);
+  gst_object_unref (other);
+  gst_object_unref (bus);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
 /* Two streams, one after the other. */
 GST_START_TEST (test_another_packing_in_the_stream_is_one_error)
 {
@@ -241,6 +264,7 @@ stereodepthpacked_suite ()
   tcase_add_test (tc, test_ends_and_starts_again);
   tcase_add_test (tc, test_seeks);
   tcase_add_test (tc, test_what_cannot_be_divided_is_one_error);
+  tcase_add_test (tc, test_other_pad_linked_while_images_come_is_one_error);
   tcase_add_test (tc, test_right_view_first_is_told_by_the_caps);
   tcase_add_test (tc, test_another_packing_in_the_stream_is_one_error);
   return suite;
