@@ -109,6 +109,36 @@ gst_ply_enc_transform_caps (
   return filtered;
 }
 
+/* `location` of the sink that is linked, as filesink and multifilesink have it; free with g_free().
+ */
+static gchar *
+file_name_of_sink (GstBaseTransform *base)
+{
+  gchar *name = nullptr;
+  GstPad *peer = gst_pad_get_peer (base->srcpad);
+  GstElement *sink = peer ? gst_pad_get_parent_element (peer) : nullptr;
+  GParamSpec *spec =
+      sink ? g_object_class_find_property (G_OBJECT_GET_CLASS (sink), "location") : nullptr;
+  if (spec && spec->value_type == G_TYPE_STRING && (spec->flags & G_PARAM_READABLE))
+    g_object_get (sink, "location", &name, nullptr);
+  gst_clear_object (&sink);
+  gst_clear_object (&peer);
+  return name;
+}
+
+static void
+warn_of_other_name (GstPlyEnc *self)
+{
+  const bool pcd = self->priv->kind == PointCloudFormat::kPcd;
+  gchar *name = file_name_of_sink (GST_BASE_TRANSFORM (self));
+  if (name && g_str_has_suffix (name, pcd ? ".ply" : ".pcd"))
+    GST_ELEMENT_WARNING (self, STREAM, FORMAT,
+        ("%s is written as %s; expected format=%s, or another name", name, pcd ? "PCD" : "PLY",
+            pcd ? "ply" : "pcd"),
+        (nullptr));
+  g_free (name);
+}
+
 static gboolean
 gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
 {
@@ -117,6 +147,7 @@ gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
   self->priv->kind = gst_structure_has_name (gst_caps_get_structure (out, 0), "application/x-pcd")
                          ? PointCloudFormat::kPcd
                          : PointCloudFormat::kPly;
+  warn_of_other_name (self);
   const rangecast::Status status =
       rangecast::guarded ("plyenc", [&] { return gstrange::parse_caps (in, self->priv->info); });
   return self->priv->caps_errors.accept (GST_ELEMENT (self), status);

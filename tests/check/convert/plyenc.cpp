@@ -246,6 +246,44 @@ GST_START_TEST (test_several_clouds_go_into_numbered_files)
 }
 GST_END_TEST;
 
+/* The warning about the name of the file, or "". */
+static std::string
+warning_of (const std::string &encoder, const std::string &sink, const char *name)
+{
+  gchar *folder = g_dir_make_tmp ("rangecast-clouds-XXXXXX", nullptr);
+  gchar *file = g_build_filename (folder, name, nullptr);
+  GstElement *pipeline =
+      gst_parse_launch (("avatartestsrc num-buffers=1 ! video/x-range,width=32,height=24 ! " +
+                            encoder + " ! " + sink + " location=" + file)
+                            .c_str (),
+          nullptr);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PAUSED);
+  fail_unless_equals_int (gst_element_get_state (pipeline, nullptr, nullptr, 60 * GST_SECOND),
+      GST_STATE_CHANGE_SUCCESS);
+  const std::string text = next_message_text (bus, GST_MESSAGE_WARNING, 0);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (bus);
+  gst_object_unref (pipeline);
+  g_remove (file);
+  g_rmdir (folder);
+  g_free (file);
+  g_free (folder);
+  return text;
+}
+
+GST_START_TEST (test_file_name_of_the_other_format_is_a_warning)
+{
+  for (const char *sink : {"filesink", "multifilesink"})
+    fail_unless_contains (
+        warning_of ("plyenc", sink, "a.pcd"), "a.pcd is written as PLY; expected format=pcd");
+  fail_unless_contains (
+      warning_of ("plyenc format=pcd", "filesink", "a.ply"), "a.ply is written as PCD");
+  fail_unless_equals_string (warning_of ("plyenc format=pcd", "filesink", "a.pcd").c_str (), "");
+  fail_unless_equals_string (warning_of ("plyenc", "filesink", "a.xyz").c_str (), "");
+}
+GST_END_TEST;
+
 /* ---- normals ---- */
 
 /* A frame set of one view, its depths in units of 0.1 mm from column and row. */
@@ -634,6 +672,7 @@ plyenc_suite ()
   tcase_add_test (tc, test_second_cloud_for_one_file_is_one_error);
   tcase_add_test (tc, test_cloud_after_a_seek_goes_into_the_file);
   tcase_add_test (tc, test_several_clouds_go_into_numbered_files);
+  tcase_add_test (tc, test_file_name_of_the_other_format_is_a_warning);
   tcase_add_test (tc, test_normals_of_a_slanted_plane_are_the_planes);
   tcase_add_test (tc, test_normals_do_not_mix_two_surfaces);
   tcase_add_test (tc, test_normal_of_a_lone_point_or_line_is_towards_the_camera);
