@@ -344,6 +344,40 @@ update_pads (GstRangeDemux *self, GstPad *sink)
     gst_element_no_more_pads (GST_ELEMENT (self));
 }
 
+/* What gst_parse_launch() says of a pad that it waited for, which names that pad, and the pads that
+ * there are. It posts that during gst_element_no_more_pads(). */
+static GstMessage *
+name_pads (GstRangeDemuxPrivate *priv, GstMessage *message)
+{
+  GError *error = nullptr;
+  gchar *debug = nullptr;
+  gst_message_parse_warning (message, &error, &debug);
+  if (g_error_matches (error, GST_PARSE_ERROR, GST_PARSE_ERROR_DELAYED_LINK)) {
+    const gchar *line = debug ? g_strrstr (debug, "\n") : nullptr;
+    std::string text = line ? line + 1 : error->message;
+    text += "; the stream has " + std::to_string (priv->info.views ()) + " views:";
+    for (const DemuxPad &entry : priv->pads)
+      if (entry.pad)
+        text += std::string (" ") + GST_PAD_NAME (entry.pad);
+    g_free (error->message);
+    error->message = g_strdup (text.c_str ());
+    GstMessage *named = gst_message_new_warning (GST_MESSAGE_SRC (message), error, debug);
+    gst_message_unref (message);
+    message = named;
+  }
+  g_error_free (error);
+  g_free (debug);
+  return message;
+}
+
+static gboolean
+gst_range_demux_post_message (GstElement *element, GstMessage *message)
+{
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_WARNING)
+    message = name_pads (GST_RANGE_DEMUX (element)->priv, message);
+  return GST_ELEMENT_CLASS (gst_range_demux_parent_class)->post_message (element, message);
+}
+
 /* ---- events ---- */
 
 static gboolean
@@ -506,6 +540,7 @@ gst_range_demux_class_init (GstRangeDemuxClass *klass)
       "Splits a stream of range frame sets into one stream per view", "gst-rangecast");
 
   element_class->change_state = GST_DEBUG_FUNCPTR (gst_range_demux_change_state);
+  element_class->post_message = GST_DEBUG_FUNCPTR (gst_range_demux_post_message);
 
   GST_DEBUG_CATEGORY_INIT (gst_range_demux_debug, "rangedemux", 0, "Range demultiplexer");
 }
