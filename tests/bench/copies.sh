@@ -6,7 +6,9 @@
 # Needs valgrind (dhat) and a C compiler.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
+source "$here/arguments.sh"
 source "$here/../../pipelines/env.sh"
+need_arguments 0 1 "$@"
 frames=${1:-20}
 need_number "$frames" FRAMES 1 100000
 dir=$(mktemp -d)

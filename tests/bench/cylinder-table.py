@@ -1,11 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The tables of tests/bench/results/overlap.md from what cylinder_bench --truth or --colour wrote.
-
-    cylinder-table.py FILE.json ...
-"""
+"""The tables of tests/bench/results/overlap.md from what cylinder_bench --truth or --colour wrote."""
+import argparse
 import json
-import sys
 
 
 def case(row):
@@ -63,12 +60,16 @@ def colours(rows):
 
 
 def main():
-    if len(sys.argv) < 2:
-        sys.exit(__doc__)
-    for path in sys.argv[1:]:
-        with open(path, encoding="utf-8") as file:
-            rows = json.load(file)
-        if "psnr_db" in rows[0]:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("files", metavar="FILE.json", nargs="+")
+    for path in parser.parse_args().files:
+        try:
+            with open(path, encoding="utf-8") as file:
+                rows = json.load(file)
+            is_colour = "psnr_db" in rows[0]
+        except (OSError, ValueError, LookupError, TypeError) as error:
+            parser.error(f"{path}: expected what cylinder_bench wrote: {error}")
+        if is_colour:
             table(["views, depth, error", *dict.fromkeys(row["method"] for row in rows)], colours(rows))
             continue
         table(["views, depth, error of poses", "removed", "double units", "thickness, mm", "off, median / 95 %, mm", "uncovered",

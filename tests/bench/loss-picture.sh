@@ -1,8 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Made docs/images/loss.png: one frame set of a stream of which 5 % of the slices are lost, left to right: intra, the same with
-# conceal=last, temporal, the same with conceal=last. Missing pixels are red. usage: meson devenv -C build, then loss-picture.sh OUT.png
+# conceal=last, temporal, the same with conceal=last. Missing pixels are red.
+# usage: loss-picture.sh OUT.png   (after: meson devenv -C build)
 set -euo pipefail
+source "$(dirname "$0")/arguments.sh"
+need_arguments 1 1 "$@"
 tests=$(cd "$(dirname "$0")/.." && pwd)
 out=$(realpath "$1")
 cd "$(mktemp -d)"

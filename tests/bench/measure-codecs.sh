@@ -1,13 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # What tests/bench/results/codec.md says of the neighbour code: runs codec_bench on all data and prints the table.
-# usage: measure-codecs.sh DATA-DIR OUT-DIR [ROUNDS]. A few minutes. DATA-DIR has lps_head, stanford_bunny_range,
+# usage: measure-codecs.sh DATA-DIR OUT-DIR [ROUNDS]
+# A few minutes. DATA-DIR has lps_head, stanford_bunny_range,
 # open3d_rgbd, luxonis_people_stereo; OUT-DIR gets NAME.json, NAME.txt, head.svg.
 set -euo pipefail
-[ $# -ge 2 ] || { echo "usage: measure-codecs.sh DATA-DIR OUT-DIR [ROUNDS]" >&2; exit 2; }
 here=$(cd "$(dirname "$0")" && pwd)
+source "$here/arguments.sh"
+need_arguments 2 3 "$@"
 source "$here/../../pipelines/env.sh"
 data=$1 out=$2 rounds=${3:-11}
+need_number "$rounds" ROUNDS 1 1000
 bench=$here/../../build/tests/bench/codec_bench
 pipelines=$here/../../pipelines
 mkdir -p "$out"

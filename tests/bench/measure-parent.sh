@@ -6,11 +6,15 @@
 # Recordings that are in OUT-DIR already are taken again. OUT-DIR/parent.json holds all numbers.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
+source "$here/arguments.sh"
 source "$here/../../pipelines/env.sh"
 build=${RANGECAST_BUILD:-$here/../../build}
-out=${1:?usage: measure-parent.sh OUT-DIR [SECONDS] [VIEWS...]} seconds=${2:-5}
+need_arguments 1 66 "$@"
+out=$1 seconds=${2:-5}
 views=("${@:3}")
 [ ${#views[@]} -gt 0 ] || views=(1 2 4 8 16)
+need_number "$seconds" SECONDS 1 3600
+for n in "${views[@]}"; do need_number "$n" VIEWS 1 64; done
 mkdir -p "$out"
 
 recordings=()

@@ -1,8 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Made docs/images/people.png from the recording luxonis_people_stereo: six moments side by side; rows: the left picture, cut out by
-# depth alone, by both cues, and by both at 60 % exposure with the background of 100 %. usage: people-sheet.sh DATA-DIR OUT.png
+# depth alone, by both cues, and by both at 60 % exposure with the background of 100 %.
+# usage: people-sheet.sh DATA-DIR OUT.png
 set -euo pipefail
+source "$(dirname "$0")/arguments.sh"
+need_arguments 2 2 "$@"
 pipelines=$(cd "$(dirname "$0")/../../pipelines" && pwd)
 # shellcheck source=../../pipelines/env.sh
 source "$pipelines/env.sh"

@@ -4,7 +4,9 @@
 # follows the receiver. Prints a table. Times are those of one machine: sender, udp-relay and viewer.
 # usage: rate-table.sh [SECONDS]
 set -euo pipefail
+source "$(dirname "$0")/arguments.sh"
 source "$(dirname "$0")/../../pipelines/env.sh"
+need_arguments 0 1 "$@"
 seconds=${1:-40} skip=10
 need_number "$seconds" SECONDS $((skip + 1)) 86400
 port=$((21000 + $$ % 40 * 50))

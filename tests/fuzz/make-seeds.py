@@ -1,10 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Makes first inputs for the fuzz targets, most of them of the golden streams in tests/data; README.md says what becomes of them.
+"""Makes first inputs for the fuzz targets, most of them of the golden streams in tests/data; README.md says what becomes of them."""
 
-usage: make-seeds.py FOLDER
-"""
-
+import argparse
 import json
 import struct
 import sys
@@ -34,8 +32,10 @@ def place_of(unit: bytes) -> tuple[int, ...]:
 
 def moved(unit: bytes) -> bytes:
     """A slice in the small views of the targets; rows of blocks of motion stay where they are."""
+    if unit[0] != SLICE or len(unit) < 36:
+        return unit
     y = place_of(unit)[1]
-    return streams.patched(unit, 22, *struct.pack("<H", y - 48 if y >= 48 else y)) if unit[0] == SLICE and len(unit) >= 36 else unit
+    return streams.patched(unit, 22, *struct.pack("<H", y - 48 if y >= 48 else y))
 
 
 def slice_seed(unit: bytes, earlier: int, more: int, length: int = 0) -> bytes:
@@ -294,13 +294,15 @@ def parse_seeds(access_units: list[list[bytes]], stream: bytes) -> list[bytes]:
 
 
 def main() -> None:
-    to = Path(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", metavar="FOLDER", type=Path)
+    to = parser.parse_args().folder
     seeds: dict[str, list[bytes]] = {"slice": too_large_numbers(), "access_unit": [], "rtp_depay": [], "byte_stream": [], "rig": []}
     seeds |= {"rig_file": rig_file_seeds(), "background": background_seeds(), "range_meta": range_meta_seeds(), "parse": []}
     seeds |= {"camera_texts": camera_texts_seeds(), "gltf": gltf_seeds(), "rtcp_reports": rtcp_reports_seeds()}
     for path in STREAMS:
         data = path.read_bytes()
-        if path.stem == "damaged":  # its sizes are lies
+        if path.stem == "damaged" or path.stem.startswith("rules-"):  # some of their sizes are lies
             seeds["byte_stream"] += [data[i : i + LARGEST] for i in range(0, len(data), LARGEST)]
             continue
         access_units = streams.units_of(data)

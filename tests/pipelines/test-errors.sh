@@ -308,6 +308,26 @@ test_recordings_that_there_are_are_kept () {
   cmp film.webm before.rcnc || fail "the film before is gone"
 }
 
+test_programs_of_benchmarks_give_their_usage () {
+  local call status tests=$source_dir/tests
+  local programs=("$tests"/bench/{measure-parent,measure-codecs,copies,rate-table,cylinder-pictures,loss-picture,people-sheet}.sh
+    "python3 $tests/bench/cylinder-table.py" "python3 $tests/fuzz/make-seeds.py")
+  ! command -v node >/dev/null || programs+=("node $tests/bench/web/clients.mjs" "node $tests/bench/web/decode.mjs")
+  for call in "${programs[@]}"; do
+    $call --help >help.txt 2>&1 || fail "$call --help: $(cat help.txt)"
+    grep -q '^usage: ' help.txt || fail "$call --help: $(cat help.txt)"
+    status=0
+    $call --nosuch >bad.txt 2>&1 || status=$?
+    [ "$status" = 2 ] || fail "$call --nosuch: $status $(cat bad.txt)"
+    grep -q '^usage: ' bad.txt || fail "$call --nosuch: $(cat bad.txt)"
+  done
+  "$tests/fuzz/make-seeds.py" seeds
+  expect_file seeds/slice/000 1
+  echo '{}' >empty.json
+  expect_error "empty.json: expected what cylinder_bench wrote" python3 "$tests/bench/cylinder-table.py" empty.json
+  expect_error "SECONDS: expected a whole number" "$tests/bench/measure-parent.sh" out x
+}
+
 test_required_options_are_named () {
   expect_error "camera-host.sh: --view is required" "$pipelines/camera-host.sh" --rig rig.yaml --to 127.0.0.1:1
   expect_error "camera-host.sh: --to is required" "$pipelines/camera-host.sh" --view 0 --rig rig.yaml

@@ -6,12 +6,16 @@ import { execFileSync } from 'node:child_process';
 import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
-import { parseArgs } from 'node:util';
-import { sleep } from '../../web/browser.js';
-import { client, killServers, memory, serve } from '../../web/serving.js';
+import { expect, readArguments } from './arguments.mjs';
 
-const { values } = parseArgs ({ options: { seconds: { type: 'string', default: '10' }, clients: { type: 'string', default: '0,1,10,50' } } });
-const seconds = Number (values.seconds), ticks = Number (execFileSync ('getconf', ['CLK_TCK']));
+const { values } = readArguments ({ seconds: { type: 'string', default: '10' }, clients: { type: 'string', default: '0,1,10,50' } });
+const seconds = Number (values.seconds);
+expect (seconds > 0 && seconds <= 3600, `--seconds: expected 1 to 3600, got '${values.seconds}'`);
+expect (/^\d{1,2}(,\d{1,2})*$/.test (values.clients), `--clients: expected numbers up to 99, e.g. 0,1,10, got '${values.clients}'`);
+const { sleep } = await import ('../../web/browser.js');
+const { client, killServers, memory, serve } = await import ('../../web/serving.js');
+
+const ticks = Number (execFileSync ('getconf', ['CLK_TCK']));
 const scene = ['avatartestsrc', 'is-live=true', 'views=4', 'range-person-only=true', '!', 'video/x-range,width=320,height=240,framerate=15/1'];
 const cpu = ({ process: { pid } }) => {
   const fields = fs.readFileSync (`/proc/${pid}/stat`, 'utf8').split (') ')[1].split (' ');

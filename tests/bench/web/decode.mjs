@@ -6,17 +6,15 @@ import { execFileSync } from 'node:child_process';
 import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
-import { accessUnits, build, joined, wasm } from '../../web/support.js';
+import { expect, readArguments } from './arguments.mjs';
 import { Core, DONE } from '../../../pipelines/web/core.js';
 
-const files = process.argv.slice (2);
-let rounds = 9;
-if (files[0] === '--rounds')
-  rounds = Number (files.splice (0, 2)[1]);
-if (!(rounds >= 1 && rounds <= 1000)) {
-  console.error ('decode.mjs: --rounds: expected 1 to 1000');
-  process.exit (2);
-}
+const { values, positionals: files } = readArguments ({ rounds: { type: 'string', default: '9' } }, true);
+const rounds = Number (values.rounds);
+expect (Number.isInteger (rounds) && rounds >= 1 && rounds <= 1000, `--rounds: expected 1 to 1000, got '${values.rounds}'`);
+for (const file of files)
+  expect (fs.existsSync (file), `no file '${file}'`);
+const { accessUnits, build, joined, wasm } = await import ('../../web/support.js');
 
 const folder = fs.mkdtempSync (path.join (os.tmpdir (), 'rangecast-'));
 process.on ('exit', () => fs.rmSync (folder, { recursive: true }));
