@@ -38,6 +38,7 @@
 #include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
 #include <rangecast/neighbourcode/bitstream/key_check.hpp>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "common/codedunits.hpp"
@@ -78,6 +79,8 @@ struct Stream {               /* streaming thread only */
   bool had_gaps = false;
   bool discont = false; /* bytes were dropped since the last buffer */
   bool ending = false;  /* push mode: EOS has arrived */
+  bool in_sync = false; /* the last bytes were an access unit */
+  bool warned_damage = false;
   gsize leading_rubbish = 0;
   rangecast::RigCollector collector; /* of the byte stream */
   std::string too_large;             /* why a rig was refused */
@@ -366,6 +369,22 @@ drop (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
   return gst_base_parse_finish_frame (base, frame, gint (size));
 }
 
+/* Posts the first damage of a stream: bytes after an access unit, neither after a seek nor at the
+ * end, of which warn_if_truncated() speaks. */
+static void
+warn_damage (GstBaseParse *base, const GstBaseParseFrame *frame, const StreamPart &part)
+{
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  if (!std::exchange (stream.in_sync, false) || part.expected || stream.warned_damage)
+    return;
+  stream.warned_damage = true;
+  GST_ELEMENT_WARNING (base, STREAM, DECODE,
+      ("The stream is damaged: %" G_GSIZE_FORMAT " bytes at byte %" G_GUINT64_FORMAT
+       " are not an access unit; further damage is only logged",
+          part.rubbish, guint64 (frame->offset)),
+      (nullptr));
+}
+
 /* Drops frames instead of skipping bytes, because the base class gives up after 2 MiB, and a
  * damaged access unit can be longer. */
 static GstFlowReturn
@@ -527,7 +546,8 @@ static GstFlowReturn
 handle_access_unit_of_stream (GstBaseParse *base, GstBaseParseFrame *frame, const StreamPart &part)
 {
   GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  const Stream &stream = priv->stream;
+  Stream &stream = priv->stream;
+  stream.in_sync = true;
   reset_min_frame_size (base);
   if (!update_caps (base))
     return caps_refused_flow (base);
@@ -552,9 +572,12 @@ handle_stream (GstBaseParse *base, GstBaseParseFrame *frame)
     handle_units (base, bytes.subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
   }
   gst_buffer_unmap (frame->buffer, &map);
+  if (GST_BASE_PARSE_LOST_SYNC (base))
+    GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.in_sync = false;
   if (part.rubbish) {
     if (GST_NEIGHBOUR_CODE_PARSE (base)->priv->seen == Seen::kSlices)
       warn_if_truncated (base, frame, part);
+    warn_damage (base, frame, part);
     return drop_rubbish (base, frame, part.rubbish);
   }
   if (part.length)

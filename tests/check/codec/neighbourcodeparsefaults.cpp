@@ -92,6 +92,22 @@ GST_START_TEST (test_stream_that_ends_within_an_access_unit_is_one_warning)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_bytes_between_access_units_are_one_warning)
+{
+  const Recording recording;
+  std::vector<guint8> bytes = recording.bytes;
+  for (const int i : {7, 4}) /* start codes */
+    bytes[recording.offsets[std::size_t (i)] + 1] ^= 1;
+  const auto texts = warnings_of_stream (bytes);
+  fail_unless_equals_int (texts.size (), 1);
+  fail_unless_contains (
+      texts[0], "at byte " + std::to_string (recording.offsets[4]) + " are not an access unit");
+  bytes = recording.bytes; /* one may begin to listen in the middle of a stream */
+  bytes.erase (bytes.begin (), bytes.begin () + 100);
+  fail_unless_equals_int (warnings_of_stream (bytes).size (), 0);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_stream_that_ends_before_its_first_slice_is_one_error_and_no_warning)
 {
   const Recording recording (1, 16);
@@ -389,6 +405,7 @@ neighbourcodeparsefaults_suite (void)
   tcase_add_test (tc, test_rubbish_before_and_between_costs_nothing_else);
   tcase_add_test (tc, test_every_truncated_prefix_keeps_the_whole_access_units_before_it);
   tcase_add_test (tc, test_stream_that_ends_within_an_access_unit_is_one_warning);
+  tcase_add_test (tc, test_bytes_between_access_units_are_one_warning);
   tcase_add_test (tc, test_stream_that_ends_before_its_first_slice_is_one_error_and_no_warning);
   tcase_add_test (tc, test_trailing_bytes_cost_nothing);
   tcase_add_test (tc, test_size_field_that_lies_costs_no_later_access_unit);
