@@ -130,6 +130,7 @@ if [ -n "$listen" ]; then
 elif [ -n "$file" ]; then
   [ ${#string[@]} = 0 ] || die "expected one of --listen, --file and a launch string"
   source=(filesrc "location=$file" ! neighbourcodeparse)
+  [ -n "$loop" ] || echo "web-server.sh: the recording is played once, from now on; --loop repeats it" >&2
 elif [ ${#string[@]} -gt 0 ]; then
   source=("${string[@]}")
 else
@@ -145,12 +146,23 @@ if [ -n "$token" ]; then
 fi
 [ -z "$token_file" ] || settings+=("token-file=$token_file")
 
-# usage: print_links URL: for 0.0.0.0 with the names and addresses of this machine
+# usage: certificate_names: those that browsers accept it for, if openssl is there to tell
+certificate_names () {
+  [ -z "$certificate" ] || openssl x509 -in "$certificate" -noout -ext subjectAltName 2>/dev/null |
+    tr -d ' ' | tr ',' '\n' | sed -n 's/^DNS://p; s/^IPAddress://p' | grep -vE '^(localhost|127\.|\*|0:0:0:0:0:0:0:1$)' || true
+}
+
+# usage: print_links URL: where it listens at all addresses of this machine, with its names, too
 print_links () {
   local scheme=${1%%://*} host=${1#*://} link_port one hosts
   link_port=${host##*:} link_port=${link_port%/} host=${host%:*}
   hosts=$host
-  case "$host" in 0.0.0.0 | '[::]') hosts="$(hostname) $(hostname -I 2>/dev/null || true)" ;; esac
+  case "$host" in
+    0.0.0.0 | '[::]')
+      hosts=$(certificate_names)
+      [ -n "$hosts" ] || hosts=$(hostname -I 2>/dev/null | tr ' ' '\n' | if [ "$host" = 0.0.0.0 ]; then hostname && grep -F . ; else grep -F : ; fi || true)
+      [ -n "$hosts" ] || hosts=$(hostname) ;;
+  esac
   for one in $hosts; do
     [[ "$one" != *:*:* || "$one" == \[* ]] || one="[$one]"
     echo "$scheme://$one:$link_port/${webrtc:+?transport=webrtc}${token:+#token=$token}"

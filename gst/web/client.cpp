@@ -2,6 +2,7 @@
 #include "client.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <span>
@@ -151,8 +152,9 @@ Client::handle (std::string_view text)
     handle_rtc (*type, *message);
   else if (*type == "ping") {
     const auto time = message->number ("time");
-    if (!time)
-      return refuse (kCloseBadMessage, "ping: time: expected a number");
+    constexpr double kMax = 9007199254740992; /* 2^53; json-glib wraps larger ones round */
+    if (!time || !(std::abs (*time) <= kMax))
+      return refuse (kCloseBadMessage, "ping: time: expected a number, at most 2^53");
     gchar number[G_ASCII_DTOSTR_BUF_SIZE];
     g_ascii_dtostr (number, sizeof number, *time);
     send_text (std::string ("{\"type\":\"pong\",\"time\":") + number +
@@ -188,7 +190,7 @@ void
 Client::acknowledge (const JsonMessage &message)
 {
   const auto number = message.number ("frameSet");
-  if (!number || !(*number >= 0 && *number <= G_MAXUINT32))
+  if (!number || !(*number >= 0 && *number <= G_MAXUINT32 && std::floor (*number) == *number))
     return refuse (kCloseBadMessage, "ack: frameSet: expected a number of a frame set");
   const auto acknowledged = static_cast<guint32> (*number);
   if (sent_ == 0 || gint32 (acknowledged - last_) > 0)

@@ -234,6 +234,18 @@ Server::open_stats ()
   return {};
 }
 
+/* What browsers send as Origin: scheme, host and port alone. */
+static bool
+is_origin (const char *text)
+{
+  g_autofree gchar *scheme = nullptr, *user = nullptr, *host = nullptr, *path = nullptr,
+                   *query = nullptr, *fragment = nullptr;
+  return g_uri_split (text, G_URI_FLAGS_NONE, &scheme, &user, &host, nullptr, &path, &query,
+             &fragment, nullptr) &&
+         scheme && (g_str_equal (scheme, "http") || g_str_equal (scheme, "https")) && host &&
+         *host && !user && !*path && !query && !fragment;
+}
+
 Status
 Server::start ()
 {
@@ -243,18 +255,30 @@ Server::start ()
         "token-file: expected a file, but there is no '" + settings_.token_file + "'"};
   if (!settings_.private_key.empty () && settings_.certificate.empty ())
     return {StatusCode::kBadValue, "private-key: expected certificate, too"};
+  if (settings_.anonymous && settings_.has_token ())
+    return {StatusCode::kBadValue, "anonymous: expected without token and token-file"};
+  g_auto (GStrv) origins = g_strsplit (settings_.origins.c_str (), " ", -1);
+  for (gchar **origin = origins; *origin; origin++)
+    if (**origin && !is_origin (*origin))
+      return {StatusCode::kBadValue,
+          "origins: expected https://HOST[:PORT] or http://HOST[:PORT], got '" +
+              std::string (*origin) + "'"};
   const std::string index = settings_.root + "/index.html";
   if (!g_file_test (index.c_str (), G_FILE_TEST_IS_REGULAR))
     return {StatusCode::kNotFound,
         "root: expected the folder of the page, but there is no '" + index + "'"};
   for (const auto &[name, address, scheme] :
       {std::tuple ("stun-server", settings_.stun_server, "stun://HOST:PORT"),
-          std::tuple ("turn-server", settings_.turn_server, "turn://USER:PASSWORD@HOST:PORT")})
-    if (!address.empty () &&
-        (!address.starts_with (std::string_view (scheme).substr (0, 7)) ||
-            (*name == 't' && address.find ('@') == address.npos) ||
-            !g_uri_is_valid (address.c_str (), G_URI_FLAGS_HAS_PASSWORD, nullptr)))
+          std::tuple ("turn-server", settings_.turn_server, "turn://USER:PASSWORD@HOST:PORT")}) {
+    if (address.empty ())
+      continue;
+    if (!address.starts_with (std::string_view (scheme).substr (0, 7)) ||
+        (*name == 't' && address.find ('@') == address.npos) ||
+        !g_uri_is_valid (address.c_str (), G_URI_FLAGS_HAS_PASSWORD, nullptr))
       return {StatusCode::kBadValue, std::string (name) + ": expected " + scheme};
+    if (!settings_.webrtc)
+      return {StatusCode::kBadValue, std::string (name) + ": expected webrtc=true, too"};
+  }
   g_main_context_push_thread_default (context_);
   soup_ = soup_server_new ("server-header", "rangewebsink", nullptr);
   Status status = load_certificate ();

@@ -10,7 +10,7 @@ import { RecordingSource } from './recording-source.js';
 class Stage {
   constructor (module) {
     this.core = new Core (module);
-    this.source = null;
+    this.source = this.wanted = null; // wanted: the last one that was asked for
     this.view = null; // what the page looks from
     this.drawing = false; // the page has a frame set that it has not drawn yet
     this.waiting = null; // of the newest frame set, not shown yet: due, held (it has been shown from elsewhere)
@@ -97,11 +97,16 @@ class Stage {
       this.waiting = { due: performance.timeOrigin + performance.now (), held: true };
     this.show ();
   }
+  // What is shown goes on until a recording has been found good.
   async open ({ recording, live, paused, time }) {
+    const source = live ? new LiveSource (this, live) : new RecordingSource (this, recording);
+    this.wanted = source;
+    if (recording && !await source.load () || this.wanted !== source)
+      return;
     this.source?.close ();
     this.network = null;
-    this.source = live ? new LiveSource (this, live) : new RecordingSource (this, recording);
-    await this.source.start (paused, time);
+    this.source = source;
+    source.start (paused, time);
   }
   points () {
     const file = this.core.ply ();

@@ -42,7 +42,7 @@ const timeText = (ms) => {
 };
 
 const CHANNEL_WAIT = 10000; // ms until another data channel is tried
-const REST = 500; // ms without a new picture until the last one is drawn at full resolution
+const REST = 500; // ms without a new picture, at least, until the last one is drawn at full resolution
 
 class Page {
   // worker: of decoder.js
@@ -83,6 +83,8 @@ class Page {
   }
   position ({ time, duration, playing }) {
     const seek = element ('seek');
+    this.closeChannel (); // of a stream before
+    element ('token').hidden = true;
     this.showBar (false);
     seek.max = Math.max (duration, 1);
     seek.disabled = duration < 0;
@@ -156,17 +158,17 @@ class Page {
   async drawNext () {
     clearTimeout (this.rest);
     this.wanted = false;
-    const { scale } = this.resolution, begin = performance.now ();
+    const scale = this.resolution.scaleOf (canvas.clientWidth * canvas.clientHeight * (window.devicePixelRatio || 1) ** 2), begin = performance.now ();
     this.setSize (scale);
     const frame = this.paint ();
     await this.renderer.drawn ();
     this.resolution.drawn (performance.now () - begin);
-    this.shown (frame, begin);
+    this.shown (frame, begin, scale);
     this.painting = false;
     if (this.wanted)
       this.draw ();
     else if (scale < 1)
-      this.rest = setTimeout (() => this.drawWhole (), REST);
+      this.rest = setTimeout (() => this.drawWhole (), Math.max (REST, 2 * this.resolution.period)); // not just before the next frame set
   }
   drawWhole () {
     const begin = performance.now ();
@@ -190,12 +192,12 @@ class Page {
     this.postView ();
     return frame;
   }
-  // begin: when its drawing began
-  shown (frame, begin) {
+  // begin: when its drawing began; scale: of the resolution
+  shown (frame, begin, scale = 1) {
     if (!frame)
       return;
     this.worker.postMessage ({ type: 'shown' });
-    this.stats.shown (frame, performance.now () - begin, this.resolution.scale);
+    this.stats.shown (frame, performance.now () - begin, scale);
     document.body.dataset.frameSets = Number (document.body.dataset.frameSets ?? 0) + 1;
   }
 
@@ -222,9 +224,6 @@ class Page {
     this.worker.postMessage ({ type: 'open', live: this.server });
   }
   open (recording) {
-    say ('');
-    this.closeChannel ();
-    element ('welcome').hidden = element ('token').hidden = true;
     this.worker.postMessage ({ type: 'open', recording, paused: parameters.has ('paused'), time: Number (parameters.get ('time') ?? 0) });
   }
 
@@ -275,6 +274,7 @@ class Page {
       this.postedView = '';
       this.worker.postMessage ({ type: 'again' });
     });
+    element ('message').onclick = () => say ('');
     element ('play').onclick = () => this.worker.postMessage ({ type: 'toggle' });
     element ('seek').oninput = () => this.worker.postMessage ({ type: 'seek', time: Number (element ('seek').value) });
     element ('home').onclick = () => this.move ('rc_go_home');

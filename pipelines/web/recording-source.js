@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Plays a recording in its own time: a File, or an address. Frame sets follow one another, as later ones may refer to earlier ones; which
 // of them are shown is the stage's business.
-import { DONE, END, NOTHING } from './core.js';
+import { Core, DONE, END, NOTHING } from './core.js';
 
 export class RecordingSource {
   constructor (stage, recording) {
@@ -13,7 +13,8 @@ export class RecordingSource {
     this.closed = false;
   }
 
-  async start (paused = false, time = 0) {
+  // Loads it, and decodes its first frame set in a core of its own. @return false if it cannot be played, which has been said
+  async load () {
     let file = this.recording;
     try {
       if (typeof file === 'string') {
@@ -24,16 +25,27 @@ export class RecordingSource {
         file = await answer.blob ();
       }
     } catch (error) {
-      if (!this.closed)
-        this.stage.say (`The recording could not be loaded: ${error.message}.`);
-      return;
+      this.stage.say (`The recording could not be loaded: ${error.message}.`);
+      return false;
     }
-    if (this.closed)
-      return;
-    this.stage.say ('');
-    const { core } = this.stage, reader = new FileReaderSync ();
-    core.read = (offset, size) => new Uint8Array (reader.readAsArrayBuffer (file.slice (offset, offset + size)));
+    const reader = new FileReaderSync ();
     this.size = file.size;
+    this.read = (offset, size) => new Uint8Array (reader.readAsArrayBuffer (file.slice (offset, offset + size)));
+    try {
+      const core = new Core (this.stage.core.module, this.read);
+      core.call ('rc_recording_open', this.size);
+      if (core.call ('rc_recording_next', 1) === DONE)
+        return true;
+      this.stage.say (core.message ());
+    } catch (error) {
+      this.stage.say (error.message);
+    }
+    return false;
+  }
+
+  start (paused = false, time = 0) {
+    this.stage.say ('');
+    this.stage.core.read = this.read;
     this.open ();
     if (this.next () && time > 0)
       this.seek (time);
@@ -43,7 +55,7 @@ export class RecordingSource {
 
   open () {
     this.stage.core.call ('rc_recording_open', this.size);
-    this.atEnd = this.failed = false;
+    this.atEnd = this.failed = this.saidDamage = false;
     this.time = 0;
   }
 
@@ -57,14 +69,17 @@ export class RecordingSource {
     const { core } = this.stage;
     let outcome;
     try {
-      outcome = this.stage.decode (() => core.call ('rc_recording_next'));
+      outcome = this.stage.decode (() => core.call ('rc_recording_next', 1));
     } catch (error) { // a new instance of the core has lost the stream
       this.failed = true;
       this.stage.say (error.message);
       return this.stop ();
     }
     if (outcome === DONE) {
-      const { pts } = core.frame ();
+      const { pts, badSlices } = core.frame ();
+      if (badSlices > 0 && !this.saidDamage)
+        this.stage.say (`The recording is damaged: ${badSlices} slices of a frame set cannot be decoded.`, 'note');
+      this.saidDamage ||= badSlices > 0;
       this.time = pts >= 0 ? pts : this.time + (this.frameDuration () || 40);
       this.stage.decoded (performance.timeOrigin + (this.playing ? this.dueOf (this.time) : performance.now ()));
       this.reportPosition ();

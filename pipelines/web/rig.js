@@ -23,6 +23,8 @@ const say = (sentence, kind = 'error') => {
   document.body.dataset.message = sentence;
 };
 
+element ('message').onclick = () => say ('');
+
 // Fills a table's body: rows of { cells, kind }, kind being '', 'late' or 'gone'.
 const fill = (table, rows) => {
   table.tBodies[0].replaceChildren (...rows.map (({ cells, kind }) => {

@@ -113,6 +113,8 @@ test ('a recording that is cut off is shown to its end, and says so', async () =
   const page = await open ('src=cut.rcnc');
   await messageMatches (page, '^The recording is cut off: ');
   assert.ok (await page.evaluate (() => Number (document.body.dataset.frameSets)) > 0);
+  // The last whole frame set, number 39, stays.
+  assert.match (await page.evaluate (() => document.getElementById ('time').textContent), /^0:02\.5 /);
   await page.close ();
 });
 
@@ -136,6 +138,18 @@ test ('a file that is opened by hand is played', async () => {
   const input = await page.waitForSelector ('#file');
   await input.uploadFile (path.join (work, 'moving.rcnc'));
   await framesShown (page, 5);
+  await page.close ();
+});
+
+test ('a foreign file leaves what is shown', async () => {
+  const page = await open ('src=moving.rcnc&paused');
+  await framesShown (page, 1);
+  await (await page.$ ('#file')).uploadFile (path.join (work, 'served/foreign.rcnc'));
+  await messageMatches (page, '^This is no recording');
+  await page.click ('#message');
+  assert.equal (await message (page), '');
+  await page.click ('#play');
+  await framesShown (page, 3);
   await page.close ();
 });
 

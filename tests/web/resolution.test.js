@@ -47,7 +47,21 @@ test ('one slow picture changes nothing', () => {
 
 test ('times that make no sense are passed over: the first frame set, a seek back, a pause', () => {
   const resolution = new Resolution ();
-  for (const due of [1000, 1066, 500, 60000, 60000])
+  for (const due of [1000, 1066, 500, 60000, 60000, 1])
     resolution.follow ({ due, skipped: 0 });
   assert.equal (resolution.interval, 66);
+});
+
+test ('a small window is drawn whole, and none with fewer pixels than 320x240', () => {
+  const resolution = new Resolution ();
+  resolution.scale = 0.4;
+  assert.equal (resolution.scaleOf (300 * 200), 1);
+  assert.equal (Math.round (resolution.scaleOf (640 * 480) * 640), 320);
+  assert.equal (resolution.scaleOf (1920 * 1080), 0.4);
+});
+
+test ('a slow stream is no reason to draw fewer pixels', () => {
+  const resolution = new Resolution ();
+  play (resolution, { interval: 500, fixed: 20, pixels: 60 });
+  assert.equal (resolution.scale, 1);
 });

@@ -131,8 +131,9 @@ decode_part (const StreamPart &part)
   return outcome;
 }
 
+/* whole: passes over an access unit that is cut off, which has a part of the person only */
 web::Outcome
-next ()
+next (bool whole)
 {
   Recording &r = *recording;
   while (true) {
@@ -143,7 +144,9 @@ next ()
       continue;
     }
     note_ending (part);
-    if (part.length) {
+    if (whole && part.expected && r.any_frame_set) {
+      skip (part.length + part.rubbish);
+    } else if (part.length) {
       const web::Outcome outcome = decode_part (part);
       skip (part.length);
       if (outcome != web::kNothing)
@@ -203,10 +206,11 @@ RC_EXPORT (rc_recording_open) void rc_recording_open (double size)
     recording->last_ns = last->header.pts_ns;
 }
 
-/** Decodes the next frame set. @return Outcome */
-RC_EXPORT (rc_recording_next) std::int32_t rc_recording_next ()
+/** Decodes the next frame set. @param whole  not 0: not one that is cut off at the end, unless it
+ *  is the only one. @return Outcome */
+RC_EXPORT (rc_recording_next) std::int32_t rc_recording_next (std::int32_t whole)
 {
-  return recording ? next () : web::fail ("There is no recording.");
+  return recording ? next (whole) : web::fail ("There is no recording.");
 }
 
 /** Goes to the last key frame set that is not later than a time. The frame sets from there on may

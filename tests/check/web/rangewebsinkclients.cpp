@@ -191,7 +191,8 @@ GST_START_TEST (test_damaged_messages_after_the_welcome_end_the_connection)
   for (const char *message :
       {"", "no JSON", "{\"type\":null}", R"({"type":"ack"})", R"({"type":"ack","frameSet":-1})",
           R"({"type":"ack","frameSet":4294967296})", R"({"type":"ack","frameSet":1e999})",
-          R"({"type":"ack","frameSet":null})", R"({"type":"ping"})",
+          R"({"type":"ack","frameSet":null})", R"({"type":"ack","frameSet":0.5})",
+          R"({"type":"ping"})", R"({"type":"ping","time":12345678901234567890})",
           R"({"type":"ping","time":"1"})", R"({"type":"ping","time":1e999})"}) {
     WebClient client (sink);
     client.enter ();
