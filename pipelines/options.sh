@@ -35,13 +35,14 @@ split_elements () {
   [[ ! " ! ${words[*]} ! " =~ \ !\ +!\  ]] || die "$3: expected an element before and after each '!', got '$1'"
 }
 
-# usage: numeric_range PROPERTY VALUE <output of gst-inspect-1.0: prints the range if the value is a number outside it
+# usage: numeric_range PROPERTY VALUE <output of gst-inspect-1.0: prints the range if the value is a plain number outside it; -1 is
+# GStreamer's way to write the largest unsigned one
 numeric_range () {
   awk -v name="$1" -v value="$2" '
     /^  [a-z]/ { inside = $1 == name || $1 == name ":" }
     inside && match($0, /Range: *[^ ]+ - +[^ ]+/) {
       split(substr($0, RSTART, RLENGTH), part)
-      if (part[2] ~ /^-?[0-9.e+]+$/ && value ~ /^-?[0-9]+(\.[0-9]*)?$/ && (value + 0 < part[2] + 0 || value + 0 > part[4] + 0))
+      if (part[2] ~ /^-?[0-9.e+]+$/ && value ~ /^-?[0-9]+(\.[0-9]*)?$/ && (value + 0 < part[2] + 0 || value + 0 > part[4] + 0) && !(value == -1 && /Unsigned/))
         print part[2] " to " part[4]
     }'
 }

@@ -146,7 +146,7 @@ if [ -n "$token" ]; then
 fi
 [ -z "$token_file" ] || settings+=("token-file=$token_file")
 
-# usage: certificate_names: those that browsers accept it for, if openssl is there to tell
+# usage: certificate_names: prints the names in the certificate; none without openssl
 certificate_names () {
   [ -z "$certificate" ] || openssl x509 -in "$certificate" -noout -ext subjectAltName 2>/dev/null |
     tr -d ' ' | tr ',' '\n' | sed -n 's/^DNS://p; s/^IPAddress://p' | grep -vE '^(localhost|127\.|\*|0:0:0:0:0:0:0:1$)' || true

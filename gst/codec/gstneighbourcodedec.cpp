@@ -151,7 +151,6 @@ reset_stream (GstNeighbourCodeDecPrivate *priv)
   reset_slices (priv);
   reset_references (priv);
   priv->concealment.reset ();
-  priv->warned_damage = false;
 }
 
 static gboolean

@@ -370,7 +370,7 @@ drop (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
 }
 
 /* Posts the first damage of a stream: bytes after an access unit, neither after a seek nor at the
- * end, of which warn_if_truncated() speaks. */
+ * end, which warn_if_truncated() reports. */
 static void
 warn_damage (GstBaseParse *base, const GstBaseParseFrame *frame, const StreamPart &part)
 {

@@ -355,13 +355,15 @@ name_pads (GstRangeDemuxPrivate *priv, GstMessage *message)
   if (g_error_matches (error, GST_PARSE_ERROR, GST_PARSE_ERROR_DELAYED_LINK)) {
     const gchar *line = debug ? g_strrstr (debug, "\n") : nullptr;
     std::string text = line ? line + 1 : error->message;
-    text += "; the stream has " + std::to_string (priv->info.views ()) + " views:";
+    const auto views = priv->info.views ();
+    text += "; the stream has " + std::to_string (views) + (views == 1 ? " view:" : " views:");
     for (const DemuxPad &entry : priv->pads)
       if (entry.pad)
         text += std::string (" ") + GST_PAD_NAME (entry.pad);
     g_free (error->message);
     error->message = g_strdup (text.c_str ());
     GstMessage *named = gst_message_new_warning (GST_MESSAGE_SRC (message), error, debug);
+    gst_message_set_seqnum (named, gst_message_get_seqnum (message));
     gst_message_unref (message);
     message = named;
   }

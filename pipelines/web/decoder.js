@@ -13,7 +13,7 @@ class Stage {
     this.source = this.wanted = null; // wanted: the last one that was asked for
     this.view = null; // what the page looks from
     this.drawing = false; // the page has a frame set that it has not drawn yet
-    this.waiting = null; // of the newest frame set, not shown yet: due, held (it has been shown from elsewhere)
+    this.waiting = null; // of the newest frame set, not shown yet: due, held (it does not follow the one before in the stream's time)
     this.skipped = 0;
     this.decodeTime = 0;
     this.network = null; // of a live source: transport, dropped (by the server), lost (messages, by the network)
@@ -31,11 +31,11 @@ class Stage {
     return outcome;
   }
 
-  // The core has a new frame set. due: when it should be seen, ms since the epoch
-  decoded (due) {
-    if (this.waiting)
+  // The core has a new frame set. due: when it should be seen, ms since the epoch; held: while nothing plays
+  decoded (due, held = false) {
+    if (this.waiting && !this.waiting.held)
       this.skipped++;
-    this.waiting = { due };
+    this.waiting = { due, held };
     this.show ();
   }
 
@@ -99,10 +99,16 @@ class Stage {
   }
   // What is shown goes on until a recording has been found good.
   async open ({ recording, live, paused, time }) {
-    const source = live ? new LiveSource (this, live) : new RecordingSource (this, recording);
+    const source = live ? new LiveSource (this, live) : new RecordingSource (this, recording), before = this.wanted;
     this.wanted = source;
-    if (recording && !await source.load () || this.wanted !== source)
+    const failure = recording ? await source.load () : '';
+    if (this.wanted !== source)
       return;
+    if (failure) {
+      this.wanted = before;
+      this.say (failure);
+      return;
+    }
     this.source?.close ();
     this.network = null;
     this.source = source;

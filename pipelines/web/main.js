@@ -57,6 +57,7 @@ class Page {
     this.pending = null; // the newest frame set, not uploaded yet
     this.resolution = new Resolution ();
     this.wanted = this.painting = false; // another picture; one is under way
+    this.resting = false; // the next one is to have all pixels
     this.server = null; // { url, token }
     this.headset = new Headset (this, element ('headset'), say);
     this.channel = null;
@@ -157,23 +158,27 @@ class Page {
   // The next picture has to wait until the GPU has drawn this one, so that it is of the newest frame set.
   async drawNext () {
     clearTimeout (this.rest);
-    this.wanted = false;
-    const scale = this.resolution.scaleOf (canvas.clientWidth * canvas.clientHeight * (window.devicePixelRatio || 1) ** 2), begin = performance.now ();
-    this.setSize (scale);
-    const frame = this.paint ();
-    await this.renderer.drawn ();
-    this.resolution.drawn (performance.now () - begin);
-    this.shown (frame, begin, scale);
-    this.painting = false;
+    const whole = this.resting, scale = whole ? 1 : this.resolution.scaleOf (canvas.clientWidth * canvas.clientHeight * (window.devicePixelRatio || 1) ** 2);
+    this.wanted = this.resting = false;
+    try {
+      const begin = performance.now ();
+      this.setSize (scale);
+      const frame = this.paint ();
+      await this.renderer.finished ();
+      if (!whole)
+        this.resolution.record (performance.now () - begin);
+      this.shown (frame, begin, scale);
+    } finally {
+      this.painting = false;
+    }
     if (this.wanted)
       this.draw ();
-    else if (scale < 1)
-      this.rest = setTimeout (() => this.drawWhole (), Math.max (REST, 2 * this.resolution.period)); // not just before the next frame set
+    else if (scale < 1) // and not just before the next frame set
+      this.rest = setTimeout (() => this.drawWhole (), Math.max (REST, 2 * this.resolution.period));
   }
   drawWhole () {
-    const begin = performance.now ();
-    this.setSize (1);
-    this.shown (this.paint (), begin);
+    this.resting = true;
+    this.draw ();
   }
 
   // show: draws one picture, or one for each eye. Returns the frame set that is new in it, if any.
@@ -285,7 +290,8 @@ class Page {
       element ('sound').textContent = this.speech.isOn ? 'Mute' : 'Sound';
     };
     element ('save-picture').onclick = () => {
-      this.drawWhole ();
+      this.setSize (1);
+      this.shown (this.paint (), performance.now ());
       canvas.toBlob ((blob) => blob && save (blob, 'rangecast.png'));
     };
     element ('save-points').onclick = () => this.worker.postMessage ({ type: 'points' });

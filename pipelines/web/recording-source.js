@@ -10,10 +10,9 @@ export class RecordingSource {
     this.playing = false;
     this.timer = null;
     this.time = 0; // of the last frame set, ms from the first
-    this.closed = false;
   }
 
-  // Loads it, and decodes its first frame set in a core of its own. @return false if it cannot be played, which has been said
+  // Loads it, and decodes its first frame set in a core of its own. @return why it cannot be played, or ''
   async load () {
     let file = this.recording;
     try {
@@ -25,8 +24,7 @@ export class RecordingSource {
         file = await answer.blob ();
       }
     } catch (error) {
-      this.stage.say (`The recording could not be loaded: ${error.message}.`);
-      return false;
+      return `The recording could not be loaded: ${error.message}.`;
     }
     const reader = new FileReaderSync ();
     this.size = file.size;
@@ -34,13 +32,10 @@ export class RecordingSource {
     try {
       const core = new Core (this.stage.core.module, this.read);
       core.call ('rc_recording_open', this.size);
-      if (core.call ('rc_recording_next', 1) === DONE)
-        return true;
-      this.stage.say (core.message ());
+      return core.call ('rc_recording_next', 1) === DONE ? '' : core.message ();
     } catch (error) {
-      this.stage.say (error.message);
+      return error.message;
     }
-    return false;
   }
 
   start (paused = false, time = 0) {
@@ -60,7 +55,6 @@ export class RecordingSource {
   }
 
   close () {
-    this.closed = true;
     clearTimeout (this.timer);
   }
 
@@ -81,7 +75,7 @@ export class RecordingSource {
         this.stage.say (`The recording is damaged: ${badSlices} slices of a frame set cannot be decoded.`, 'note');
       this.saidDamage ||= badSlices > 0;
       this.time = pts >= 0 ? pts : this.time + (this.frameDuration () || 40);
-      this.stage.decoded (performance.timeOrigin + (this.playing ? this.dueOf (this.time) : performance.now ()));
+      this.stage.decoded (performance.timeOrigin + (this.playing ? this.dueOf (this.time) : performance.now ()), !this.playing);
       this.reportPosition ();
       return true;
     }

@@ -27,7 +27,7 @@ class Program {
       this.check ();
     this.gl.useProgram (this.program);
   }
-  // At the first use: who asks earlier waits for the compiler.
+  // At the first use: asking earlier blocks until the compiler has finished.
   check () {
     const gl = this.gl;
     if (!gl.getProgramParameter (this.program, gl.LINK_STATUS) && !gl.isContextLost ())
@@ -163,13 +163,14 @@ export class Renderer {
     }
     gl.disable (gl.SCISSOR_TEST);
   }
-  // Resolves when the GPU has drawn what it was told to.
-  drawn () {
+  // Resolves when the GPU has executed the commands issued so far, or its context was lost.
+  finished () {
     const { gl } = this, fence = gl.fenceSync (gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush ();
     return new Promise ((resolve) => {
+      // A lost context has no fences, and one that was restored does not know those of before.
       const look = () => {
-        if (!gl.isContextLost () && gl.getSyncParameter (fence, gl.SYNC_STATUS) !== gl.SIGNALED)
+        if (fence && gl.getSyncParameter (fence, gl.SYNC_STATUS) === gl.UNSIGNALED)
           setTimeout (look, 0);
         else {
           gl.deleteSync (fence);

@@ -14,7 +14,6 @@ source "$here/../../pipelines/env.sh"
 source "$here/../pipelines/netns.sh"
 skip () { echo "skipped: $*"; exit 77; }
 net_need
-cd "$(mktemp -d)"
 net_open
 net_host viewers
 net_host relay0 # the sender

@@ -11,7 +11,7 @@ const play = (resolution, { interval, fixed, pixels }, count = 200) => {
     const skipped = Math.max (0, Math.ceil (cost () / interval) - 1);
     due += interval * (1 + skipped);
     resolution.follow ({ due, skipped });
-    resolution.drawn (cost ());
+    resolution.record (cost ());
     scales.push (resolution.scale);
   }
   return { cost: cost (), scales: scales.slice (-50) };
@@ -41,7 +41,7 @@ test ('there is a least resolution, and it is left again when the GPU has time',
 test ('one slow picture changes nothing', () => {
   const resolution = new Resolution ();
   for (let i = 0; i < 100; i++)
-    resolution.drawn (i % 10 === 0 ? 400 : 20);
+    resolution.record (i % 10 === 0 ? 400 : 20);
   assert.equal (resolution.scale, 1);
 });
 

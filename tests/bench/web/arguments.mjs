@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Arguments of the programs here, each with a comment that begins with "usage: ". They import what needs a build after that.
+// Arguments of the programs here, each with a comment that begins with "usage: ". Import modules that need a build only after this.
 import fs from 'node:fs';
 import path from 'node:path';
 import { parseArgs } from 'node:util';
