@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # What each level of a tree of relays costs (docs/guide/streaming.md, "Relays"): every host is a network namespace, so root only. A relay
-# sends to the next one and to a viewer. Latency: from a frame set's last packet at the sender's own viewer to its last packet at the
+# sends to the next one, if any, and to a viewer. Latency: from a frame set's last packet at the sender's own viewer to its last packet at the
 # viewer of that level. CPU: of the relay's process.
 # usage: tests/bench/relays.sh [SECONDS [LEVELS [properties of neighbourcodeenc...]]]   (default: 20 3)
 set -euo pipefail
@@ -52,7 +52,7 @@ sets = list(packets[0])[2:-8]  # those that all levels can have had
 if len(sets) < 5:
     sys.exit("relays.sh: no stream came from the sender")
 sent = sum(packets[0][s][0] for s in sets)
-print("| level | packets a frame set | lost % | latency p50 ms | p99 ms | CPU us a packet, sent twice |\n|---|---|---|---|---|---|")
+print("| level | packets a frame set | lost % | latency p50 ms | p99 ms | CPU us a packet |\n|---|---|---|---|---|---|")
 for level in range(1, len(sockets)):
     came = sum(packets[level].get(s, (0, 0))[0] for s in sets)
     late = sorted(1e3 * (packets[level][s][1] - packets[0][s][1]) for s in sets if packets[level].get(s, (0, 0))[0] == packets[0][s][0])
