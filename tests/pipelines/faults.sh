@@ -55,15 +55,6 @@ end_job () {
 list () { stream-report --list all.rcnc 2>/dev/null; }
 sets () { stream-report --list "$1" | wc -l; }
 
-wait_for () { # file regular-expression seconds
-  local i
-  for ((i = 0; i < $3 * 5; i++)); do
-    ! grep -qE "$2" "$1" 2>/dev/null || return 0
-    sleep 0.2
-  done
-  fail "$1 never held $2 in $3 s: $(tail -n 20 "$1")"
-}
-
 # Until so many frame sets have just these views, after one with those before `.*` where there is one.
 wait_for_sets () { wait_for_sets_after 0 "$@"; } # views count seconds
 wait_for_sets_after () { # ms views count seconds

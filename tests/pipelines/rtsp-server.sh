@@ -5,16 +5,6 @@ viewers=$source_dir/tests/pipelines/rtsp_viewers.py
 # Profile plain: large frame sets, so that slow viewers fall behind.
 figure="avatartestsrc is-live=true range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 ! neighbourcodeenc profile=plain"
 
-until_true () { # seconds command...
-  local i most=$(($1 * 5))
-  shift
-  for ((i = 0; i < most; i++)); do
-    "$@" && return
-    sleep 0.2
-  done
-  fail "$* was never true; $(tail -n 5 server.log)"
-}
-
 # usage: serve arguments of rtsp-server -> sets $url, and $server, which ends with the test
 serve () {
   : >server.log # maybe of another one before

@@ -31,6 +31,25 @@ expect_file () { # path bytes
   [ "$(stat -c %s "$1")" -ge "$2" ] || fail "$1: $(stat -c %s "$1") bytes, expected at least $2"
 }
 
+# Until the command succeeds.
+until_true () { # seconds command...
+  local i
+  for ((i = 0; i < $1 * 5; i++)); do
+    ! "${@:2}" || return 0
+    sleep 0.2
+  done
+  fail "not within $1 s: ${*:2}; $(tail -n 5 ./*.log ./*.txt 2>/dev/null)"
+}
+wait_for () { # file regular-expression seconds
+  holds () { grep -qE "$2" "$1" 2>/dev/null; }
+  until_true "$3" holds "$1" "$2"
+}
+# The process has a handler for Ctrl-C. Until then it misses one: bash starts what is in the background without.
+takes_interrupt () { # pid
+  local caught
+  caught=$(awk '/^SigCgt/ { print $2 }' "/proc/$1/status") && ((0x$caught >> 1 & 1))
+}
+
 # usage: need_gl: skips where no OpenGL context can be made.
 need_gl () {
   timeout 60 gst-launch-1.0 -q gltestsrc num-buffers=1 ! gldownload ! fakesink >/dev/null 2>&1 ||

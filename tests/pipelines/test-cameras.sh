@@ -8,15 +8,6 @@ need_cameras () {
 # Addresses of this run's own.
 address () { echo "127.$((ports / 256)).$((ports % 256)).$1"; }
 
-wait_for () { # file regular-expression seconds
-  local i
-  for ((i = 0; i < $3 * 5; i++)); do
-    ! grep -qE "$2" "$1" 2>/dev/null || return 0
-    sleep 0.2
-  done
-  fail "$1 never held $2 in $3 s: $(tail -n 20 "$1")"
-}
-
 start_cameras () { # log options...
   local log=$1
   shift

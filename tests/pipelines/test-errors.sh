@@ -96,10 +96,10 @@ test_a_recording_to_which_nothing_came_says_so_and_leaves_no_file () {
   local i recorder
   "$pipelines/record.sh" none.rcnc --listen $((ports + 203)) >record.log 2>&1 &
   recorder=$!
-  for ((i = 0; i < 150; i++)); do [ ! -e none.rcnc ] || break; sleep 0.2; done
-  [ -e none.rcnc ] || fail "it never began: $(cat record.log)"
+  until_true 60 takes_interrupt $recorder
+  [ -e none.rcnc ] || fail "it holds no place: $(cat record.log)"
   kill -INT $recorder
-  wait $recorder || true # nothing came: an error
+  await_end $recorder # nothing came: an error
   [ ! -e none.rcnc ] || fail "an empty file is left for a while"
   for ((i = 0; i < 100; i++)); do ! grep -q 'nothing came' record.log || break; sleep 0.1; done
   grep -q "nothing came to port $((ports + 203))" record.log || fail "it said: $(cat record.log)"
@@ -253,8 +253,8 @@ test_a_film_of_a_stream_that_did_not_come_is_not_left () {
   local i viewer
   "$pipelines/viewer-host.sh" --listen $((ports + 209)) --out film --size 160x120 >viewer.log 2>&1 &
   viewer=$!
-  for ((i = 0; i < 150; i++)); do [ ! -e film/avatar.webm ] || break; sleep 0.2; done
-  [ -e film/avatar.webm ] || fail "it never began: $(cat viewer.log)"
+  until_true 60 takes_interrupt $viewer
+  until_true 60 test -e film/avatar.webm
   kill -INT $viewer
   await_end $viewer
   [ ! -e film/avatar.webm ] || fail "an empty film is left"

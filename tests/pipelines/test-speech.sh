@@ -17,15 +17,6 @@ export_rig () { # views
   gst-launch-1.0 -q avatartestsrc views="$1" num-buffers=1 rig-export=rig.yaml ! video/x-range,width=160,height=120 ! fakesink
 }
 
-until_true () { # seconds command...
-  local i
-  for ((i = 0; i < $1 * 5; i++)); do
-    ! "${@:2}" || return 0
-    sleep 0.2
-  done
-  fail "not within $1 s: ${*:2}; $(tail -n 5 ./*.log | grep -v '^\(picture\|sound\)')"
-}
-
 stop_all () {
   kill -TERM "$@" 2>/dev/null || true
   wait "$@" 2>/dev/null || true
@@ -212,7 +203,8 @@ test_senders_of_speech_end_at_once () {
       --audio "$silence" --audio-to "127.0.0.1:$((ports + 70))" >"camera$i.log" 2>&1 &
     senders+=($!)
   done
-  sleep 4
+  for i in "${senders[@]}"; do until_true 60 takes_interrupt "$i"; done
+  sleep 2
   kill -INT "${senders[@]}"
   for ((i = 0; i < 40; i++)); do
     late=$(ps -o pid= -p "$(IFS=,; echo "${senders[*]}")" | wc -l || true)

@@ -7,16 +7,6 @@ need_server () {
   [ -f "${RANGECAST_BUILD:-$source_dir/build}/pipelines/web/index.html" ] || skip "built without the page, which needs clang for wasm32-wasi"
 }
 
-until_true () { # seconds command...
-  local i most=$(($1 * 10))
-  shift
-  for ((i = 0; i < most; i++)); do
-    "$@" && return
-    sleep 0.1
-  done
-  fail "$* was never true; $(tail -n 5 ./*.log ./*.txt)"
-}
-
 # usage: serve arguments of web-server.sh -> sets $server, a process group of its own that ends with the test, and $links
 serve () {
   : >links.txt # maybe of another one before

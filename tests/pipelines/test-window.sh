@@ -15,16 +15,6 @@ on_display () { xvfb-run -n $((100 + BASHPID % 20000)) -a -s "-screen 0 640x480x
 
 look () { gst-launch-1.0 -q ximagesrc num-buffers=1 show-pointer=false ! videoconvert ! pngenc ! filesink "location=$1"; }
 
-# Waits until a command succeeds, at most 20 s.
-wait_for () {
-  local tries
-  for ((tries = 0; tries < 100; tries++)); do
-    "$@" && return
-    sleep 0.2
-  done
-  fail "in vain: $*"
-}
-
 window_id () { xdotool search --onlyvisible --name 'OpenGL renderer' >window.txt; }
 first_picture () { look before.png && [ "$(stat -c %s before.png)" -gt 10000 ]; }
 first_picture_again () { look again.png && cmp -s before.png again.png; }
@@ -43,9 +33,9 @@ open_window () {
     ! striprender name=r ! 'video/x-raw(memory:GLMemory),width=320,height=240' ! glimagesink >log.txt 2>&1 &
   pipeline=$!
   trap 'kill $pipeline || true' EXIT
-  wait_for window_id
+  until_true 20 window_id
   window=$(cat window.txt)
-  wait_for first_picture
+  until_true 20 first_picture
 }
 
 drag_in_window () {
@@ -53,12 +43,12 @@ drag_in_window () {
   xdotool mousemove --window "$window" 160 120 mousedown 1
   xdotool mousemove --window "$window" 120 120
   xdotool mousemove --window "$window" 80 120 mouseup 1
-  wait_for azimuth_is 45
+  until_true 20 azimuth_is 45
   sleep 0.5
   look after.png
   xdotool key --window "$window" r
-  wait_for azimuth_is 0
-  wait_for first_picture_again
+  until_true 20 azimuth_is 0
+  until_true 20 first_picture_again
 }
 
 test_dragging_in_a_window_turns_the_view () {
@@ -72,15 +62,15 @@ larger_than_before () { look after.png && [ "$(stat -c %s after.png)" -gt $(($(s
 resize_window () {
   open_window
   xdotool windowsize "$window" 480 360
-  wait_for larger_than_before
+  until_true 20 larger_than_before
   xdotool mousemove --window "$window" 240 180 mousedown 1
   xdotool mousemove --window "$window" 160 180
   xdotool mousemove --window "$window" 80 180 mouseup 1
-  wait_for azimuth_is '\(60\|59\)\.[09]*[0-9]\{0,3\}'
+  until_true 20 azimuth_is '\(60\|59\)\.[09]*[0-9]\{0,3\}'
   xdotool windowsize "$window" 320 240
   xdotool key --window "$window" r
-  wait_for azimuth_is 0
-  wait_for first_picture_again
+  until_true 20 azimuth_is 0
+  until_true 20 first_picture_again
 }
 
 test_resized_window_shows_the_whole_picture_and_can_be_dragged () { in_display resize_window; }
@@ -95,8 +85,8 @@ lose_the_sender () {
     ! 'video/x-raw(memory:GLMemory),width=320,height=240,framerate=10/1' ! glimagesink >log.txt 2>&1 &
   pipeline=$!
   trap 'kill $pipeline || true; kill $sender 2>/dev/null || true' EXIT
-  wait_for window_id
-  wait_for first_picture
+  until_true 20 window_id
+  until_true 20 first_picture
   kill $sender; wait $sender || true
   sleep 1.5
   look silent.png
