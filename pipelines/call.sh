@@ -59,6 +59,7 @@ need_number "$port" --port 1 $((65535 - 10 - views))
 [[ "$peer" != *:* ]] || die "--peer: expected a name or IPv4 address, got '$peer'"
 split_address "$peer:$port" --peer
 [ -z "$fec" ] || need_number "$fec" --fec 1 100
+[ "$microphone" != none ] || [ "$echo_cancel" ] || die "--no-echo-cancel: expected with a microphone"
 rtp_key=$key rtp_check sender
 
 # usage: check SCRIPT OPTION...: whether it takes them; its error is about an option of this script

@@ -648,10 +648,13 @@ gst_neighbour_code_parse_sink_event (GstBaseParse *base, GstEvent *event)
 {
   const GstEventType type = GST_EVENT_TYPE (event);
   handle_key_unit_event (base, event);
+  Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   if (type == GST_EVENT_EOS)
     finish_stream (base);
   else if (type == GST_EVENT_GAP)
-    GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.had_gaps = true;
+    stream.had_gaps = true;
+  else if (type == GST_EVENT_STREAM_START)
+    stream.warned_damage = false;
   const gboolean done =
       GST_BASE_PARSE_CLASS (gst_neighbour_code_parse_parent_class)->sink_event (base, event);
   if (type == GST_EVENT_FLUSH_STOP || type == GST_EVENT_SEGMENT)

@@ -6,11 +6,12 @@
 # usage: tests/bench/relays.sh [SECONDS [LEVELS [properties of neighbourcodeenc...]]]   (default: 20 3)
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
-[ "${1:-}" != --help ] || { sed -n 's/^# usage: /usage: /p' "$0"; exit; }
+source "$here/arguments.sh"
+need_arguments 0 99 "$@"
 seconds=${1:-20} levels=${2:-3} encoder=("${@:3}")
-[[ $seconds =~ ^[1-9][0-9]{0,3}$ ]] && [[ $levels =~ ^[1-9][0-9]?$ ]] ||
-  { echo "relays.sh: expected SECONDS (1 to 9999) and LEVELS (1 to 99), got '$seconds' and '$levels'" >&2; exit 2; }
 source "$here/../../pipelines/env.sh"
+need_number "$seconds" SECONDS 1 9999
+need_number "$levels" LEVELS 1 99
 source "$here/../pipelines/netns.sh"
 skip () { echo "skipped: $*"; exit 77; }
 net_need

@@ -310,7 +310,7 @@ test_recordings_that_there_are_are_kept () {
 
 test_programs_of_benchmarks_give_their_usage () {
   local call status tests=$source_dir/tests
-  local programs=("$tests"/bench/{measure-parent,measure-codecs,copies,rate-table,cylinder-pictures,loss-picture,people-sheet}.sh
+  local programs=("$tests"/bench/{measure-parent,measure-codecs,copies,rate-table,cylinder-pictures,loss-picture,people-sheet,relays}.sh
     "python3 $tests/bench/cylinder-table.py" "python3 $tests/fuzz/make-seeds.py")
   ! command -v node >/dev/null || programs+=("node $tests/bench/web/clients.mjs" "node $tests/bench/web/decode.mjs")
   for call in "${programs[@]}"; do

@@ -278,6 +278,7 @@ test_wrong_options_are_named () {
   echo none >empty.yaml
   expect_error "'empty.yaml' has no views" "$pipelines/call.sh" --peer 127.0.0.1 --rig empty.yaml
   local call=("$pipelines/call.sh" --peer 127.0.0.1 --rig rig.yaml --input range --no-window)
+  expect_error "call.sh: --no-echo-cancel: expected with a microphone" "${call[@]}" --microphone none --no-echo-cancel
   expect_error "call.sh: --microphone: a quote is not closed in 'a \"'" "${call[@]}" --microphone 'a "'
   expect_error "call.sh: --speaker: a quote is not closed in 'a \"'" "${call[@]}" --microphone none --speaker 'a "'
   expect_error "call.sh: --fps: expected a whole number from 1 to 1000, got '0'" "${call[@]}" --microphone none --fps 0

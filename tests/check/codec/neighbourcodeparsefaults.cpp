@@ -41,16 +41,23 @@ GST_START_TEST (test_every_truncated_prefix_keeps_the_whole_access_units_before_
 }
 GST_END_TEST;
 
-/* Warnings of a stream that ends after these bytes; in `errors` how many errors there were. */
+/* Warnings of streams that end after these bytes, one after another; in `errors` how many errors
+ * there were. */
 static std::vector<std::string>
-warnings_of_stream (std::span<const guint8> bytes, int *errors = nullptr)
+warnings_of_streams (int streams, std::span<const guint8> bytes, int *errors = nullptr)
 {
   GstHarness *h = new_parser ();
   std::vector<std::string> texts;
   {
     ErrorCounter counter (h);
-    push_bytes (h, bytes, 5000);
-    gst_harness_push_event (h, gst_event_new_eos ());
+    for (int i = 0; i < streams; i++) {
+      GstSegment segment;
+      gst_segment_init (&segment, GST_FORMAT_BYTES);
+      gst_harness_push_event (h, gst_event_new_stream_start (std::to_string (i).c_str ()));
+      gst_harness_push_event (h, gst_event_new_segment (&segment));
+      push_bytes (h, bytes, 5000);
+      gst_harness_push_event (h, gst_event_new_eos ());
+    }
     while (GstMessage *message = gst_bus_pop_filtered (
                counter.bus, GstMessageType (GST_MESSAGE_WARNING | GST_MESSAGE_ERROR))) {
       GError *error = nullptr;
@@ -68,6 +75,12 @@ warnings_of_stream (std::span<const guint8> bytes, int *errors = nullptr)
   unref_all (parsed);
   gst_harness_teardown (h);
   return texts;
+}
+
+static std::vector<std::string>
+warnings_of_stream (std::span<const guint8> bytes, int *errors = nullptr)
+{
+  return warnings_of_streams (1, bytes, errors);
 }
 
 GST_START_TEST (test_stream_that_ends_within_an_access_unit_is_one_warning)
@@ -102,6 +115,7 @@ GST_START_TEST (test_bytes_between_access_units_are_one_warning)
   fail_unless_equals_int (texts.size (), 1);
   fail_unless_contains (
       texts[0], "at byte " + std::to_string (recording.offsets[4]) + " are not an access unit");
+  fail_unless_equals_int (warnings_of_streams (3, bytes).size (), 3);
   bytes = recording.bytes; /* one may begin to listen in the middle of a stream */
   bytes.erase (bytes.begin (), bytes.begin () + 100);
   fail_unless_equals_int (warnings_of_stream (bytes).size (), 0);
