@@ -154,7 +154,7 @@ certificate_names () {
 
 # usage: print_links URL: where it listens at all addresses of this machine, with its names, too
 print_links () {
-  local scheme=${1%%://*} host=${1#*://} link_port one hosts
+  local scheme=${1%%://*} host=${1#*://} link_port one hosts printed=()
   link_port=${host##*:} link_port=${link_port%/} host=${host%:*}
   hosts=$host
   case "$host" in
@@ -165,8 +165,9 @@ print_links () {
   esac
   for one in $hosts; do
     [[ "$one" != *:*:* || "$one" == \[* ]] || one="[$one]"
-    echo "$scheme://$one:$link_port/${webrtc:+?transport=webrtc}${token:+#token=$token}"
+    printed+=("$scheme://$one:$link_port/${webrtc:+?transport=webrtc}${token:+#token=$token}")
   done
+  printf '%s\n' "${printed[@]}" # at once
   [ -z "$token_file" ] || [ -n "$private" ] || echo "(each user's link ends with #token= and their token)"
 }
 

@@ -204,6 +204,32 @@ test_other_machines_need_a_token () {
   [ ! -e "$private" ] || fail "$private is left"
 }
 
+test_links_name_the_addresses_of_this_machine_or_those_of_the_certificate () {
+  need_server
+  local link address port
+  serve --address 0.0.0.0 --token one
+  port=${links[0]##*:} port=${port%%/*}
+  for address in "$(hostname)" $(hostname -I | tr ' ' '\n' | grep -F .); do
+    grep -qxF "http://$address:$port/#token=one" links.txt || fail "$address is not in: $(cat links.txt)"
+  done
+  for link in "${links[@]}"; do curl -sSf -o page.html --resolve "$(hostname):$port:127.0.0.1" "$link" || fail "$link"; done
+  stop_server
+  if grep -qs . /proc/net/if_inet6; then
+    serve --address :: --anonymous
+    for link in "${links[@]}"; do
+      [[ "$link" =~ ^http://(\[[0-9a-f:]+\]|"$(hostname)"):[0-9]+/$ ]] || fail "$link"
+      [[ "$link" == *"//$(hostname):"* ]] || curl -gsSf -o page.html "$link" || fail "$link"
+    done
+    stop_server
+  fi
+  "$pipelines/web-certificate.sh" certs rig.example 192.0.2.7 127.0.0.1
+  serve --address 0.0.0.0 --token one --certificate certs/server.pem --private-key certs/server-key.pem
+  [[ "${links[*]}" =~ ^https://rig.example:[0-9]+/#token=one\ https://192.0.2.7:[0-9]+/#token=one$ ]] || fail "${links[*]}"
+  port=${links[0]##*:} port=${port%%/*}
+  curl -sSf -o page.html --cacert certs/authority.pem --resolve "rig.example:$port:127.0.0.1" "${links[0]}"
+  stop_server
+}
+
 test_tokens_come_from_options_and_files () {
   need_server
   printf 'anna one\nbert two\n' >"the users.txt"
