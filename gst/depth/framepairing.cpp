@@ -12,6 +12,9 @@ using gstrange::running_time_of;
 #define MS_FORMAT ".1f ms"
 #define MS_ARGS(ns) (double (ns) / GST_MSECOND)
 
+/* Of a live pipeline, ahead of its clock. */
+static constexpr GstClockTime kFarAhead = 10 * GST_SECOND;
+
 /* The oldest buffer of a pad. */
 struct PairMatcher::Front {
   GstBuffer *buffer; /* null: none */
@@ -52,9 +55,13 @@ PairMatcher::pop_pair (GstClockTime frame_duration, Pair &pair)
       drop (fronts, fronts[1 - gap].time > last ? gap : 1 - gap, tolerance);
     } else if (a.gap || b.gap)
       drop (fronts, a.gap ? 0 : 1, tolerance);
-    else if (timed && (a.time > b.time ? a.time - b.time : b.time - a.time) > tolerance)
-      drop (fronts, a.time < b.time ? 0 : 1, tolerance);
-    else
+    else if (timed && (a.time > b.time ? a.time - b.time : b.time - a.time) > tolerance) {
+      const int newer = a.time < b.time ? 1 : 0;
+      const bool wrong = is_far_ahead (fronts[newer], fronts[1 - newer]);
+      drop (fronts, wrong ? newer : 1 - newer, tolerance);
+      if (wrong)
+        warn_far_ahead (fronts[newer], pads_[newer]);
+    } else
       break;
   }
   pair.first = gst_aggregator_pad_pop_buffer (pads_[0]);
@@ -67,6 +74,33 @@ PairMatcher::pop_pair (GstClockTime frame_duration, Pair &pair)
   gst_clear_buffer (&pair.first); /* flushed in between */
   gst_clear_buffer (&pair.second);
   return GST_AGGREGATOR_FLOW_NEED_DATA;
+}
+
+/* Sources that are not live and stamp buffers by the clock (fdsrc do-timestamp=true) may do so in
+ * the moment between the pipeline's clock and its base time, and be hours ahead. */
+bool
+PairMatcher::is_far_ahead (const Front &front, const Front &other) const
+{
+  GstElement *element = GST_PAD_PARENT (pads_[0]);
+  if (front.time < other.time + kFarAhead || GST_STATE (element) != GST_STATE_PLAYING ||
+      !GST_CLOCK_TIME_IS_VALID (gst_aggregator_get_latency (GST_AGGREGATOR (element))))
+    return false;
+  const GstClockTime now = gst_element_get_current_running_time (element);
+  return GST_CLOCK_TIME_IS_VALID (now) && front.time > now + kFarAhead;
+}
+
+void
+PairMatcher::warn_far_ahead (const Front &front, GstAggregatorPad *pad)
+{
+  if (std::exchange (warned_far_ahead_, true))
+    return;
+  GstElement *element = GST_PAD_PARENT (pad);
+  const GstClockTime now = gst_element_get_current_running_time (element);
+  GST_ELEMENT_WARNING (element, STREAM, FAILED,
+      ("Pad %s: dropped a buffer %.0f s ahead of the clock", GST_PAD_NAME (pad),
+          (double (front.time) - double (now)) / GST_SECOND),
+      ("running time %" GST_TIME_FORMAT "; further ones are only logged",
+          GST_TIME_ARGS (front.time)));
 }
 
 /* Drops the front of one pad. If either front is a GAP, its time becomes one without pairs; a
@@ -87,7 +121,7 @@ PairMatcher::drop (const Front (&fronts)[2], int side, GstClockTime tolerance)
         "dropping frame at %" GST_TIME_FORMAT ": no partner, pad %s is %" MS_FORMAT
         " ahead, tolerance %" MS_FORMAT,
         GST_TIME_ARGS (front.time), GST_PAD_NAME (pads_[1 - side]),
-        MS_ARGS (other.time - front.time), MS_ARGS (tolerance));
+        MS_ARGS (GST_CLOCK_DIFF (front.time, other.time)), MS_ARGS (tolerance));
   if (!front.gap)
     dropped_[side]++;
   discont_ |= GST_BUFFER_IS_DISCONT (front.buffer);
@@ -155,6 +189,7 @@ void
 PairMatcher::reset ()
 {
   dropped_[0] = dropped_[1] = 0;
+  warned_far_ahead_ = false;
   flush ();
 }
 

@@ -8,10 +8,9 @@ silence="audiotestsrc is-live=true wave=silence"
 heard="fakesink name=speaker sync=true"
 claps () { python3 "$source_dir/tests/pipelines/claps.py" "$@"; }
 
+claps_env=(env LD_PRELOAD="$clap" ASAN_OPTIONS="${ASAN_OPTIONS:+$ASAN_OPTIONS:}verify_asan_link_order=0")
 # usage: with_claps [VARIABLE=VALUE...] command...
-with_claps () {
-  env LD_PRELOAD="$clap" ASAN_OPTIONS="${ASAN_OPTIONS:+$ASAN_OPTIONS:}verify_asan_link_order=0" "$@"
-}
+with_claps () { "${claps_env[@]}" "$@"; }
 
 export_rig () { # views
   gst-launch-1.0 -q avatartestsrc views="$1" num-buffers=1 rig-export=rig.yaml ! video/x-range,width=160,height=120 ! fakesink
@@ -229,6 +228,9 @@ test_speech_is_sent_without_any_to_hear () {
   export RANGECAST_LAUNCH=echo
   "$pipelines/viewer-host.sh" --listen $((ports + 20)) --talk "$silence" --talk-to 127.0.0.1:7000 >launch.txt
   [ "$(grep -o 'name=microphone' launch.txt | wc -l)" = 1 ] || fail "$(cat launch.txt)"
+  grep -q -e '--clock system' launch.txt || fail "$(cat launch.txt)"
+  "$pipelines/viewer-host.sh" --listen $((ports + 20)) --talk "$silence" --talk-to 127.0.0.1:7000 --talk-clock 127.0.0.1:7100 >launch.txt
+  grep -q -e '--clock 127.0.0.1:7100' launch.txt || fail "$(cat launch.txt)"
 }
 
 test_recordings_are_kept () {
@@ -284,7 +286,36 @@ test_wrong_options_are_named () {
   expect_error "call.sh: --fps: expected a whole number from 1 to 1000, got '0'" "${call[@]}" --microphone none --fps 0
 }
 
-# ---- calls ----
+# ---- several hosts ----
+
+test_speech_reaches_all_hosts_of_a_multicast_group () {
+  need_gl
+  net_need
+  net_open
+  export_rig 1
+  local name group=239.255.7.1 hosts=()
+  for name in studio one two; do net_host $name; done
+  net_on studio "${claps_env[@]}" CLAP_SEND=1 "$pipelines/camera-host.sh" --view 0 --rig rig.yaml --input range --size 160x120 --learn 5 \
+    --to 127.0.0.1:5000 --audio "$silence" --audio-to 127.0.0.1:5300 >camera.log 2>&1 &
+  hosts+=($!)
+  net_on studio "$pipelines/parent-host.sh" --views 1 --listen 5000 --to $group:6000 --audio 5300 --audio-to $group:6002 \
+    --interface eth0 >parent.log 2>&1 &
+  hosts+=($!)
+  for name in one two; do
+    net_on $name "${claps_env[@]}" CLAP_LOG="$PWD/$name.seen" "$pipelines/viewer-host.sh" --listen 6000 --audio 6002 \
+      --multicast $group --interface eth0 --size 160x120 --speaker "$heard" >$name.log 2>&1 &
+    hosts+=($!)
+  done
+  hears () { [ "$(claps "$1.seen" 2>/dev/null | wc -l)" -ge 5 ]; }
+  for name in one two; do until_true 90 hears $name; done
+  stop_all "${hosts[@]}"
+  for name in one two; do
+    claps $name.seen | tail -n +2 >claps.txt
+    expect_in_step claps.txt 4
+  done
+  net_close
+}
+
 
 open_two_hosts () {
   net_need
@@ -294,7 +325,7 @@ open_two_hosts () {
 }
 start_end () { # name peer options...
   mkdir -p "$1"
-  net_on "$1" env LD_PRELOAD="$clap" ASAN_OPTIONS="${ASAN_OPTIONS:+$ASAN_OPTIONS:}verify_asan_link_order=0" CLAP_SEND=1 \
+  net_on "$1" "${claps_env[@]}" CLAP_SEND=1 \
     CLAP_LOG="$PWD/$1/seen.log" "$pipelines/call.sh" --peer "$(net_address "$2")" --rig rig.yaml --input range --size 160x120 \
     --learn 5 --microphone "$silence" --speaker "$heard" --no-window --key studio.key "${@:3}" <"$1.keys" >"$1.log" 2>&1 &
   ends[$1]=$!

@@ -572,6 +572,49 @@ pull_preroll (GstElement *pipeline, const char *name)
   return sample;
 }
 
+static GstPadProbeReturn
+stamp_an_hour_ahead (GstPad *, GstPadProbeInfo *info, gpointer)
+{
+  GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info)) += 3600 * GST_SECOND;
+  return GST_PAD_PROBE_REMOVE;
+}
+
+/* As fdsrc do-timestamp=true may stamp its first one. */
+GST_START_TEST (test_depth_far_ahead_of_the_clock_does_not_stop_a_live_stream)
+{
+  GstElement *pipeline = gst_parse_launch (
+      "videotestsrc is-live=true num-buffers=10 ! video/x-raw,framerate=10/1,width=64,height=48 "
+      "! queue ! c.colour videotestsrc is-live=true num-buffers=10 "
+      "! video/x-raw,format=GRAY16_LE,framerate=10/1,width=64,height=48 ! identity name=camera "
+      "! queue ! c.depth  rangecombine name=c ! fakesink",
+      nullptr);
+  GstElement *camera = gst_bin_get_by_name (GST_BIN (pipeline), "camera"),
+             *combine = gst_bin_get_by_name (GST_BIN (pipeline), "c");
+  GstPad *pad = gst_element_get_static_pad (camera, "src");
+  gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_BUFFER, stamp_an_hour_ahead, nullptr, nullptr);
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  fail_unless_contains (
+      next_message_text (bus, GST_MESSAGE_WARNING), "Pad depth: dropped a buffer 36");
+  GstMessage *end = gst_bus_timed_pop_filtered (bus, 60 * GST_SECOND,
+      GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING));
+  fail_unless (end && GST_MESSAGE_TYPE (end) == GST_MESSAGE_EOS);
+  gst_message_unref (end);
+  GstStructure *stats = nullptr;
+  g_object_get (combine, "stats", &stats, nullptr);
+  guint64 frames = 0;
+  fail_unless (gst_structure_get_uint64 (stats, "frames", &frames));
+  fail_unless (frames >= 7, "%d frame sets", int (frames));
+  gst_structure_free (stats);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (bus);
+  gst_object_unref (pad);
+  gst_object_unref (camera);
+  gst_object_unref (combine);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
 /* Through an element that keeps what it does not know of caps, too. */
 GST_START_TEST (test_takes_back_what_rangesplit_gave_without_properties)
 {
@@ -672,6 +715,7 @@ rangecombine_suite ()
   tcase_add_test (tc, test_end_of_one_pad_ends_the_stream);
   tcase_add_test (tc, test_new_size_in_the_stream_is_taken);
   tcase_add_test (tc, test_changes_states_twice);
+  tcase_add_test (tc, test_depth_far_ahead_of_the_clock_does_not_stop_a_live_stream);
   tcase_add_test (tc, test_takes_back_what_rangesplit_gave_without_properties);
   tcase_add_test (tc, test_calibration_of_another_size_in_the_caps_is_an_error);
   tcase_add_test (tc, test_invalid_calibration_is_one_error_that_names_the_field);
