@@ -486,7 +486,8 @@ Server::answer (SoupServerMessage *message, const char *path)
   soup_message_headers_append (headers, "Referrer-Policy", "no-referrer");
   soup_message_headers_append (headers, "Content-Security-Policy",
       "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; "
-      "img-src 'self' data: blob:; connect-src *; object-src 'none'; base-uri 'none'; "
+      "img-src 'self' data: blob:; media-src blob:; connect-src *; object-src 'none'; base-uri "
+      "'none'; "
       "frame-ancestors 'none'");
   const char *method = soup_server_message_get_method (message);
   if (method != SOUP_METHOD_GET && method != SOUP_METHOD_HEAD)

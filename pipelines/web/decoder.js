@@ -21,7 +21,7 @@ class Stage {
 
   post (message) { postMessage (message); }
   say (text, kind = 'error') { this.post ({ type: 'say', text, kind }); }
-  position (time, duration, playing) { this.post ({ type: 'position', time, duration, playing }); }
+  position (time, duration, playing, due) { this.post ({ type: 'position', time, duration, playing, due }); }
 
   // decode (): an Outcome. Measures it; a failure of the core is said, and FAILED returned.
   decode (decode) {
@@ -112,6 +112,7 @@ class Stage {
     this.source?.close ();
     this.network = null;
     this.source = source;
+    this.post ({ type: 'opened' });
     source.start (paused, time);
   }
   points () {

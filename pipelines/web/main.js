@@ -6,6 +6,7 @@
 import { BLEND, Core, STRIPS } from './core.js';
 import { DataChannel } from './data-channel.js';
 import { followPointers } from './pointers.js';
+import { RecordedSound } from './recorded-sound.js';
 import { Renderer } from './renderer.js';
 import { Resolution } from './resolution.js';
 import { findServer, storeToken, readToken } from './server.js';
@@ -53,6 +54,7 @@ class Page {
     this.camera = new Core (module);
     this.renderer = new Renderer (canvas, (number) => this.camera.text (this.camera.call ('rc_shader', number)));
     this.speech = new Speech (say, (wait) => this.worker.postMessage ({ type: 'hold', wait }));
+    this.recordedSound = new RecordedSound (say, (available) => this.audio ({ available }));
     this.stats = new Stats (element ('stats'), parameters.has ('stats'), (latency) => this.speech.follow (latency));
     this.pending = null; // the newest frame set, not uploaded yet
     this.resolution = new Resolution ();
@@ -82,7 +84,8 @@ class Page {
     this.setScene (state);
     this.draw ();
   }
-  position ({ time, duration, playing }) {
+  position ({ time, duration, playing, due }) {
+    this.recordedSound.follow (time, playing, due, this.speech.seen);
     const seek = element ('seek');
     this.closeChannel (); // of a stream before
     element ('token').hidden = true;
@@ -108,7 +111,12 @@ class Page {
       this.closeChannel ();
   }
   hear ({ packet }) { this.speech.add (packet); }
-  audio ({ available }) { element ('sound').hidden = !available; }
+  audio ({ available }) {
+    element ('sound').hidden = !available;
+    this.sayMuted ();
+  }
+  get sound () { return this.recordedSound.isOpen ? this.recordedSound : this.speech; }
+  sayMuted () { element ('sound').textContent = this.sound.isOn ? 'Mute' : 'Sound'; }
   welcome ({ rtc, iceServers }) {
     if (rtc && parameters.get ('transport') === 'webrtc')
       this.openChannel (iceServers, 3);
@@ -139,6 +147,14 @@ class Page {
     clearTimeout (this.channelTimer);
     this.channel?.close ();
     this.channel = null;
+  }
+
+  // What was asked for last is shown from now on.
+  opened () {
+    const { recording, files } = this.opening;
+    this.recordedSound.close ();
+    if (recording)
+      this.recordedSound.open (recording, files);
   }
 
   // ---- drawing ----
@@ -225,11 +241,20 @@ class Page {
   // ---- from the user ----
 
   openLive (url, token) {
+    this.opening = {};
     this.server = { url, token };
     this.worker.postMessage ({ type: 'open', live: this.server });
   }
-  open (recording) {
+  // recording: a File or an address; files: that and what was chosen with it
+  open (recording, files) {
+    this.opening = { recording, files };
     this.worker.postMessage ({ type: 'open', recording, paused: parameters.has ('paused'), time: Number (parameters.get ('time') ?? 0) });
+  }
+
+  // A recording, and its speech where that was chosen, too.
+  openFiles ([...files]) {
+    if (files.length > 0)
+      this.open (files.find (({ name }) => !/\.opus~?$/.test (name)) ?? files[0], files);
   }
 
   // scale: of the resolution of the screen
@@ -286,8 +311,8 @@ class Page {
     element ('mode').textContent = settings.mode === BLEND ? 'Blend' : 'Strips';
     element ('mode').onclick = () => this.toggleMode ();
     element ('sound').onclick = () => {
-      this.speech.toggle ();
-      element ('sound').textContent = this.speech.isOn ? 'Mute' : 'Sound';
+      this.sound.toggle ();
+      this.sayMuted ();
     };
     element ('save-picture').onclick = () => {
       this.setSize (1);
@@ -302,7 +327,7 @@ class Page {
       storeToken (this.server.url, element ('token-text').value);
       this.openLive (this.server.url, element ('token-text').value);
     };
-    element ('file').onchange = ({ target }) => target.files[0] && this.open (target.files[0]);
+    element ('file').onchange = ({ target }) => this.openFiles (target.files);
     addEventListener ('dragover', (event) => {
       event.preventDefault ();
       document.body.classList.add ('dropping');
@@ -311,8 +336,7 @@ class Page {
     addEventListener ('drop', (event) => {
       event.preventDefault ();
       document.body.classList.remove ('dropping');
-      if (event.dataTransfer.files[0])
-        this.open (event.dataTransfer.files[0]);
+      this.openFiles (event.dataTransfer.files);
     });
   }
 }

@@ -75,7 +75,7 @@ export class RecordingSource {
         this.stage.say (`The recording is damaged: ${badSlices} slices of a frame set cannot be decoded.`, 'note');
       this.saidDamage ||= badSlices > 0;
       this.time = pts >= 0 ? pts : this.time + (this.frameDuration () || 40);
-      this.stage.decoded (performance.timeOrigin + (this.playing ? this.dueOf (this.time) : performance.now ()), !this.playing);
+      this.stage.decoded (this.playing ? this.dueOf (this.time) : performance.timeOrigin + performance.now (), !this.playing);
       this.reportPosition ();
       return true;
     }
@@ -94,11 +94,11 @@ export class RecordingSource {
   }
 
   frameDuration () { return this.stage.core.record ('rc_recording')?.frameDuration ?? 0; }
-  dueOf (time) { return this.origin + time; }
+  dueOf (time) { return performance.timeOrigin + this.origin + time; } // ms since the epoch
 
   reportPosition () {
     const duration = this.stage.core.record ('rc_recording')?.duration ?? -1;
-    this.stage.position (this.time, duration, this.playing);
+    this.stage.position (this.time, duration, this.playing, this.dueOf (this.time));
   }
 
   play () {
@@ -117,7 +117,7 @@ export class RecordingSource {
 
   schedule () {
     const period = this.frameDuration () || 40;
-    const wait = this.dueOf (this.time + period) - performance.now ();
+    const wait = this.dueOf (this.time + period) - performance.timeOrigin - performance.now ();
     if (wait < -1000) { // too slow: time goes on from here
       this.stage.say ('This device is too slow to play the recording in its own time.', 'note');
       this.origin -= wait;

@@ -12,6 +12,9 @@ gst-launch-1.0 -q avatartestsrc views=4 num-buffers=1 range-person-only=true ! v
   ! neighbourcodeenc ! filesink "location=$source"
 gst-launch-1.0 -q avatartestsrc views=4 num-buffers=40 range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 \
   ! neighbourcodeenc ! filesink "location=$work/moving.rcnc"
+gst-launch-1.0 -q avatartestsrc views=2 num-buffers=150 range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 \
+  ! neighbourcodeenc ! filesink "location=$work/talk.rcnc"
+gst-launch-1.0 -q audiotestsrc wave=ticks num-buffers=470 ! opusenc ! oggmux ! filesink "location=$work/talk.opus"
 for mode in blend strips; do
   for angle in 0 -30 45 100 180; do
     gst-launch-1.0 -q filesrc "location=$source" ! neighbourcodeparse ! neighbourcodedec ! striprender "mode=$mode" fit=true "azimuth=$angle" \

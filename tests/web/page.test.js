@@ -15,7 +15,7 @@ const prepareFolder = () => {
   const folder = path.join (work, 'served');
   fs.rmSync (folder, { recursive: true, force: true });
   fs.cpSync (path.join (build, 'pipelines/web'), folder, { recursive: true, filter: (from) => !/\.[od]$/.test (from) });
-  for (const name of ['scene.rcnc', 'moving.rcnc', ...fs.readdirSync (work).filter ((file) => /^native-.*\.png$/.test (file))])
+  for (const name of ['scene.rcnc', 'moving.rcnc', 'talk.rcnc', 'talk.opus', ...fs.readdirSync (work).filter ((file) => /^native-.*\.png$/.test (file))])
     fs.copyFileSync (path.join (work, name), path.join (folder, name));
   fs.writeFileSync (path.join (folder, 'foreign.rcnc'), 'this is a text, and no recording\n'.repeat (100));
   const scene = fs.readFileSync (path.join (work, 'moving.rcnc'));
@@ -169,6 +169,58 @@ test ('a file that is dropped onto the page is played, and the button and the sp
   await page.focus ('#picture');
   await page.keyboard.press ('Space');
   await stateIs ('playing');
+  await page.close ();
+});
+
+// Until a few frame sets were shown with sound: ms that it is after the picture, at each of them.
+const soundAfterPicture = (page) => page.evaluate (() => new Promise ((resolve) => {
+  const { rangecastPage: shown } = window, { position, stats } = shown, { seen } = stats, differences = [];
+  let origin = NaN; // ms since the epoch
+  shown.position = function (message) {
+    origin = message.due - message.time;
+    return position.call (this, message);
+  };
+  stats.seen = function (latency) {
+    const { audio } = shown.recordedSound, time = performance.timeOrigin + performance.now () - latency - origin;
+    if (!audio.paused && time > 1000 && audio.currentTime > 0)
+      differences.push (time - 1000 * audio.currentTime);
+    if (differences.length === 15)
+      resolve (differences.slice (5));
+    return seen.call (this, latency);
+  };
+}));
+const middle = (values) => values.toSorted ((a, b) => a - b)[values.length >> 1];
+
+test ('the speech beside a recording is heard in step with the picture, after a click', async () => {
+  const page = await open ('src=talk.rcnc&mode=strips');
+  await page.waitForSelector ('#sound:not([hidden])');
+  assert.equal (await page.evaluate (() => window.rangecastPage.recordedSound.audio.paused), true);
+  await page.click ('#sound');
+  const differences = await soundAfterPicture (page);
+  console.log (`sound after picture, ms: ${differences.map ((value) => value.toFixed (0)).join (' ')}`);
+  assert.ok (Math.abs (middle (differences)) < 40, `${differences}`);
+  const isPaused = (wanted) => page.waitForFunction ((expected) => window.rangecastPage.recordedSound.audio.paused === expected, {}, wanted);
+  await page.click ('#play');
+  await isPaused (true);
+  await page.click ('#play');
+  await isPaused (false);
+  await page.evaluate (() => window.rangecastPage.worker.postMessage ({ type: 'seek', time: 6000 }));
+  await page.waitForFunction (() => window.rangecastPage.recordedSound.audio.currentTime > 5.8);
+  await page.click ('#sound'); // mute
+  await isPaused (true);
+  await (await page.$ ('#file')).uploadFile (path.join (work, 'served/scene.rcnc')); // which has no speech
+  await page.waitForSelector ('#sound', { hidden: true });
+  await page.close ();
+});
+
+test ('a recording and its speech are dropped together', async () => {
+  const page = await open ('');
+  await page.waitForSelector ('#welcome:not([hidden])');
+  await (await page.$ ('#file')).uploadFile (path.join (work, 'served/talk.opus'), path.join (work, 'served/talk.rcnc'));
+  await page.waitForSelector ('#sound:not([hidden])');
+  await page.click ('#sound');
+  await page.waitForFunction (() => window.rangecastPage.recordedSound.audio.currentTime > 0.5);
+  assert.equal (await message (page), '');
   await page.close ();
 });
 
