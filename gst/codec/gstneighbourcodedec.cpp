@@ -41,7 +41,9 @@
 #include <vector>
 
 #include "common/bufferpools.hpp"
+#include "common/capserrors.hpp"
 #include "common/codedunits.hpp"
+#include "common/downstream.hpp"
 #include "common/elementproperties.hpp"
 #include "common/requirecaps.hpp"
 #include "common/streamlock.hpp"
@@ -49,6 +51,7 @@
 
 using rangecast::DecoderResult;
 using rangecast::Status;
+using rangecast::StatusCode;
 
 GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_dec_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_dec_debug
@@ -83,6 +86,7 @@ struct GstNeighbourCodeDecPrivate {
   std::atomic<bool> is_temporal{false}; /* later frame sets refer to the latest */
 
   /* streaming thread only */
+  CapsErrors caps_errors;
   rangecast::AccessUnitDecoder decoder;
   GstBufferPool *pool = nullptr;
   Concealment concealment;
@@ -166,7 +170,7 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
     return priv->decoder.set_rig (info.rig);
   });
   priv->reporter.set_views (info.rig);
-  if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
+  if (!priv->caps_errors.accept (GST_ELEMENT (self), status))
     return FALSE;
   GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
   reset_slices (priv);
@@ -176,6 +180,46 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   drop_pool (priv->pool);
   status = gstrange::make_pool (out, priv->pool);
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+}
+
+/* An encoder writes byte streams where downstream takes anything, such as a payloader of GDP. They
+ * are accepted so that take_caps() can say what is missing. */
+static bool
+is_byte_stream (const GstCaps *caps)
+{
+  const GstStructure *structure = gst_caps_get_structure (caps, 0);
+  return gst_structure_has_name (structure, GST_NEIGHBOUR_CODE_MEDIA_TYPE) &&
+         g_strcmp0 (gst_structure_get_string (structure, "alignment"), "byte-stream") == 0;
+}
+
+static gboolean
+gst_neighbour_code_dec_accept_caps (
+    GstBaseTransform *base, GstPadDirection direction, GstCaps *caps)
+{
+  if (direction == GST_PAD_SINK && gst_caps_get_size (caps) == 1 && is_byte_stream (caps))
+    return TRUE;
+  return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)
+      ->accept_caps (base, direction, caps);
+}
+
+/* Takes ownership of the CAPS event. */
+static gboolean
+take_caps (GstBaseTransform *base, GstEvent *event)
+{
+  CapsErrors &errors = GST_NEIGHBOUR_CODE_DEC (base)->priv->caps_errors;
+  GstCaps *caps = nullptr;
+  gst_event_parse_caps (event, &caps);
+  if (is_byte_stream (caps)) {
+    gst_event_unref (event);
+    return errors.accept (GST_ELEMENT (base),
+        {StatusCode::kUnsupported,
+            "pad sink: alignment=byte-stream; expected neighbourcodeparse before this element"});
+  }
+  if (GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)->sink_event (base, event))
+    return TRUE;
+  if (std::string text = explain_downstream (GST_BASE_TRANSFORM_SRC_PAD (base)); !text.empty ())
+    errors.accept (GST_ELEMENT (base), {StatusCode::kUnsupported, std::move (text)});
+  return FALSE;
 }
 
 /* QoS is hidden from the base class where it would drop single slices (alignment=slice), or frame
@@ -446,6 +490,8 @@ gst_neighbour_code_dec_sink_event (GstBaseTransform *base, GstEvent *event)
     self->priv->reporter.finish ();
   if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)
     self->priv->warned_damage = false;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS)
+    return take_caps (base, event);
   return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)->sink_event (base, event);
 }
 
@@ -468,6 +514,7 @@ gst_neighbour_code_dec_start (GstBaseTransform *base)
 {
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (base)->priv;
   priv->reporter.start (GST_ELEMENT (base), collect_stats);
+  priv->caps_errors.reset ();
   std::lock_guard guard (priv->lock);
   priv->frames = priv->coded_bytes = 0;
   priv->totals = {};
@@ -555,6 +602,7 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
   transform_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_stop);
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_transform_caps);
+  transform_class->accept_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_accept_caps);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_set_caps);
   transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_sink_event);
   transform_class->generate_output = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_generate_output);

@@ -20,6 +20,7 @@
 #include "gstrangecombine.h"
 
 #include "common/bufferpools.hpp"
+#include "common/downstream.hpp"
 #include "common/elementproperties.hpp"
 #include "framepairing.hpp"
 #include "padlinkwatch.hpp"
@@ -667,6 +668,7 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
   aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_range_combine_flush);
   aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_range_combine_sink_event);
   aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_range_combine_update_src_caps);
+  aggregator_class->negotiate = GST_DEBUG_FUNCPTR (negotiate_downstream);
   aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
   aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_range_combine_aggregate);
   aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_range_combine_get_next_time);

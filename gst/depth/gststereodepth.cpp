@@ -29,6 +29,7 @@
 #include "gststereodepth.h"
 
 #include "common/bufferpools.hpp"
+#include "common/downstream.hpp"
 #include "common/elementproperties.hpp"
 #include "common/videoframereader.hpp"
 #include "framepairing.hpp"
@@ -812,6 +813,7 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   aggregator_class->sink_query = GST_DEBUG_FUNCPTR (gst_stereo_depth_sink_query);
   aggregator_class->src_event = GST_DEBUG_FUNCPTR (gst_stereo_depth_src_event);
   aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_stereo_depth_update_src_caps);
+  aggregator_class->negotiate = GST_DEBUG_FUNCPTR (negotiate_downstream);
   aggregator_class->create_new_pad = GST_DEBUG_FUNCPTR (gst_stereo_depth_create_new_pad);
   aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
   aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_stereo_depth_aggregate);

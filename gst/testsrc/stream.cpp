@@ -3,6 +3,8 @@
  * and state changes. */
 #include "stream.hpp"
 
+#include "common/downstream.hpp"
+
 #include <algorithm>
 #include <gstrange/gstrange.h>
 #include <gstrange/gstrangestatus.hpp>
@@ -200,6 +202,9 @@ AvatarStream::negotiate (const AvatarPads &pads)
       if (!running_)
         return GST_FLOW_FLUSHING;
     }
+    for (const auto &pad : pads)
+      if (!require_downstream (element_, pad->pad ()))
+        return GST_FLOW_ERROR;
     GST_ELEMENT_ERROR (element_, CORE, NEGOTIATION,
         ("the peers of the pads have no size and frame rate in common (16 to 4096 pixels, 1/1000 "
          "to 1000 frames per second)"),

@@ -46,6 +46,26 @@ test_left_and_right_of_different_size_are_named () {
   expect_error "640x480" pair $vga video/x-raw,format=RGB,width=320,height=240 focal-length=500 baseline=0.1
 }
 
+test_media_types_that_do_not_fit_are_named () {
+  local scene=(avatartestsrc name=a num-buffers=2) drawn="; striprender draws it"
+  expect_error "a makes video/x-range, and autovideosink0 takes video/x-raw$drawn" run "${scene[@]}" ! autovideosink
+  expect_error "neighbourcodeenc0 makes video/x-neighbour-code, and autovideosink0 takes video/x-raw; neighbourcodedec ! striprender draw it" \
+    run "${scene[@]}" ! neighbourcodeenc ! autovideosink
+  expect_error "depth makes video/x-range, and autovideosink0 takes video/x-raw$drawn" \
+    run "${scene[@]}" a.left ! depth.left a.right ! depth.right stereodepth name=depth focal-length=300 baseline=0.1 ! autovideosink
+  expect_error "c makes video/x-range, and autovideosink0 takes video/x-raw$drawn" \
+    run videotestsrc num-buffers=2 ! c.colour videotestsrc num-buffers=2 ! video/x-raw,format=GRAY16_LE ! c.depth rangecombine name=c ! autovideosink
+  run "${scene[@]}" ! neighbourcodeenc ! filesink location=scene.rcnc
+  expect_error "neighbourcodedec0 makes video/x-range, and autovideosink0 takes video/x-raw$drawn" \
+    run filesrc location=scene.rcnc ! neighbourcodeparse ! neighbourcodedec ! autovideosink
+  expect_error "neighbourcodedec0: pad sink: alignment=byte-stream; expected neighbourcodeparse before this element" \
+    run filesrc location=scene.rcnc ! typefind ! neighbourcodedec ! fakesink
+  ! run multifilesrc location=scene.rcnc num-buffers=9 caps=video/x-neighbour-code ! neighbourcodedec ! fakesink 2>said.txt || fail "no error"
+  [ "$(grep -c 'no field "rig"' said.txt)" = 1 ] || fail "$(cat said.txt)"
+  expect_error "the peers of the pads have no size and frame rate in common" \
+    run "${scene[@]}" a.left ! video/x-raw,width=320 ! fakesink a.right ! video/x-raw,width=640 ! fakesink
+}
+
 test_model_that_is_not_one_is_named () {
   echo "no model" >bad.glb
   expect_error "bad.glb" run avatartestsrc location=bad.glb num-buffers=1 ! fakesink
