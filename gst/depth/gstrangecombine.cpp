@@ -67,6 +67,7 @@ constexpr double kDefaultFocalLength = 0.82;
 constexpr double kDefaultFar = 6;
 /* Frames whose depth is looked at: cameras may begin with empty ones. */
 constexpr int kCheckedFrames = 5;
+constexpr double kUsualShare = 0.01; /* of the pixels with depth lies between near and far */
 
 struct CombineSettings {
   ViewSettings view;
@@ -371,8 +372,8 @@ combine_cameras (GstRangeCombinePrivate *priv, GstBuffer *colour,
   return status;
 }
 
-/* Warns once if the first frames have depth, but none between near and far: most likely
- * depth-scale is wrong. */
+/* Warns once if the first frames have depth, but hardly any between near and far: most likely
+ * depth-scale is wrong, or the image has 8 bits. */
 static void
 warn_of_range (GstRangeCombine *self)
 {
@@ -382,7 +383,8 @@ warn_of_range (GstRangeCombine *self)
   const rangecast::DepthRange range = *std::exchange (priv->out_of_range, std::nullopt);
   priv->frames_to_check = 0;
   GST_ELEMENT_WARNING (self, STREAM, FORMAT,
-      ("pad depth: no pixel lies between near (%g m) and far (%g m); values are %d to %d, with "
+      ("pad depth: hardly any pixel lies between near (%g m) and far (%g m); values are %d to %d, "
+       "with "
        "depth-scale=%g %g to %g m; expected another %snear or far",
           priv->view.near_m, priv->view.far_m, range.min, range.max, priv->depth_scale,
           range.min * priv->depth_scale, range.max * priv->depth_scale,
@@ -398,14 +400,14 @@ check_range (
   GstRangeCombinePrivate *priv = self->priv;
   if (priv->frames_to_check == 0)
     return;
-  if (rangecast::count_points (image) > 0) {
+  const rangecast::DepthRange range = rangecast::find_depth_range (depth);
+  if (range.count == 0)
+    return;
+  if (rangecast::count_points (image) >= kUsualShare * range.count) {
     priv->frames_to_check = 0;
     priv->out_of_range.reset ();
     return;
   }
-  const rangecast::DepthRange range = rangecast::find_depth_range (depth);
-  if (range.max == 0)
-    return;
   priv->out_of_range = range;
   if (--priv->frames_to_check == 0)
     warn_of_range (self);

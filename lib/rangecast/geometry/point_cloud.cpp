@@ -50,11 +50,11 @@ rescale_depth (ImageView<const std::uint16_t> in, double factor, std::uint16_t n
 DepthRange
 find_depth_range (ImageView<const std::uint16_t> depth)
 {
-  DepthRange range = {65536, 0};
+  DepthRange range = {65536, 0, 0};
   for (int y = 0; y < depth.height; y++)
     for (const std::uint16_t *z = depth.row (y); z < depth.row (y) + depth.width; z++)
       if (*z != 0)
-        range = {std::min<int> (range.min, *z), std::max<int> (range.max, *z)};
+        range = {std::min<int> (range.min, *z), std::max<int> (range.max, *z), range.count + 1};
   return range.max == 0 ? DepthRange{} : range;
 }
 

@@ -26,9 +26,10 @@ std::size_t count_points (const ConstRangeImage &image);
 Status rescale_depth (ImageView<const std::uint16_t> in, double factor, std::uint16_t near,
     std::uint16_t far, ImageView<std::uint16_t> out);
 
-/** Least and greatest value of a depth image's pixels other than 0; both 0 if there are none. */
+/** Least and greatest value of a depth image's pixels other than 0, and how many those are; all 0
+ *  if there are none. */
 struct DepthRange {
-  int min = 0, max = 0;
+  int min = 0, max = 0, count = 0;
 };
 [[nodiscard]] DepthRange find_depth_range (ImageView<const std::uint16_t> depth);
 

@@ -127,6 +127,27 @@ GST_START_TEST (test_wrong_depth_scale_is_one_warning_that_names_it)
 }
 GST_END_TEST;
 
+/* As where pictures for people, of 8 bits, are taken for depth. */
+GST_START_TEST (test_a_few_pixels_in_range_do_not_hide_a_wrong_depth_scale)
+{
+  Combine c ("video/x-raw,format=RGB,width=40,height=30,framerate=10/1",
+      "video/x-raw,format=GRAY16_LE,width=40,height=30,framerate=10/1");
+  for (guint64 i = 0; i < 5; i++) {
+    GstBuffer *colour = gst_buffer_new_allocate (nullptr, 120 * 30, nullptr),
+              *depth = gst_buffer_new_allocate (nullptr, 80 * 30, nullptr);
+    gst_buffer_memset (colour, 0, 7, 120 * 30);
+    gst_buffer_memset (depth, 0, 250, 80 * 30); /* 64 m */
+    const guint8 near[2] = {0, 4};              /* 1 m */
+    gst_buffer_fill (depth, 0, near, 2);
+    GST_BUFFER_PTS (colour) = GST_BUFFER_PTS (depth) = i * 100 * GST_MSECOND;
+    gst_harness_push (c.colour, colour);
+    gst_harness_push (c.depth, depth);
+    gst_buffer_unref (gst_harness_pull (c.colour));
+  }
+  fail_unless_contains (next_message_text (c.bus, GST_MESSAGE_WARNING), "values are 1024 to 64250");
+}
+GST_END_TEST;
+
 GST_START_TEST (test_wrong_depth_scale_of_a_single_picture_is_a_warning_at_eos)
 {
   Combine c;
@@ -696,6 +717,7 @@ rangecombine_suite ()
   tcase_add_test (tc, test_big_endian_depth_is_taken);
   tcase_add_test (tc, test_depth_outside_near_and_far_is_invalid);
   tcase_add_test (tc, test_wrong_depth_scale_is_one_warning_that_names_it);
+  tcase_add_test (tc, test_a_few_pixels_in_range_do_not_hide_a_wrong_depth_scale);
   tcase_add_test (tc, test_wrong_depth_scale_of_a_single_picture_is_a_warning_at_eos);
   tcase_add_test (tc, test_empty_frames_and_later_depth_give_no_warning);
   tcase_add_test (tc, test_pairs_by_pts_and_drops_what_has_no_partner);
