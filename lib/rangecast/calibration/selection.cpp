@@ -176,24 +176,24 @@ FrameSelector::clear ()
 {
   frames_.clear ();
   places_.clear ();
-  last_ = {};
-  have_last_ = false;
+  last_.clear ();
 }
 
-/* Motion is unknown for a camera that did not see the board in the previous frame. */
+/* Compares each image with the same camera's previous one, which may belong to an earlier frame
+ * than those of other cameras. A board that was not in it counts as moving. */
 bool
-FrameSelector::is_moving (
-    const std::vector<CalibrationCamera> &cameras, const CalibrationFrame &frame) const
+FrameSelector::is_moving (const std::vector<CalibrationCamera> &cameras,
+    const CalibrationFrame &frame, std::uint64_t time_ns) const
 {
   for (const Sighting &sighting : frame.sightings) {
-    const Sighting *before = last_.find (sighting.camera);
-    if (!before)
-      return true;
+    const LastImage &before = last_[sighting.camera];
+    if (!before.valid || time_ns - before.time_ns >= kMotionNs)
+      continue;
     double moved = 0;
     int common = 0;
     for (const BoardCorner &corner : sighting.corners) {
-      const auto old = std::ranges::find (before->corners, corner.id, &BoardCorner::id);
-      if (old == before->corners.end ())
+      const auto old = std::ranges::find (before.corners, corner.id, &BoardCorner::id);
+      if (old == before.corners.end ())
         continue;
       moved += std::hypot (corner.x - old->x, corner.y - old->y);
       common++;
@@ -202,6 +202,17 @@ FrameSelector::is_moving (
       return true;
   }
   return false;
+}
+
+void
+FrameSelector::record_images (
+    const CalibrationFrame &frame, std::uint64_t time_ns, const std::vector<bool> &has_image)
+{
+  for (std::size_t i = 0; i < last_.size (); i++)
+    if (has_image.empty () || has_image[i]) {
+      const Sighting *sighting = frame.find (int (i));
+      last_[i] = {true, time_ns, sighting ? sighting->corners : std::vector<BoardCorner>{}};
+    }
 }
 
 /* The maximum over all cameras of the difference from all frames but `except`. */
@@ -222,13 +233,34 @@ FrameSelector::difference (const Places &places, std::size_t except) const
 }
 
 bool
-FrameSelector::links_are_few (const CalibrationFrame &frame) const
+FrameSelector::links_are_few (int a, int b) const
 {
-  for (const Sighting &a : frame.sightings)
-    for (const Sighting &b : frame.sightings)
-      if (a.camera < b.camera && shared_frames (frames_, a.camera, b.camera) < kFewLinks)
+  return shared_frames (frames_, a, b) < kFewLinks;
+}
+
+/* Two cameras with few common frames want more of them: places may differ by half as much, and only
+ * frames that both cameras share count as similar. */
+bool
+FrameSelector::is_new (const Places &places) const
+{
+  double wanted = kNewPlace;
+  for (const auto &[a, place_a] : places)
+    for (const auto &[b, place_b] : places) {
+      if (a >= b || !links_are_few (a, b))
+        continue;
+      wanted = kNewPlace / 2;
+      double nearest = std::numeric_limits<double>::max ();
+      for (const Places &old : places_) {
+        const auto old_a = std::ranges::find (old, a, &Places::value_type::first);
+        const auto old_b = std::ranges::find (old, b, &Places::value_type::first);
+        if (old_a != old.end () && old_b != old.end ())
+          nearest = std::min (nearest,
+              std::max (distance (place_a, old_a->second), distance (place_b, old_b->second)));
+      }
+      if (nearest >= wanted)
         return true;
-  return false;
+    }
+  return difference (places, std::numeric_limits<std::size_t>::max ()) >= wanted;
 }
 
 /* At the maximum number, the most redundant frame is replaced, unless the new one is more
@@ -257,13 +289,12 @@ FrameSelector::take (CalibrationFrame frame, Places places)
 
 FrameVerdict
 FrameSelector::offer (const std::vector<CalibrationCamera> &cameras, CalibrationFrame frame,
-    const std::vector<double> &edge_widths, std::uint64_t time_ns)
+    const std::vector<double> &edge_widths, std::uint64_t time_ns,
+    const std::vector<bool> &has_image)
 {
-  const bool soon = have_last_ && time_ns - last_time_ns_ < kMotionNs;
-  const bool moving = soon && is_moving (cameras, frame);
-  last_ = frame;
-  last_time_ns_ = time_ns;
-  have_last_ = true;
+  last_.resize (cameras.size ());
+  const bool moving = is_moving (cameras, frame, time_ns);
+  record_images (frame, time_ns, has_image);
   if (frame.sightings.empty ())
     return FrameVerdict::kNoBoard;
 
@@ -279,8 +310,7 @@ FrameSelector::offer (const std::vector<CalibrationCamera> &cameras, Calibration
     if (edge_widths[i] >
         std::max (kBlurredPx, kBlurredShare * cameras[frame.sightings[i].camera].width))
       return FrameVerdict::kBlurred;
-  const double wanted = links_are_few (frame) ? kNewPlace / 2 : kNewPlace;
-  if (!frames_.empty () && difference (places, std::numeric_limits<std::size_t>::max ()) < wanted)
+  if (!frames_.empty () && !is_new (places))
     return FrameVerdict::kSimilar;
   return take (std::move (frame), std::move (places));
 }

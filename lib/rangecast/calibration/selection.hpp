@@ -48,7 +48,7 @@ struct SelectionSettings {
 enum class FrameVerdict {
   kTaken,
   kNoBoard, ///< in no image
-  kMoving,  ///< the board moved since the previous frame, or was not in it
+  kMoving,  ///< the board moved since the camera's previous image, or was not in it
   kBlurred, ///< edges are too wide
   kSimilar, ///< no camera sees it at a new place
 };
@@ -64,30 +64,37 @@ public:
 
   /** @param cameras  all cameras; later calls may append more
    *  @param edge_widths  edge_width_px() of each sighting; empty: not evaluated
-   *  @param time_ns  of the frame; motion is not evaluated between frames more than a second apart
-   */
+   *  @param time_ns  of the frame; motion is not evaluated between images a second or more apart
+   *  @param has_image  whether there was an image, by camera; empty: of all cameras */
   FrameVerdict offer (const std::vector<CalibrationCamera> &cameras, CalibrationFrame frame,
-      const std::vector<double> &edge_widths, std::uint64_t time_ns);
+      const std::vector<double> &edge_widths, std::uint64_t time_ns,
+      const std::vector<bool> &has_image = {});
 
   [[nodiscard]] const std::vector<CalibrationFrame> &frames () const { return frames_; }
   [[nodiscard]] CameraCoverage coverage (const CalibrationCamera &camera, int index) const;
 
 private:
   using Places = std::vector<std::pair<int, BoardPlace>>; // by camera
+  struct LastImage {
+    bool valid = false; // there was one
+    std::uint64_t time_ns = 0;
+    std::vector<BoardCorner> corners; // empty: without the board
+  };
 
-  [[nodiscard]] bool is_moving (
-      const std::vector<CalibrationCamera> &cameras, const CalibrationFrame &frame) const;
+  [[nodiscard]] bool is_moving (const std::vector<CalibrationCamera> &cameras,
+      const CalibrationFrame &frame, std::uint64_t time_ns) const;
+  void record_images (
+      const CalibrationFrame &frame, std::uint64_t time_ns, const std::vector<bool> &has_image);
   [[nodiscard]] double difference (const Places &places, std::size_t except) const;
-  [[nodiscard]] bool links_are_few (const CalibrationFrame &frame) const;
+  [[nodiscard]] bool links_are_few (int a, int b) const;
+  [[nodiscard]] bool is_new (const Places &places) const;
   FrameVerdict take (CalibrationFrame frame, Places places);
 
   BoardSpec board_;
   SelectionSettings settings_;
   std::vector<CalibrationFrame> frames_;
-  std::vector<Places> places_; // of frames_
-  CalibrationFrame last_;      // the previous frame
-  std::uint64_t last_time_ns_ = 0;
-  bool have_last_ = false;
+  std::vector<Places> places_;  // of frames_
+  std::vector<LastImage> last_; // by camera
 };
 
 } // namespace rangecast

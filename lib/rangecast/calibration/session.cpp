@@ -63,7 +63,9 @@ CalibrationSession::examine (const std::vector<CalibrationCamera> &cameras,
   CalibrationFrame frame;
   frame.number = number;
   std::vector<double> edge_widths;
+  std::vector<bool> has_image;
   for (std::size_t i = 0; i < cameras.size (); i++) {
+    has_image.push_back (!pictures[i].empty ());
     if (!states_[i]->status.ok ())
       return states_[i]->status;
     if (states_[i]->corners.empty ())
@@ -71,7 +73,7 @@ CalibrationSession::examine (const std::vector<CalibrationCamera> &cameras,
     frame.sightings.push_back ({int (i), states_[i]->corners});
     edge_widths.push_back (states_[i]->edge_width);
   }
-  verdict_ = selector_.offer (cameras, std::move (frame), edge_widths, time_ns);
+  verdict_ = selector_.offer (cameras, std::move (frame), edge_widths, time_ns, has_image);
   for (const auto &state : states_)
     state->seen[int (verdict_)] += !state->corners.empty ();
   return {};

@@ -77,6 +77,35 @@ TEST_F (SelectionTest, board_that_moves_is_not_taken_until_it_stands_still)
   EXPECT_EQ (soon (0.0405), FrameVerdict::kTaken);
 }
 
+/* As when the images of one moment arrive too far apart: each camera is compared with its own. */
+TEST_F (SelectionTest, motion_is_judged_from_the_last_image_of_the_same_camera)
+{
+  const CalibrationFrame both = frame (0, 0, 0.6, 0, 0, 2), moved = frame (0.2, 0, 0.6, 0, 0, 2);
+  const auto soon = [&] (const CalibrationFrame &f, bool first, bool second) {
+    CalibrationFrame seen;
+    for (const Sighting &sighting : f.sightings)
+      if (sighting.camera == 0 ? first : second)
+        seen.sightings.push_back (sighting);
+    return selector_.offer (cameras_, seen, {}, time_ += kSecond / 10, {first, second});
+  };
+  EXPECT_EQ (soon (both, true, false), FrameVerdict::kTaken);
+  EXPECT_EQ (soon (both, false, true), FrameVerdict::kTaken);
+  EXPECT_EQ (soon (moved, true, false), FrameVerdict::kMoving);
+  EXPECT_EQ (soon (moved, false, true), FrameVerdict::kMoving);
+  EXPECT_EQ (soon (moved, true, false), FrameVerdict::kTaken);
+  EXPECT_EQ (soon ({}, false, true), FrameVerdict::kNoBoard);
+  EXPECT_EQ (soon (moved, false, true), FrameVerdict::kMoving); /* it was away */
+}
+
+TEST_F (SelectionTest, first_board_that_two_cameras_share_is_taken_where_each_saw_one_before)
+{
+  const CalibrationFrame both = frame (0, 0, 0.6, 0, 0, 2);
+  EXPECT_EQ (offer ({{both.sightings[0]}, 0}), FrameVerdict::kTaken);
+  EXPECT_EQ (offer ({{both.sightings[1]}, 1}), FrameVerdict::kTaken);
+  EXPECT_EQ (offer (both), FrameVerdict::kTaken);
+  EXPECT_EQ (offer (both), FrameVerdict::kSimilar);
+}
+
 TEST_F (SelectionTest, blurred_board_is_not_taken)
 {
   EXPECT_EQ (offer (frame (0, 0, 0.6), {7}), FrameVerdict::kBlurred);
