@@ -54,6 +54,14 @@ static guint signals[LAST_SIGNAL];
 /* Maximum frame rate of what is taken for single photographs instead of video, Hz. */
 static constexpr int kMaxPhotoRate = 2;
 
+/* Default of `latency`, ns: the time for which a late camera is waited for. Only the preview is
+ * delayed by it, and only while a camera is late. */
+static constexpr GstClockTime kLatency = 200 * GST_MSECOND;
+
+/* Beyond this lateness on arrival, images are no longer waited for, ns: so that a camera that sends
+ * nothing does not make a backlog of the others' images. */
+static constexpr GstClockTime kMaxLateness = GST_SECOND;
+
 struct GstRigCalibratePrivate {
   /* Guards the members up to stale; never held across a push, message or job. */
   std::mutex lock;
@@ -76,6 +84,8 @@ struct GstRigCalibratePrivate {
   /* streaming thread */
   bool begin = true; /* no set was examined yet */
   guint64 sets = 0;
+  /* The oldest image that waits for those of other cameras, and since when; running times. */
+  GstClockTime waiting = GST_CLOCK_TIME_NONE, waiting_since = GST_CLOCK_TIME_NONE;
   TileLayout layout; /* of the output caps */
 };
 
@@ -451,10 +461,12 @@ gst_rig_calibrate_aggregate (GstAggregator *aggregator, gboolean timeout)
   return examine_set (self, pop_images (cameras, fronts, priv->sets++), live);
 }
 
-/* A late camera is waited for until the deadline of the oldest image that waits. */
+/* A late camera is waited for until `latency` after the oldest image that waits arrived, not after
+ * it was due: decoders on a busy machine are late, and the images of one moment with them. */
 static GstClockTime
 gst_rig_calibrate_get_next_time (GstAggregator *aggregator)
 {
+  GstRigCalibratePrivate *priv = GST_RIG_CALIBRATE (aggregator)->priv;
   GstClockTime oldest = GST_CLOCK_TIME_NONE;
   const CameraInputs cameras = current_cameras (GST_RIG_CALIBRATE (aggregator));
   for (const auto &camera : cameras)
@@ -464,7 +476,13 @@ gst_rig_calibrate_get_next_time (GstAggregator *aggregator)
   const PadFronts fronts (cameras, true);
   for (const PadFronts::Front &front : fronts.list)
     oldest = std::min (oldest, front.running);
-  return oldest;
+  if (oldest != priv->waiting) {
+    priv->waiting = oldest;
+    priv->waiting_since = gst_element_get_current_running_time (GST_ELEMENT (aggregator));
+  }
+  if (!GST_CLOCK_TIME_IS_VALID (oldest) || !GST_CLOCK_TIME_IS_VALID (priv->waiting_since))
+    return oldest;
+  return std::clamp (priv->waiting_since, oldest, oldest + kMaxLateness);
 }
 
 /* ---- request pads ---- */
@@ -555,6 +573,7 @@ gst_rig_calibrate_start (GstAggregator *aggregator)
     return FALSE;
   priv->begin = true;
   priv->sets = 0;
+  priv->waiting = priv->waiting_since = GST_CLOCK_TIME_NONE;
   priv->layout = {};
   {
     std::lock_guard guard (priv->lock);
@@ -622,6 +641,7 @@ static void
 gst_rig_calibrate_init (GstRigCalibrate *self)
 {
   self->priv = new GstRigCalibratePrivate;
+  g_object_set (self, "latency", kLatency, nullptr);
 }
 
 static void

@@ -617,6 +617,80 @@ GST_START_TEST (test_live_pictures_go_unseen_while_the_last_ones_are_looked_at)
 }
 GST_END_TEST;
 
+/* As by a camera whose images take longer to decode; all of them are late, beyond `latency`. */
+GST_START_TEST (test_live_pictures_of_one_moment_stay_together_when_they_arrive_late)
+{
+  GstElement *pipeline = gst_parse_launch (
+      "rigcalibrate name=c ! fakesink videotestsrc is-live=true num-buffers=8 ! "
+      "video/x-raw,width=64,height=48,framerate=5/1 ! queue ! identity sleep-time=150000 ! "
+      "queue ! identity sleep-time=150000 ! queue ! identity sleep-time=150000 ! tee name=late "
+      "late. ! queue ! c.sink_0 late. ! queue ! identity sleep-time=80000 ! c.sink_1",
+      nullptr);
+  GstElement *element = gst_bin_get_by_name (GST_BIN (pipeline), "c");
+  GstBus *bus = gst_element_get_bus (pipeline);
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  int boards = 0;
+  guint64 last = 0;
+  while (true) {
+    GstMessage *message = gst_bus_timed_pop_filtered (
+        bus, 60 * GST_SECOND, GstMessageType (GST_MESSAGE_ELEMENT | GST_MESSAGE_ERROR));
+    fail_unless (message != nullptr);
+    const bool end = GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR; /* no board, told at EOS */
+    if (!end && gst_message_has_name (message, "rigcalibrate-board")) {
+      gst_structure_get_uint64 (gst_message_get_structure (message), "frame", &last);
+      boards++;
+    }
+    gst_message_unref (message);
+    if (end)
+      break;
+  }
+  ck_assert_int_ge (boards, 2);
+  fail_unless_equals_int (boards % 2, 0);                     /* one for each camera */
+  fail_unless_equals_uint64 (last + 1, guint64 (boards) / 2); /* nor was a moment skipped */
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (bus);
+  gst_object_unref (element);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_camera_that_sends_nothing_does_not_stop_a_live_one)
+{
+  GstElement *pipeline = gst_parse_launch (
+      "rigcalibrate name=c ! fakesink videotestsrc is-live=true num-buffers=60 ! "
+      "video/x-raw,width=64,height=48,framerate=30/1 ! c.sink_0 "
+      "videotestsrc is-live=true num-buffers=1 ! video/x-raw,width=64,height=48,framerate=30/1 ! "
+      "identity name=silent ! c.sink_1",
+      nullptr);
+  GstElement *silent = gst_bin_get_by_name (GST_BIN (pipeline), "silent");
+  GstPad *pad = gst_element_get_static_pad (silent, "sink");
+  gst_pad_add_probe (/* after the first image it neither sends nor ends */
+      pad, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      [] (GstPad *, GstPadProbeInfo *info, gpointer) {
+        return GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_EOS
+                   ? GST_PAD_PROBE_DROP
+                   : GST_PAD_PROBE_OK;
+      },
+      nullptr, nullptr);
+  GstElement *element = gst_bin_get_by_name (GST_BIN (pipeline), "c");
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  guint64 examined = 0;
+  for (int i = 0; i < 1000 && examined < 5; i++) {
+    g_usleep (10000);
+    GstStructure *stats;
+    g_object_get (element, "stats", &stats, nullptr);
+    gst_structure_get_uint64 (stats, "examined", &examined);
+    gst_structure_free (stats);
+  }
+  ck_assert_uint_ge (examined, 5);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (pad);
+  gst_object_unref (silent);
+  gst_object_unref (element);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_stops_in_the_middle_and_starts_again)
 {
   Calibrate c (1, "min-frames=4");
@@ -696,6 +770,8 @@ rigcalibrate_suite ()
   tcase_add_test (tc, test_pictures_smaller_than_their_caps_are_one_error);
   tcase_add_test (tc, test_what_cannot_end_well_does_not_start);
   tcase_add_test (tc, test_live_pictures_go_unseen_while_the_last_ones_are_looked_at);
+  tcase_add_test (tc, test_live_pictures_of_one_moment_stay_together_when_they_arrive_late);
+  tcase_add_test (tc, test_camera_that_sends_nothing_does_not_stop_a_live_one);
   tcase_add_test (tc, test_stops_in_the_middle_and_starts_again);
   tcase_add_test (tc, test_ready_interrupts_a_calibration_without_a_word);
   tcase_add_test (tc, test_flush_does_not_wait_for_a_calibration);
