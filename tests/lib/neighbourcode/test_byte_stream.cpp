@@ -226,3 +226,126 @@ TEST (StreamFile, AnyDamageEnds)
     (void)opened.locate (UINT64_MAX - 1);
   }
 }
+
+/* Files one after another. */
+static File
+join (const std::vector<File> &files)
+{
+  File joined (0);
+  for (const File &file : files) {
+    for (const std::uint64_t offset : file.offsets)
+      joined.offsets.push_back (joined.bytes.size () + offset);
+    append (joined.bytes, file.bytes);
+  }
+  return joined;
+}
+
+/* The offsets of the takes, as numbers of access units; their times follow each other. */
+static std::vector<std::size_t>
+takes_of (File &file)
+{
+  std::vector<std::size_t> begins;
+  const TakeList list = file.open ().takes (0, kFrame_ns);
+  for (const Take &take : list.takes ()) {
+    const auto unit = std::ranges::find (file.offsets, take.offset);
+    begins.push_back (std::size_t (unit - file.offsets.begin ()));
+    EXPECT_EQ (take.time_ns, begins.back () * kFrame_ns);
+  }
+  return begins;
+}
+
+/* The times of all access units, one after another. */
+static std::vector<std::uint64_t>
+times_of (File &file)
+{
+  TakeList list;
+  std::vector<std::uint64_t> times;
+  for (const std::uint64_t offset : file.offsets) {
+    AccessUnitPlace unit{offset, {}, file.bytes[offset + kStreamPrefixSize] % 16 == 2};
+    EXPECT_TRUE (begins_access_unit (std::span (file.bytes).subspan (offset), unit.header));
+    times.push_back (list.add (unit, kFrame_ns).time_ns);
+  }
+  return times;
+}
+
+TEST (Takes, EveryTakeOfAFileIsFound)
+{
+  File file = join ({File (30), File (1), File (1, 0), File (40, 0), File (50, 8'000'000'000)});
+  EXPECT_EQ (takes_of (file), (std::vector<std::size_t>{0, 30, 31, 32}));
+  const auto times = times_of (file);
+  for (std::size_t i = 0; i < 72; i++)
+    EXPECT_EQ (times[i], i * kFrame_ns);
+  EXPECT_EQ (times[72], 32 * kFrame_ns + 8'000'000'000); /* later: the same take */
+}
+
+TEST (Takes, LongTakesOfALongFileAreFoundBySampling)
+{
+  for (const int first : {1300, 5000, 15000, 18700}) {
+    File file = join ({File (first), File (20000 - first), File (3000)});
+    ASSERT_GT (file.bytes.size (), std::size_t{16} << 20);
+    EXPECT_EQ (takes_of (file), (std::vector<std::size_t>{0, std::size_t (first), 20000}));
+    EXPECT_LT (file.bytes_read, file.bytes.size () / 3);
+  }
+}
+
+TEST (Takes, DamagedTimeChangesNoOther)
+{
+  const File first (8), second (6, 0);
+  File sound = join ({first, second});
+  const auto times = times_of (sound);
+  EXPECT_EQ (times.back (), 13 * kFrame_ns);
+  for (std::size_t unit = 1; unit < 13; unit++) /* nothing follows the last one that could tell */
+    for (int bit = 0; bit < 64; bit++) {
+      File damaged = sound;
+      damaged.bytes[damaged.offsets[unit] + 12 + std::size_t (bit / 8)] ^=
+          std::uint8_t (1 << bit % 8);
+      const auto now = times_of (damaged);
+      const bool meet = unit >= 7 && unit <= 9; /* where the takes meet, all after it may move */
+      for (std::size_t i = meet ? unit + 3 : 0; i < 14; i++)
+        if (i != unit) {
+          EXPECT_EQ (now[i] - (meet ? now[i - 1] : 0), meet ? kFrame_ns : times[i])
+              << "bit " << bit << " of " << unit << " changes " << i;
+        }
+      if (!meet) {
+        EXPECT_EQ (damaged.open ().takes (0, kFrame_ns).takes ().size (), 2u) << bit << " " << unit;
+      }
+    }
+}
+
+TEST (Takes, ReadingOnElsewhereBeginsNone)
+{
+  File file = join ({File (40), File (40)});
+  TakeList list = file.open ().takes (0, kFrame_ns);
+  for (const std::size_t unit : {70, 10, 45, 39, 40, 0}) {
+    AccessUnitPlace place{file.offsets[unit], {}, false};
+    ASSERT_TRUE (begins_access_unit (std::span (file.bytes).subspan (place.offset), place.header));
+    list.interrupt ();
+    const auto time = list.add (place, kFrame_ns);
+    EXPECT_EQ (time.time_ns, unit * kFrame_ns);
+    EXPECT_FALSE (time.begins_take);
+  }
+  EXPECT_EQ (list.takes ().size (), 2u);
+}
+
+TEST (Takes, TakeThatSamplingMissedMovesLaterOnes)
+{
+  File file = join ({File (400), File (10), File (400)});
+  TakeList list;
+  for (const std::size_t unit : {0, 410}) { /* as if only these two were known */
+    AccessUnitPlace place{file.offsets[unit], {}, true};
+    begins_access_unit (std::span (file.bytes).subspan (place.offset), place.header);
+    list.add (place, kFrame_ns);
+  }
+  ASSERT_EQ (list.takes ().size (), 2u);
+  list.interrupt ();
+  for (std::size_t unit = 0; unit < 810; unit++) {
+    AccessUnitPlace place{file.offsets[unit], {}, false};
+    begins_access_unit (std::span (file.bytes).subspan (place.offset), place.header);
+    const auto time = list.add (place, kFrame_ns);
+    EXPECT_EQ (time.begins_take, unit == 400 || unit == 410);
+    if (unit < 410) {
+      EXPECT_EQ (time.time_ns, unit * kFrame_ns);
+    }
+  }
+  EXPECT_EQ (list.takes ().size (), 3u);
+}

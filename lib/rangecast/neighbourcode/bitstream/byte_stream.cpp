@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 namespace rangecast {
 namespace {
@@ -15,6 +16,11 @@ constexpr std::size_t kBlock = 65536;
 constexpr std::uint64_t kWalkBytes = 4 * kBlock;
 /* Rigs come once a second: linear search begins so much earlier that it finds one. */
 constexpr std::uint64_t kRigWindow_ns = 2'000'000'000;
+
+/* Files up to this size are searched for takes access unit by access unit; longer ones are sampled
+ * at so many places. */
+constexpr std::uint64_t kWalkFile = 8 << 20;
+constexpr std::uint64_t kTakeSamples = 64;
 
 enum class End { kSound, kDamaged, kOpen };
 
@@ -121,6 +127,80 @@ next_part (Bytes bytes, bool at_end)
   if (at_end && part.length == bytes.size () && bytes.size () < declared)
     part.expected = declared;
   return part;
+}
+
+std::size_t
+TakeList::index_at (std::uint64_t offset) const
+{
+  const auto after = std::ranges::upper_bound (takes_, offset, {}, &Take::offset);
+  return std::size_t (std::max<std::ptrdiff_t> (after - takes_.begin (), 1) - 1);
+}
+
+std::uint64_t
+TakeList::time_of (std::uint64_t offset, std::uint64_t pts_ns) const
+{
+  const Take &take = takes_[index_at (offset)];
+  return take.time_ns + (pts_ns - std::min (pts_ns, take.pts_ns));
+}
+
+/* Also compared with the one before the last, because the time of the last may be damaged. */
+bool
+TakeList::goes_back (const AccessUnitPlace &unit) const
+{
+  const std::uint64_t pts = unit.header.pts_ns;
+  return (pts < last_ && pts < before_) || (unit.has_rig && pts == last_ && pts <= before_);
+}
+
+void
+TakeList::shift_from (std::size_t index, std::uint64_t by_ns)
+{
+  for (; index < takes_.size (); index++)
+    takes_[index].time_ns += by_ns; /* modulo 2^64: may be negative */
+}
+
+void
+TakeList::insert (const AccessUnitPlace &unit, std::uint64_t frame_ns)
+{
+  const Take &old = takes_[current_];
+  const Take take = {unit.offset, unit.header.pts_ns, last_time_ns_ + frame_ns};
+  shift_ns_ = take.time_ns - (old.time_ns + (take.pts_ns - old.pts_ns));
+  shift_from (++current_, shift_ns_);
+  takes_.insert (takes_.begin () + std::ptrdiff_t (current_), take);
+}
+
+void
+TakeList::remove_damaged ()
+{
+  takes_.erase (takes_.begin () + std::ptrdiff_t (current_));
+  shift_from (current_--, 0 - shift_ns_);
+  last_ = before_;
+}
+
+TakeList::Time
+TakeList::add (const AccessUnitPlace &unit, std::uint64_t frame_ns, std::uint64_t start_ns)
+{
+  const std::uint64_t pts = unit.header.pts_ns;
+  if (takes_.empty ())
+    takes_.push_back ({unit.offset, pts, start_ns});
+  if (std::exchange (is_new_, false) && current_ != kNone && pts > before_)
+    remove_damaged ();
+  bool begins_take = false;
+  const std::size_t known = index_at (unit.offset);
+  if (known != current_) {
+    const bool is_first = takes_[known].offset == unit.offset;
+    begins_take = is_first && current_ != kNone;
+    current_ = known;
+    before_ = is_first ? UINT64_MAX : 0; /* all times are earlier, or none */
+  } else {
+    begins_take = goes_back (unit);
+    is_new_ = begins_take && pts < last_;
+    if (begins_take)
+      insert (unit, frame_ns);
+    before_ = last_;
+  }
+  last_ = pts;
+  last_time_ns_ = time_of (unit.offset, pts);
+  return {last_time_ns_, begins_take};
 }
 
 std::optional<AccessUnitPlace>
@@ -233,6 +313,76 @@ StreamFile::locate (std::uint64_t pts_ns)
     if (target.before || from == 0 || window_ns > all / 4)
       return target;
   }
+}
+
+/* Of two access units, of which the time of `to` is earlier: an access unit from `from` on that is
+ * not earlier than it, shortly before the first one that is. */
+AccessUnitPlace
+StreamFile::last_not_before (const AccessUnitPlace &from, const AccessUnitPlace &to)
+{
+  AccessUnitPlace low = from;
+  std::uint64_t high = to.offset;
+  while (high - low.offset > kWalkBytes) {
+    const std::uint64_t middle = low.offset + (high - low.offset) / 2;
+    const auto place = next (middle, high);
+    if (place && place->header.pts_ns != kNoTime && place->header.pts_ns >= from.header.pts_ns)
+      low = *place;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+/* Adds access units from `place` to the first one at `to` or later, and the one after that, which
+ * shows whether its time is damaged. */
+void
+StreamFile::walk_takes (
+    AccessUnitPlace place, std::uint64_t to, std::uint64_t frame_ns, TakeList &list)
+{
+  for (int beyond = 0; beyond < 2;) {
+    if (place.header.pts_ns != kNoTime)
+      list.add (place, frame_ns);
+    beyond += place.offset >= to;
+    const auto following_place = following (place);
+    if (!following_place)
+      return;
+    place = *following_place;
+  }
+}
+
+/* Adds `from` and, if the time goes back up to `to`, where it does. */
+void
+StreamFile::search_takes (
+    const AccessUnitPlace &from, const AccessUnitPlace &to, std::uint64_t frame_ns, TakeList &list)
+{
+  list.add (from, frame_ns);
+  if (to.offset <= from.offset || to.header.pts_ns > from.header.pts_ns)
+    return;
+  const AccessUnitPlace low = last_not_before (from, to);
+  if (low.offset > from.offset)
+    list.add (low, frame_ns);
+  if (const auto first = following (low))
+    walk_takes (*first, std::min (low.offset + kWalkBytes, to.offset), frame_ns, list);
+  list.interrupt ();
+}
+
+TakeList
+StreamFile::takes (std::uint64_t begin, std::uint64_t frame_ns)
+{
+  TakeList list;
+  auto from = next (begin, size_);
+  if (from && size_ <= kWalkFile) {
+    walk_takes (*from, size_, frame_ns, list);
+    return list;
+  }
+  while (from) {
+    const auto to = next (from->offset + size_ / kTakeSamples, size_);
+    const auto end = to ? to : last ();
+    if (end && from->header.pts_ns != kNoTime)
+      search_takes (*from, *end, frame_ns, list);
+    from = to;
+  }
+  return list;
 }
 
 } // namespace rangecast

@@ -46,6 +46,53 @@ struct AccessUnitPlace {
   bool has_rig = false; ///< rig views precede its slices
 };
 
+/** One of the recordings that a byte stream holds, one after another. */
+struct Take {
+  std::uint64_t offset = 0;  ///< bytes, of its first access unit
+  std::uint64_t pts_ns = 0;  ///< of that one, in the file
+  std::uint64_t time_ns = 0; ///< of that one, on the time line of the whole stream
+};
+
+/** The time line of a byte stream, on which each take follows the one before it. A take begins
+ * where presentation times go back, or where one is repeated with a rig. One damaged time begins no
+ *  take: the access unit after it continues the old one. */
+class TakeList {
+public:
+  struct Time {
+    std::uint64_t time_ns;
+    bool begins_take; ///< and is not the stream's first one
+  };
+  /** Adds the next access unit, which has a time. The first one begins the time line.
+   *  @param start_ns  where the time line begins
+   *  @param frame_ns  from the last access unit of a take to the next take */
+  Time add (const AccessUnitPlace &unit, std::uint64_t frame_ns, std::uint64_t start_ns = 0);
+  /** The next access unit does not follow the one before, as after a seek. */
+  void interrupt () { current_ = kNone; }
+
+  [[nodiscard]] bool empty () const { return takes_.empty (); }
+  [[nodiscard]] const std::vector<Take> &takes () const { return takes_; }
+  /** Index of the take of the access unit at an offset; the list is not empty. */
+  [[nodiscard]] std::size_t index_at (std::uint64_t offset) const;
+  /** Time of an access unit; not before its take begins. The list is not empty. */
+  [[nodiscard]] std::uint64_t time_of (std::uint64_t offset, std::uint64_t pts_ns) const;
+
+private:
+  static constexpr std::size_t kNone = SIZE_MAX;
+
+  [[nodiscard]] bool goes_back (const AccessUnitPlace &unit) const;
+  void insert (const AccessUnitPlace &unit, std::uint64_t frame_ns);
+  void remove_damaged ();
+  void shift_from (std::size_t index, std::uint64_t by_ns);
+
+  std::vector<Take> takes_;        /* by offset */
+  std::size_t current_ = kNone;    /* take of the last access unit */
+  std::uint64_t last_ = 0;         /* presentation times of the last access unit */
+  std::uint64_t before_ = 0;       /* and of the one before it */
+  std::uint64_t last_time_ns_ = 0; /* of the last access unit */
+  bool is_new_ = false;            /* the last access unit has gone back, maybe by damage */
+  std::uint64_t shift_ns_ = 0;     /* of the later takes, by that one */
+};
+
 /** Finds access units by time in a file without reading all of it. */
 class StreamFile {
 public:
@@ -57,6 +104,11 @@ public:
 
   /** The last access unit. */
   std::optional<AccessUnitPlace> last ();
+
+  /** The takes from an offset on. All of a file of up to 8 MiB. In a longer one, those that take at
+   * least a 32nd of it are found, by bisection; of shorter ones, only some. Empty if there are no
+   * times. */
+  TakeList takes (std::uint64_t begin, std::uint64_t frame_ns);
 
   struct Target {
     std::optional<AccessUnitPlace> before; ///< the last key one not later than the time
@@ -72,6 +124,10 @@ private:
   std::optional<AccessUnitPlace> following (const AccessUnitPlace &place);
   std::uint64_t bisect (std::uint64_t pts_ns);
   Target walk (std::uint64_t from, std::uint64_t pts_ns);
+  AccessUnitPlace last_not_before (const AccessUnitPlace &from, const AccessUnitPlace &to);
+  void search_takes (const AccessUnitPlace &from, const AccessUnitPlace &to, std::uint64_t frame_ns,
+      TakeList &list);
+  void walk_takes (AccessUnitPlace place, std::uint64_t to, std::uint64_t frame_ns, TakeList &list);
 
   Read read_;
   std::uint64_t size_;
