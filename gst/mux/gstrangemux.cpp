@@ -26,7 +26,7 @@
  *  1. It waits at its pad: WaitingBuffers.
  *  2. Its stream is chosen for frame sets, or left out: update_streams(), negotiate().
  *  3. Its capture time is compared with those of the other streams: compare_clocks() if live,
- *     compare_recordings() if not.
+ *     compare_recordings() if not. Of recordings that have begun again, it waits for the others.
  *  4. It is dropped if no frame set can contain it, because it is late, out of sync or of a stream
  *     that is left out: drop_unusable().
  *  5. It waits for buffers of the other streams, until the deadline; then it is joined with those
@@ -56,6 +56,7 @@
 #include "recordings.hpp"
 #include "rigcheck.hpp"
 #include "streams.hpp"
+#include "waitingbuffers.hpp"
 
 using rangecast::Status;
 using rangecast::StatusCode;
@@ -81,20 +82,6 @@ struct Settings {
 /* Frame sets since start: pushed, and of these with a buffer of every pad. */
 struct Counters {
   guint64 frames = 0, complete = 0;
-};
-
-/* 1. The buffers at the pads. Keeps its memory from one frame set to the next. */
-class WaitingBuffers {
-public:
-  WaitingBuffers () = default;
-  ~WaitingBuffers () { release (); }
-  WaitingBuffers (const WaitingBuffers &) = delete;
-
-  void collect (const MuxStreams &streams, bool live);
-  void release ();
-
-  std::vector<WaitingBuffer> list, gaps;
-  int missing = 0, ended = 0; /* pads without a buffer */
 };
 
 } // namespace
@@ -162,45 +149,20 @@ private:
   MuxStreams &streams_;
 };
 
-void
-WaitingBuffers::collect (const MuxStreams &streams, bool live)
-{
-  release ();
-  for (const auto &stream : streams) {
-    GstAggregatorPad *pad = stream->pad;
-    GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad);
-    if (!buffer) {
-      (gst_aggregator_pad_is_eos (pad) ? ended : missing)++;
-      continue;
-    }
-    /* Capture times from the network may be any number; sums of this one and a few seconds do not
-     * overflow. */
-    const GstClockTime capture =
-        std::min<GstClockTime> (gstrange::capture_time_of (pad, buffer, live), G_MAXINT64);
-    const GstClockTime running = gstrange::running_time_of (pad, buffer);
-    const bool gap = gstrange::is_gap (buffer);
-    (gap ? gaps : list).push_back ({stream.get (), buffer, capture, running});
-    if (!gap && GST_CLOCK_TIME_IS_VALID (running)) {
-      stream->shift = GST_CLOCK_DIFF (running, capture);
-      stream->shift_known = true;
-    }
-  }
-}
-
-void
-WaitingBuffers::release ()
-{
-  for (auto *buffers : {&list, &gaps}) {
-    for (const WaitingBuffer &w : *buffers)
-      gst_buffer_unref (w.buffer);
-    buffers->clear ();
-  }
-  missing = ended = 0;
-}
-
 } // namespace
 
 /* ---- 2. which streams make up frame sets; caps with the union of their rigs ---- */
+
+static void
+report (GstRangeMux *self, MuxStream &stream, StreamState state)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  GST_INFO_OBJECT (self, "%s is %s", stream.title ().c_str (), name_of (state));
+  GstClockTimeDiff offset = stream.ahead;
+  if (priv->live)
+    offset = stream.offset_known ? stream.offset - priv->consensus.reference () : 0;
+  report_state (GST_ELEMENT (self), stream, state, offset, priv->live);
+}
 
 /* Sets a stream's state, and reports it when it changes: kLate and kOutOfSync once they have lasted
  * kMinReportTime.
@@ -220,11 +182,18 @@ set_state (GstRangeMux *self, MuxStream &stream, StreamState state, GstClockTime
                      running >= stream.since + kMinReportTime;
   if (!lasts && (state == StreamState::kLate || state == StreamState::kOutOfSync))
     return;
-  GST_INFO_OBJECT (self, "%s is %s", stream.title ().c_str (), name_of (state));
-  GstClockTimeDiff offset = stream.ahead;
-  if (priv->live)
-    offset = stream.offset_known ? stream.offset - priv->consensus.reference () : 0;
-  report_state (GST_ELEMENT (self), stream, state, offset);
+  report (self, stream, state);
+}
+
+/* Reports streams that have ended and of which all buffers were dropped, in less than
+ * kMinReportTime. */
+static void
+report_all_dropped (GstRangeMux *self, const MuxStreams &streams)
+{
+  for (const auto &stream : streams)
+    if (stream->received > 0 && stream->late + stream->out_of_sync == stream->received &&
+        stream->reported == StreamState::kIn && gst_aggregator_pad_is_eos (stream->pad))
+      report (self, *stream, stream->state);
 }
 
 /* Finds which streams are silent: those without a buffer whose last one is much older than the
@@ -237,7 +206,7 @@ update_streams (GstRangeMux *self, const MuxStreams &streams)
   GstClockTime now = GST_CLOCK_TIME_NONE; /* the greatest number there is */
   for (const auto &stream : streams)
     stream->waits = false;
-  for (const auto *buffers : {&priv->waiting.list, &priv->waiting.gaps})
+  for (const auto *buffers : {&priv->waiting.list, &priv->waiting.gaps, &priv->waiting.next_round})
     for (const WaitingBuffer &w : *buffers) {
       w.stream->waits = true;
       if (!GST_CLOCK_TIME_IS_VALID (w.running))
@@ -321,14 +290,13 @@ static void
 compare_recordings (GstRangeMux *self)
 {
   GstRangeMuxPrivate *priv = self->priv;
-  if (priv->recordings.compare (priv->waiting.list, priv->last.capture)) {
+  if (priv->recordings.compare (priv->waiting, priv->last.capture)) {
     GST_DEBUG_OBJECT (self, "the recordings have begun again");
     priv->last.capture = GST_CLOCK_TIME_NONE;
   }
-  if (const WaitingBuffer *ahead = Recordings::find_different_time (priv->waiting.list);
-      ahead && !ahead->stream->different_time_reported) {
-    ahead->stream->different_time_reported = true;
-    set_state (self, *ahead->stream, StreamState::kDifferentTime, ahead->running);
+  if (const WaitingBuffer *w = Recordings::find_different_time (priv->waiting)) {
+    w->stream->different_time_reported = true;
+    set_state (self, *w->stream, StreamState::kDifferentTime, w->running);
   }
 }
 
@@ -397,6 +365,8 @@ classify_buffer (const GstRangeMuxPrivate *priv, const WaitingBuffer &w, GstCloc
     return StreamState::kOutOfSync;
   const bool late =
       GST_CLOCK_TIME_IS_VALID (priv->last.capture) && w.capture <= priv->last.capture + tolerance;
+  if (late && w.stream->round.went_back && priv->waiting.missing > 0)
+    return StreamState::kIn; /* recordings begin again if the others' next buffers went back, too */
   return late ? StreamState::kLate : StreamState::kIn;
 }
 
@@ -416,6 +386,8 @@ drop_unusable (GstRangeMux *self, GstClockTime tolerance)
         ", last frame set %" GST_TIME_FORMAT,
         name_of (state), GST_TIME_ARGS (w.capture), GST_TIME_ARGS (priv->last.capture));
     any = true;
+    if (state == StreamState::kLate && !priv->live)
+      stream.ahead = GST_CLOCK_DIFF (priv->last.capture, w.capture);
     gst_aggregator_pad_drop_buffer (stream.pad);
     {
       std::lock_guard guard (priv->lock);
@@ -480,6 +452,7 @@ join_matching (GstRangeMux *self, GstClockTime first, GstClockTime tolerance)
                                         ": its buffers have view-ids of another pad; dropped"});
       stream.clash_reported = true;
     }
+    stream.round.add (w);
     stream.matched_others = stream.matched_others || match.streams > 1;
     set_state (self, stream, StreamState::kIn, w.running);
     std::lock_guard guard (priv->lock);
@@ -492,11 +465,10 @@ join_matching (GstRangeMux *self, GstClockTime first, GstClockTime tolerance)
 
 /* Running times of live streams can be compared; those of recordings follow the capture times. */
 static GstClockTime
-output_running_time (const GstRangeMuxPrivate *priv, const Match &match, GstClockTime tolerance)
+output_running_time (const GstRangeMuxPrivate *priv, const Match &match)
 {
   if (!priv->live)
-    return running_time_after (priv->last, match.times, match.speed,
-        GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration : 2 * tolerance);
+    return running_time_after (priv->last, match.times, match.speed);
   if (GST_CLOCK_TIME_IS_VALID (match.times.running) && GST_CLOCK_TIME_IS_VALID (priv->last.running))
     return std::max (match.times.running, priv->last.running); /* never backwards */
   return match.times.running;
@@ -516,7 +488,9 @@ push_frame_set (GstRangeMux *self, std::size_t streams, GstClockTime tolerance)
   if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
       flow != GST_FLOW_OK)
     return flow;
-  priv->last = {first, output_running_time (priv, match, tolerance)};
+  const GstClockTime period =
+      GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration : 2 * tolerance;
+  priv->last = {first, output_running_time (priv, match), period};
   gstrange::stamp (
       GST_AGGREGATOR (self), frame_set, priv->last.running, priv->frame_duration, first);
   GST_LOG_OBJECT (
@@ -537,7 +511,9 @@ make_frame_set (GstRangeMux *self, const MuxStreams &streams, bool timeout)
 {
   GstRangeMuxPrivate *priv = self->priv;
   const WaitingBuffers &waiting = priv->waiting;
-  if (!priv->live && waiting.ended > 0)
+  if (waiting.ended > 0)
+    report_all_dropped (self, streams);
+  if (waiting.ended > 0 && !priv->live)
     report_unmatched (self, streams);
   if (waiting.list.empty () && waiting.gaps.empty ()) {
     if (waiting.missing > 0 || waiting.ended == 0)
@@ -665,6 +641,7 @@ gst_range_mux_flush (GstAggregator *aggregator)
   for (const auto &stream : priv->streams) {
     stream->offset_known = stream->shift_known = false;
     stream->seen = GST_CLOCK_TIME_NONE;
+    stream->round = {};
   }
   return GST_FLOW_OK;
 }

@@ -5,32 +5,101 @@
 #include <cmath>
 #include <gstrange/gstrangemeta.h>
 
-bool
-Recordings::compare (std::span<const WaitingBuffer> waiting, GstClockTime last_capture)
+/* Finds whether a buffer is of the next round. One that comes late within its round has the running
+ * time of its place there, and seldom precedes the stream's first one. Where a clock was set back,
+ * capture times go back less far than to the first one: all streams together have begun again, one
+ * alone is late. */
+static void
+compare_with_round (const WaitingBuffer &w)
 {
-  if (waiting.empty ())
-    return false;
+  RecordingRound &round = w.stream->round;
+  round.over = false;
+  if (!GST_CLOCK_TIME_IS_VALID (round.newest) || w.capture > round.newest) {
+    round.went_back = false;
+    return;
+  }
+  const GstClockTime back = round.newest - w.capture;
+  const bool from_begin = w.capture <= round.begin;
+  const bool running_goes_on = GST_CLOCK_TIME_IS_VALID (w.running) &&
+                               GST_CLOCK_TIME_IS_VALID (round.newest_running) &&
+                               w.running > round.newest_running;
+  round.over = from_begin && back > Recordings::kMaxReordered;
+  round.went_back = round.went_back || from_begin || running_goes_on || back > Recordings::kMaxBack;
+}
+
+/* Those that wait for the next round vote for the time that the others have reached.
+ * @return the median capture time */
+GstClockTime
+Recordings::vote (std::span<const WaitingBuffer> waiting, GstClockTime last_capture)
+{
+  const auto time_of = [last_capture] (const WaitingBuffer &w) {
+    return w.stream->round.over ? last_capture : w.capture;
+  };
   captures_.clear ();
   for (const WaitingBuffer &w : waiting)
-    captures_.push_back (w.capture);
+    captures_.push_back (time_of (w));
   const auto middle = captures_.begin () + std::ptrdiff_t (captures_.size () / 2);
   std::ranges::nth_element (captures_, middle);
   const bool can_vote = captures_.size () >= 3;
   const GstClockTime others = can_vote ? *middle : std::ranges::min (captures_);
   for (const WaitingBuffer &w : waiting) {
-    w.stream->ahead = GST_CLOCK_DIFF (others, w.capture);
-    w.stream->in_sync = !can_vote || GstClockTime (ABS (w.stream->ahead)) <= kMaxLater;
+    const GstClockTimeDiff distance = GST_CLOCK_DIFF (others, time_of (w));
+    w.stream->ahead = w.stream->round.over ? GST_CLOCK_DIFF (last_capture, w.capture) : distance;
+    w.stream->in_sync = !can_vote || GstClockTime (ABS (distance)) <= kMaxLater;
   }
-  return GST_CLOCK_TIME_IS_VALID (last_capture) && *middle + kMaxBack < last_capture;
+  return *middle;
+}
+
+bool
+Recordings::compare (WaitingBuffers &waiting, GstClockTime last_capture)
+{
+  if (waiting.list.empty ())
+    return false;
+  for (const WaitingBuffer &w : waiting.list) {
+    if (!GST_CLOCK_TIME_IS_VALID (last_capture))
+      w.stream->round = {};
+    compare_with_round (w);
+  }
+  const GstClockTime middle = vote (waiting.list, last_capture);
+  const auto went_back = [] (const WaitingBuffer &w) {
+    return w.stream->in_sync && w.stream->round.went_back;
+  };
+  const bool known = waiting.missing == 0 && GST_CLOCK_TIME_IS_VALID (last_capture);
+  const bool most = known && middle + kMaxBack < last_capture;
+  const bool all = known && std::ranges::all_of (waiting.list, [&] (const WaitingBuffer &w) {
+    return !w.stream->in_sync || went_back (w);
+  });
+  if (most || (all && waiting.gaps.empty ())) {
+    for (const WaitingBuffer &w : waiting.list)
+      w.stream->round = {};
+    vote (waiting.list, last_capture);
+    return true;
+  }
+  /* Gaps of the old round are dropped first. */
+  std::erase_if (waiting.list, [&] (const WaitingBuffer &w) {
+    const bool next = w.stream->round.over || (all && went_back (w));
+    if (next)
+      waiting.next_round.push_back (w);
+    return next;
+  });
+  return false;
 }
 
 const WaitingBuffer *
-Recordings::find_different_time (std::span<const WaitingBuffer> waiting)
+Recordings::find_different_time (const WaitingBuffers &waiting)
 {
-  if (waiting.size () == 2)
-    for (const WaitingBuffer &w : waiting)
-      if (w.stream->ahead > GstClockTimeDiff (kMaxLater))
+  const auto waits_long = [] (const WaitingBuffer &w, GstClockTimeDiff time) {
+    return time > GstClockTimeDiff (kMaxLater) && !w.stream->different_time_reported;
+  };
+  if (waiting.list.size () == 2)
+    for (const WaitingBuffer &w : waiting.list)
+      if (waits_long (w, w.stream->ahead))
         return &w;
+  for (const WaitingBuffer &w : waiting.next_round) {
+    const GstClockTime reached = w.capture - w.stream->ahead; /* by the others */
+    if (waits_long (w, GST_CLOCK_DIFF (w.stream->round.newest, reached)))
+      return &w;
+  }
   return nullptr;
 }
 
@@ -68,14 +137,13 @@ speed_of (const WaitingBuffer &w)
 }
 
 GstClockTime
-running_time_after (
-    const FrameTimes &last, const FrameTimes &next, double speed, GstClockTime period)
+running_time_after (const FrameTimes &last, const FrameTimes &next, double speed)
 {
   if (!GST_CLOCK_TIME_IS_VALID (last.running))
     return next.running;
   const bool follows = GST_CLOCK_TIME_IS_VALID (last.capture) && next.capture > last.capture &&
                        next.capture - last.capture <= Recordings::kMaxLater;
-  const GstClockTime distance = follows ? next.capture - last.capture : period;
+  const GstClockTime distance = follows ? next.capture - last.capture : last.period;
   const GstClockTime running = last.running + GstClockTime (double (distance) / speed);
   return follows || !GST_CLOCK_TIME_IS_VALID (next.running) ? running
                                                             : std::max (running, next.running);

@@ -10,11 +10,23 @@ using rangecast::StatusCode;
 using rangecast::View;
 
 void
+RecordingRound::add (const WaitingBuffer &w)
+{
+  if (!GST_CLOCK_TIME_IS_VALID (begin))
+    begin = w.capture;
+  if (GST_CLOCK_TIME_IS_VALID (newest) && w.capture <= newest)
+    return;
+  newest = w.capture;
+  newest_running = w.running;
+}
+
+void
 MuxStream::reset ()
 {
   has_caps = coded = chosen = alive = clash_reported = offset_known = shift_known = matched_others =
       different_time_reported = false;
   other_rig = clash = {};
+  round = {};
   seen = since = GST_CLOCK_TIME_NONE;
   reported = state = StreamState::kIn;
   received = late = out_of_sync = left_out = matched = views = 0;
@@ -124,9 +136,37 @@ name_of (StreamState state)
 
 namespace {
 
+std::string
+explain_late (GstClockTimeDiff offset, const std::string &seconds, bool live)
+{
+  std::string text = ": all buffers are late";
+  if (live) {
+    if (offset != 0)
+      text += ", capture times are " + seconds + " behind the others'";
+    return text + "; left out; expected a host and a network that keep up, a synchronised clock, "
+                  "or a greater latency";
+  }
+  text += offset < 0 ? ", captured " + seconds + " before" : ", captured at the time of";
+  return text + " the last frame set; left out; expected capture times that rise";
+}
+
+std::string
+explain_different_time (GstClockTimeDiff offset, const std::string &seconds)
+{
+  if (offset < 0)
+    return ": it has begun again, its capture times are " + seconds +
+           " behind the others': it waits until they begin again or end; expected recordings that "
+           "are equally long";
+  return (offset > 0 ? ": its capture times are " + seconds +
+                           " ahead of the others': it waits until they catch up"
+                     : std::string (": it has ended, and no frame set contains both its views and "
+                                    "another stream's")) +
+         "; expected recordings of the same time, by hosts with synchronised clocks";
+}
+
 /* The sentence that follows title(). */
 std::string
-explain (const MuxStream &stream, StreamState state, GstClockTimeDiff offset)
+explain (const MuxStream &stream, StreamState state, GstClockTimeDiff offset, bool live)
 {
   const std::string seconds = std::to_string (double (ABS (offset)) / GST_SECOND) + " s";
   switch (state) {
@@ -134,18 +174,12 @@ explain (const MuxStream &stream, StreamState state, GstClockTimeDiff offset)
       return ": nothing came for " + std::to_string (kSilentAfter / GST_SECOND) +
              " s; the others continue without it";
     case StreamState::kLate:
-      return ": all buffers are late, capture times are " + seconds +
-             " behind the others'; left out; expected a host and a network that keep up, a "
-             "synchronised clock, or a greater latency";
+      return explain_late (offset, seconds, live);
     case StreamState::kOutOfSync:
       return ": its capture times are " + seconds + (offset < 0 ? " behind" : " ahead of") +
              " the others': the host's clock is not synchronised; left out until it is";
     case StreamState::kDifferentTime:
-      return (offset > 0 ? ": its capture times are " + seconds +
-                               " ahead of the others': it waits until they catch up"
-                         : std::string (": it has ended, and no frame set contains both its views "
-                                        "and another stream's")) +
-             "; expected recordings of the same time, by hosts with synchronised clocks";
+      return explain_different_time (offset, seconds);
     case StreamState::kOtherRig:
       return ": " + stream.other_rig.message () + "; left out";
     case StreamState::kClash:
@@ -158,11 +192,12 @@ explain (const MuxStream &stream, StreamState state, GstClockTimeDiff offset)
 } // namespace
 
 void
-report_state (GstElement *element, MuxStream &stream, StreamState state, GstClockTimeDiff offset)
+report_state (
+    GstElement *element, MuxStream &stream, StreamState state, GstClockTimeDiff offset, bool live)
 {
   const int view_id = stream.has_caps ? stream.info.rig.views.front ().id : -1;
   stream.reported = state;
-  const std::string text = stream.title () + explain (stream, state, offset);
+  const std::string text = stream.title () + explain (stream, state, offset, live);
   if (state != StreamState::kIn)
     gst_range_post_warning (element, {StatusCode::kBadData, text});
   gst_element_post_message (element,

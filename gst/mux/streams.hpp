@@ -22,6 +22,20 @@ enum class StreamState {
 /** A stream without buffers for so long is silent: frame sets and caps are made without it. */
 inline constexpr GstClockTime kSilentAfter = 2 * GST_SECOND;
 
+struct WaitingBuffer;
+
+/** Where a recording is in its round. All recordings begin a round together: when they are started,
+ *  and each time all of them have begun again. */
+struct RecordingRound {
+  GstClockTime begin = GST_CLOCK_TIME_NONE;          ///< capture time of its first buffer
+  GstClockTime newest = GST_CLOCK_TIME_NONE;         ///< greatest capture time in a frame set
+  GstClockTime newest_running = GST_CLOCK_TIME_NONE; ///< running time of that buffer
+  bool went_back = false; ///< the buffer at its pad is of the next round if all others' are
+  bool over = false;      ///< the buffer at its pad is of the next round
+
+  void add (const WaitingBuffer &w);
+};
+
 /** A sink pad of rangemux and its stream. */
 struct MuxStream {
   explicit MuxStream (GstAggregatorPad *p) : pad (GST_AGGREGATOR_PAD (gst_object_ref (p))) {}
@@ -51,6 +65,7 @@ struct MuxStream {
   bool different_time_reported = false;     ///< state kDifferentTime was reported
   GstClockTimeDiff shift = 0;               ///< capture time - running time of its last buffer, ns
   GstClockTimeDiff ahead = 0;               ///< recordings: capture time - that of the others, ns
+  RecordingRound round;                     ///< not live
   GstClockTime seen = GST_CLOCK_TIME_NONE;  ///< running time of its last buffer
   GstClockTime since = GST_CLOCK_TIME_NONE; ///< running time at which it got its state
   StreamState reported = StreamState::kIn;  ///< the state that was reported last
@@ -90,6 +105,7 @@ const char *name_of (StreamState state);
 
 /** Posts a warning for the user, and an element message `rangemux-stream` for the application. Call
  *  it without locks.
- *  @param offset  of its capture times to the others', ns */
+ *  @param offset  of its capture times to the others', ns; not live and late: to that of the last
+ *                 frame set */
 void report_state (
-    GstElement *element, MuxStream &stream, StreamState state, GstClockTimeDiff offset);
+    GstElement *element, MuxStream &stream, StreamState state, GstClockTimeDiff offset, bool live);

@@ -292,6 +292,26 @@ GST_START_TEST (test_a_host_that_always_comes_too_late_is_told)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_a_host_of_which_all_came_too_late_is_told_when_it_ends)
+{
+  LiveMux mux (3);
+  mux.dead = 0b100;
+  mux.always (3);
+  mux.dead = 0;
+  mux.ahead[2] = -GstClockTimeDiff (10 * kFrame);
+  fail_unless_equals_int (mux.ever (5), 0b011);
+  fail_unless (mux.told ().empty ());
+  gst_harness_push_event (mux.in[2], gst_event_new_eos ());
+  mux.dead = 0b100;
+  mux.ever (3);
+  const std::vector<Told> told = mux.told ();
+  fail_unless_equals_int (told.size (), 1);
+  fail_unless_equals_string (told[0].pad.c_str (), "sink_2");
+  fail_unless_equals_string (told[0].state.c_str (), "late");
+  fail_unless_equals_uint64 (mux.stat ("dropped-late"), 5);
+}
+GST_END_TEST;
+
 /* ---- two hosts with one view-id, other rigs, other formats ---- */
 
 GST_START_TEST (
@@ -410,6 +430,7 @@ rangemuxfaults_suite ()
   tcase_add_test (tc, test_one_stream_whose_times_jump_silences_nobody);
   tcase_add_test (tc, test_who_clashed_with_a_pad_that_is_released_takes_its_place);
   tcase_add_test (tc, test_a_host_that_always_comes_too_late_is_told);
+  tcase_add_test (tc, test_a_host_of_which_all_came_too_late_is_told_when_it_ends);
   tcase_add_test (
       tc, test_of_two_hosts_with_one_view_the_second_is_told_and_left_out_until_the_first_is_gone);
   tcase_add_test (tc, test_a_host_of_the_other_format_does_not_stop_the_others);

@@ -15,13 +15,21 @@ struct FrameSet {
   guint views;
 };
 
-/* One that was recorded: its capture times, one period after another. */
+/* One that was recorded: its capture times, one period after another, as often as it is played. */
 struct Recording {
   GstClockTime begin;
   int frames;
   GstClockTime period = kFrame;
-  GstClockTime capture (int frame) const { return begin + pts (frame); }
-  GstClockTime pts (int frame) const { return GstClockTime (frame) * period; }
+  int rounds = 1;
+  bool pts_go_on = false;      /* where capture times go back */
+  std::vector<int> order = {}; /* of the frames; empty: as they were captured */
+  int total () const { return frames * rounds; }
+  GstClockTime time (int i) const
+  {
+    return GstClockTime (order.empty () ? i % frames : order[i % frames]) * period;
+  }
+  GstClockTime capture (int i) const { return begin + time (i); }
+  GstClockTime pts (int i) const { return pts_go_on ? GstClockTime (i) * period : time (i); }
 };
 
 /* A rangemux that is given recordings. */
@@ -40,7 +48,7 @@ struct Recordings : Mux {
     while (left > 0)
       for (std::size_t i = 0; i < list_.size (); i++) {
         if (!ended[i] && takes (int (i), next[i])) {
-          if (next[i] < list_[i].frames) {
+          if (next[i] < list_[i].total ()) {
             push (int (i), list_[i].capture (next[i]), list_[i].pts (next[i]));
             next[i]++;
           } else {
@@ -322,6 +330,146 @@ GST_START_TEST (test_after_a_flush_times_are_those_of_the_streams)
 }
 GST_END_TEST;
 
+/* ---- recordings that begin again ---- */
+
+GST_START_TEST (test_a_second_round_of_any_length_loses_nothing)
+{
+  for (const int streams : {1, 2, 3})
+    for (const int frames : {1, 3, 10, 45, 60})
+      for (const bool pts_go_on : {false, true}) {
+        Recordings mux (std::vector<Recording> (streams, {kHour, frames, kFrame, 3, pts_go_on}));
+        const std::vector<FrameSet> sets = mux.play ();
+        fail_unless_equals_int (sets.size (), 3 * frames);
+        fail_unless_equals_int (count_views (sets, (1U << streams) - 1), 3 * frames);
+        for (std::size_t i = 0; i < sets.size (); i++)
+          fail_unless_equals_uint64 (sets[i].pts, i * kFrame);
+        fail_unless (mux.n_warnings == 0, mux.warnings.c_str ());
+      }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_pts_of_a_second_take_at_another_frame_rate_go_on)
+{
+  Mux mux (1);
+  for (const int take : {0, 1}) {
+    const GstClockTime period = kFrame * (take + 1), begin = take * 10 * kFrame;
+    gst_harness_set_src_caps (
+        mux.in[0], gstrange::make_range_caps (gstrange::make_info (mux.one (0), 25, take + 1)));
+    for (GstClockTime i = 0; i < 10; i++) {
+      mux.push (0, kHour + i * period, begin + i * period);
+      GstBuffer *buffer = gst_harness_pull (mux.out);
+      fail_unless_equals_uint64 (GST_BUFFER_PTS (buffer), begin + i * period);
+      gst_buffer_unref (buffer);
+    }
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_recordings_of_different_lengths_begin_each_round_together)
+{
+  for (const bool pts_go_on : {false, true}) {
+    Recordings two ({{kHour, 10, kFrame, 3, pts_go_on}, {kHour, 14, kFrame, 3, pts_go_on}});
+    const std::vector<FrameSet> of_two = two.play ();
+    fail_unless_equals_int (of_two.size (), 42);
+    fail_unless_equals_int (count_views (of_two, 0b11), 30);
+    fail_unless (two.n_warnings == 0, two.warnings.c_str ());
+    Recordings three ({{kHour, 14, kFrame, 2, pts_go_on}, {kHour, 10, kFrame, 2, pts_go_on},
+        {kHour + kFrame, 11, kFrame, 2, pts_go_on}});
+    const std::vector<FrameSet> of_three = three.play ();
+    fail_unless_equals_int (of_three.size (), 28);
+    fail_unless_equals_int (count_views (of_three, 0b111), 18);
+    fail_unless (three.n_warnings == 0, three.warnings.c_str ());
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_recording_that_begins_again_waits_for_a_longer_one)
+{
+  Recordings mux ({{kHour, 10, kFrame, 3}, {kHour, 100}});
+  const std::vector<FrameSet> sets = mux.play ();
+  fail_unless_equals_int (sets.size (), 100 + 20);
+  for (std::size_t i = 0; i < sets.size (); i++)
+    fail_unless_equals_int (sets[i].views, i < 10 ? 0b11 : i < 100 ? 0b10 : 0b01);
+  fail_unless (mux.n_warnings == 0, mux.warnings.c_str ());
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_recording_of_another_clock_stays_left_out_when_the_others_begin_again)
+{
+  Recordings mux (
+      {{kHour, 10, kFrame, 2}, {kHour, 10, kFrame, 2}, {5 * kHour, 40, kFrame, 2, true}});
+  const std::vector<FrameSet> sets = mux.play ();
+  fail_unless_equals_int (count_views (sets, 0b011), 20);
+  fail_unless_equals_int (sets.size (), 20);
+  fail_unless_equals_uint64 (mux.stat ("out-of-step"), 80);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_gap_at_the_end_of_a_round_does_not_reach_into_the_next)
+{
+  Mux mux (2);
+  for (int i = 0; i < 10; i++) {
+    mux.push (0, kHour + i * kFrame, i * kFrame);
+    if (i < 8)
+      mux.push (1, kHour + i * kFrame, i * kFrame);
+    if (i == 8)
+      gst_harness_push_event (mux.in[1], gst_event_new_gap (8 * kFrame, 5 * kFrame));
+    fail_unless_equals_int (mux.pull (), i < 8 ? 0b11 : 0b01);
+  }
+  for (int i = 0; i < 10; i++) {
+    for (const int stream : {0, 1})
+      mux.push (stream, kHour + i * kFrame, (10 + i) * kFrame);
+    fail_unless_equals_int (mux.pull (), 0b11);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_reordered_buffer_is_late_and_no_restart)
+{
+  const Recording reordered = {kHour, 6, kFrame, 1, false, {0, 1, 3, 2, 4, 5}};
+  Recordings one ({reordered});
+  fail_unless_equals_int (one.play ().size (), 5);
+  fail_unless_equals_uint64 (one.stat ("dropped-late"), 1);
+  for (const std::vector<int> &order : {reordered.order, std::vector{1, 0, 2, 3, 4, 5}}) {
+    Recordings two ({{kHour, 6}, {kHour, 6, kFrame, 1, false, order}});
+    const std::vector<FrameSet> sets = two.play ();
+    fail_unless_equals_int (sets.size (), 6);
+    fail_unless_equals_int (count_views (sets, 0b11), 5);
+    fail_unless_equals_uint64 (two.stat ("dropped-late"), 1);
+  }
+}
+GST_END_TEST;
+
+/* 100 frames; after 60 of them the clock is set back by as many. */
+static Recording
+with_clock_set_back (int frames)
+{
+  Recording recording = {kHour, 100, kFrame, 1, true};
+  for (int i = 0; i < 100; i++)
+    recording.order.push_back (i < 60 ? i : i - frames);
+  return recording;
+}
+
+GST_START_TEST (test_clocks_set_back_together_lose_nothing)
+{
+  for (const int frames : {5, 30, 55}) {
+    Recordings mux ({with_clock_set_back (frames), with_clock_set_back (frames)});
+    fail_unless_equals_int (count_views (mux.play (), 0b11), 100);
+    fail_unless (mux.n_warnings == 0, mux.warnings.c_str ());
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_clock_set_back_alone_is_late_until_it_is_where_it_was)
+{
+  for (const int frames : {5, 35}) {
+    Recordings mux ({{kHour, 100}, with_clock_set_back (frames)});
+    fail_unless_equals_int (count_views (mux.play (), 0b11), 100 - frames);
+    fail_unless_equals_uint64 (mux.stat ("dropped-late"), frames);
+  }
+}
+GST_END_TEST;
+
 /* ---- what is told ---- */
 
 static bool
@@ -405,6 +553,42 @@ GST_START_TEST (test_a_recording_left_out_among_three_is_told_with_its_offset)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_what_is_late_among_recordings_is_told_without_advice_for_hosts_and_networks)
+{
+  Recordings mux ({{kHour, 100}, with_clock_set_back (35)});
+  mux.play ();
+  fail_unless_equals_int (mux.n_warnings, 1);
+  fail_unless (contains (mux.warnings, "pad sink_1 (view 1)"), mux.warnings.c_str ());
+  fail_unless (contains (mux.warnings, " s before the last frame set"), mux.warnings.c_str ());
+  fail_unless (!contains (mux.warnings, "latency"), mux.warnings.c_str ());
+  fail_unless_equals_string (mux.states.at (0).c_str (), "sink_1 late");
+  fail_unless (mux.offsets[0] < 0 && mux.offsets[0] > -35 * gint64 (kFrame));
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_recording_of_which_all_is_dropped_is_told_however_short_it_is)
+{
+  Recordings mux ({{kHour, 60}, {kHour, 60}, {2 * kHour, 3}});
+  mux.play ();
+  fail_unless_equals_uint64 (mux.stat ("out-of-step"), 3);
+  fail_unless_equals_int (mux.n_warnings, 1);
+  fail_unless_equals_string (mux.states.at (0).c_str (), "sink_2 out-of-step");
+}
+GST_END_TEST;
+
+GST_START_TEST (test_a_recording_that_waits_for_minutes_to_begin_again_is_told_once)
+{
+  constexpr GstClockTime kLong = 30 * GST_SECOND;
+  Recordings mux ({{kHour, 3, kLong, 2}, {kHour, 10, kLong}});
+  fail_unless_equals_int (mux.play ().size (), 13);
+  fail_unless_equals_int (mux.n_warnings, 1);
+  fail_unless (
+      contains (mux.warnings, "pad sink_0 (view 0): it has begun again"), mux.warnings.c_str ());
+  fail_unless_equals_string (mux.states.at (0).c_str (), "sink_0 apart");
+  fail_unless_equals_int64 (mux.offsets[0], -5 * gint64 (kLong));
+}
+GST_END_TEST;
+
 /* ---- gaps ---- */
 
 GST_START_TEST (test_a_gap_is_as_long_as_its_own_times_say_where_pts_are_the_streams_own)
@@ -448,12 +632,25 @@ rangemuxrecordings_suite ()
   tcase_add_test (tc, test_without_capture_times_running_times_stay_at_any_speed);
   tcase_add_test (tc, test_after_a_seek_for_another_speed_downstream_gets_the_same_running_times);
   tcase_add_test (tc, test_after_a_flush_times_are_those_of_the_streams);
+  tcase_add_test (tc, test_a_second_round_of_any_length_loses_nothing);
+  tcase_add_test (tc, test_pts_of_a_second_take_at_another_frame_rate_go_on);
+  tcase_add_test (tc, test_recordings_of_different_lengths_begin_each_round_together);
+  tcase_add_test (tc, test_a_recording_that_begins_again_waits_for_a_longer_one);
+  tcase_add_test (tc, test_a_recording_of_another_clock_stays_left_out_when_the_others_begin_again);
+  tcase_add_test (tc, test_a_gap_at_the_end_of_a_round_does_not_reach_into_the_next);
+  tcase_add_test (tc, test_a_reordered_buffer_is_late_and_no_restart);
+  tcase_add_test (tc, test_clocks_set_back_together_lose_nothing);
+  tcase_add_test (tc, test_a_clock_set_back_alone_is_late_until_it_is_where_it_was);
   tcase_add_test (tc, test_of_two_recordings_of_other_clocks_one_is_told_once);
   tcase_add_test (tc, test_two_that_take_turns_of_minutes_are_told_once_each);
   tcase_add_test (tc, test_a_recording_that_ends_before_the_other_begins_is_told_once);
   tcase_add_test (tc, test_the_one_of_three_that_never_matched_is_told_wherever_it_ends);
   tcase_add_test (tc, test_a_recording_alone_or_beside_an_empty_one_tells_nothing);
   tcase_add_test (tc, test_a_recording_left_out_among_three_is_told_with_its_offset);
+  tcase_add_test (
+      tc, test_what_is_late_among_recordings_is_told_without_advice_for_hosts_and_networks);
+  tcase_add_test (tc, test_a_recording_of_which_all_is_dropped_is_told_however_short_it_is);
+  tcase_add_test (tc, test_a_recording_that_waits_for_minutes_to_begin_again_is_told_once);
   tcase_add_test (tc, test_a_gap_is_as_long_as_its_own_times_say_where_pts_are_the_streams_own);
   return suite;
 }
