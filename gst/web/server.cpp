@@ -234,16 +234,18 @@ Server::open_stats ()
   return {};
 }
 
-/* What browsers send as Origin: scheme, host and port alone. */
+/* What browsers send as Origin: scheme, host, and the port if it is not the scheme's own. */
 static bool
 is_origin (const char *text)
 {
   g_autofree gchar *scheme = nullptr, *user = nullptr, *host = nullptr, *path = nullptr,
                    *query = nullptr, *fragment = nullptr;
-  return g_uri_split (text, G_URI_FLAGS_NONE, &scheme, &user, &host, nullptr, &path, &query,
+  gint port = -1;
+  return g_uri_split (text, G_URI_FLAGS_NONE, &scheme, &user, &host, &port, &path, &query,
              &fragment, nullptr) &&
          scheme && (g_str_equal (scheme, "http") || g_str_equal (scheme, "https")) && host &&
-         *host && !user && !*path && !query && !fragment;
+         *host && !user && !*path && !query && !fragment &&
+         port != (g_str_equal (scheme, "http") ? 80 : 443);
 }
 
 Status
@@ -261,7 +263,8 @@ Server::start ()
   for (gchar **origin = origins; *origin; origin++)
     if (**origin && !is_origin (*origin))
       return {StatusCode::kBadValue,
-          "origins: expected https://HOST[:PORT] or http://HOST[:PORT], got '" +
+          "origins: expected https://HOST[:PORT] or http://HOST[:PORT], without the port 443 or 80 "
+          "that it has anyway, got '" +
               std::string (*origin) + "'"};
   const std::string index = settings_.root + "/index.html";
   if (!g_file_test (index.c_str (), G_FILE_TEST_IS_REGULAR))

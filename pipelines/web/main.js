@@ -281,6 +281,7 @@ class Page {
       ArrowLeft: () => this.move ('rc_step', -1, 0), ArrowRight: () => this.move ('rc_step', 1, 0),
       ArrowUp: () => this.move ('rc_step', 0, 1), ArrowDown: () => this.move ('rc_step', 0, -1),
       '+': () => this.move ('rc_step_nearer', 1), '=': () => this.move ('rc_step_nearer', 1), '-': () => this.move ('rc_step_nearer', 0),
+      Escape: () => say (''),
       Home: () => this.move ('rc_go_home'), r: () => this.move ('rc_go_home'), m: () => this.toggleMode (),
       ' ': () => this.worker.postMessage ({ type: 'toggle' }),
     };
@@ -327,7 +328,10 @@ class Page {
       storeToken (this.server.url, element ('token-text').value);
       this.openLive (this.server.url, element ('token-text').value);
     };
-    element ('file').onchange = ({ target }) => this.openFiles (target.files);
+    element ('file').onchange = ({ target }) => {
+      this.openFiles (target.files);
+      target.value = ''; // so that the same file can be chosen again
+    };
     addEventListener ('dragover', (event) => {
       event.preventDefault ();
       document.body.classList.add ('dropping');

@@ -232,7 +232,8 @@ GST_START_TEST (test_certificate_must_be_a_readable_pem_file)
   expect_error ("token-file=/nonexistent", "token-file: expected a file");
   expect_error ("token=abc anonymous=true", "anonymous: expected without token");
   for (const char *origin : {"foo", "studio.example.org", "https://", "ftp://a.example",
-           "https://a.example/", "https://a.example/page", "https://me@a.example"})
+           "https://a.example/", "https://a.example/page", "https://me@a.example",
+           "https://a.example:443", "http://a.example:80"})
     expect_error (std::string ("origins=\"https://b.example:8443 ") + origin + "\"",
         std::string ("got '") + origin + "'");
   expect_error ("stun-server=stun://a.example:3478", "stun-server: expected webrtc=true, too");
