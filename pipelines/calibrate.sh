@@ -36,10 +36,16 @@ the result
 END
 }
 
+# demo.sh builds without it.
+need_element () {
+  gst-inspect-1.0 --exists --atleast-version=0.0.0 rigcalibrate 2>/dev/null ||
+    die "no element rigcalibrate: run $root/setup.sh"
+}
+
 # Limits come from gst-inspect-1.0, which runs once, so that they are written down in one place.
 inspected=
 property_of () { # property
-  [ -n "$inspected" ] || inspected=$(LC_ALL=C gst-inspect-1.0 --no-colors rigcalibrate) || die "no element rigcalibrate"
+  [ -n "$inspected" ] || { need_element && inspected=$(LC_ALL=C gst-inspect-1.0 --no-colors rigcalibrate); }
   awk -v name="$1" '/^  [a-z-]+ +:/ { inside = $1 == name } inside' <<<"$inspected"
 }
 
@@ -93,6 +99,7 @@ while [ $# -gt 0 ]; do
 done
 [ ${#whats[@]} -gt 0 ] && [ -n "$out" ] || { usage >&2; die "expected at least --left or a packed camera, and --out"; }
 
+need_element
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
@@ -171,10 +178,25 @@ describe_source () { # camera's number, WHAT
   fi
 }
 
-# Prints width and height of the pictures of `source`.
+# Prints width and height of the first picture of `source`, from the header of a PNG: what gst-launch-1.0 -v prints may be cut off.
 size_of_source () {
-  LC_ALL=C timeout 30 gst-launch-1.0 -v "${source[@]}" ! identity eos-after=2 ! fakesink name=measured 2>"$folder/size.log" |
-    sed -nE 's/.*measured\.GstPad:sink: caps = .*width=\(int\)([0-9]+), height=\(int\)([0-9]+).*/\1 \2/p' | head -n 1
+  local width height
+  rm -f "$folder/first.png"
+  LC_ALL=C timeout 30 gst-launch-1.0 "${source[@]}" ! videoconvert ! pngenc snapshot=true compression-level=1 ! filesink \
+    "location=$folder/first.png" >/dev/null 2>"$folder/size.log" || true
+  read -r width height < <(od -An -tu4 --endian=big -j16 -N8 "$folder/first.png" 2>/dev/null) && echo "$width $height"
+}
+
+# Of a launch string the source.
+shorten () { if is_source "$1" && [[ "$1" == *" ! "* ]]; then echo "${1%% ! *} ! ..."; else echo "$1"; fi; }
+
+# usage: check_halves OPTION WIDTH HEIGHT: a line if the camera hardly has two lenses
+check_halves () {
+  local width=$2 height=$3
+  if [ "$1" = side-by-side ]; then width=$((width / 2)); else height=$((height / 2)); fi
+  [ $((width * 10)) -lt $((height * 12)) ] || [ $((width * 10)) -gt $((height * 21)) ] || return 0
+  echo "calibrate.sh: --$1: pictures of $2x$3 have halves of $width x $height, an unusual shape: is this a camera with two lenses," \
+    "at a size in which it sends both pictures?" >&2
 }
 
 pads=() sources=()
@@ -190,7 +212,8 @@ for i in "${!whats[@]}"; do
     left | right | third) add_camera "${views[i]}" "${roles[i]}" "${source[@]}" ;;
     *)
       read -r width height < <(size_of_source) ||
-        die "--${roles[i]}: no picture comes from '${whats[i]}'$(sed -n 's/^ERROR: [^/]*/: /p' "$folder/size.log" | head -n 1)"
+        die "--${roles[i]}: no picture comes from '$(shorten "${whats[i]}")'$(sed -nE 's/^(ERROR: from element [^ ]+|WARNING: erroneous pipeline): /: /p' "$folder/size.log" | head -n 1)"
+      check_halves "${roles[i]}" "$width" "$height"
       if [ "${roles[i]}" = side-by-side ]; then
         left=(videocrop "right=$((width / 2))") right=(videocrop "left=$((width / 2))")
       else
