@@ -65,6 +65,23 @@ report_recovery (GstMessage *message)
   }
 }
 
+/* When people should leave the picture, and when they may come back. */
+void
+report_learning (GstMessage *message)
+{
+  const GstStructure *structure = gst_message_get_structure (message);
+  int view_id = 0, frames = 0, of = 0;
+  if (!gst_structure_has_name (structure, "roiextract-learning") ||
+      !gst_structure_get (structure, "view-id", G_TYPE_INT, &view_id, "frames", G_TYPE_INT, &frames,
+          "of", G_TYPE_INT, &of, nullptr))
+    return;
+  if (frames >= of)
+    g_print ("view %d: the background is learnt\n", view_id);
+  else if (frames <= 1)
+    g_print ("view %d: learning the background from %d frames; nobody should be in the picture\n",
+        view_id, of);
+}
+
 /* Where browsers find the stream. */
 void
 report_address (GstMessage *message)
@@ -123,6 +140,7 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
     case GST_MESSAGE_ELEMENT:
       report_recovery (message);
       report_address (message);
+      report_learning (message);
       if (runner->stats)
         runner->stats->take (message);
       break;
