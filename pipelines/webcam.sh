@@ -13,13 +13,13 @@ usage: webcam.sh [--device /dev/videoN] [--rig FILE] [options] [-- options of ca
   --size WxH      size of the packed pictures (default 1280x480)
   --fps N         frames per second (default 30)
   --rig FILE      the camera's calibration (default webcam.yaml). If there is none, the camera is calibrated: show it a
-                  chessboard of 10x7 squares in all parts of the picture (Ctrl-C finishes). Options after -- go to calibrate.sh,
-                  e.g. -- --square 0.03
+                  chessboard of 10x7 squares of 25 mm in all parts of the picture (Ctrl-C finishes). Options after -- go to
+                  calibrate.sh, e.g. -- --square 0.03. What is farther than 1.2 m is cleared, unless -- --far M is given
   --calibrate WHAT  the pictures for that, as --side-by-side of calibrate.sh (default: those of the camera)
-  --learn N       number of frames from which the background is learnt: leave the picture until then (default 0: keep
-                  everything between near and far)
-  --depth WHAT    properties of stereodepth, e.g. "near=0.4 far=1.5"
-  --png FILE      write one picture instead of opening a window
+  --learn N       number of frames from which the background is learnt: leave the picture until a line says that it is
+                  (default 0: keep everything between near and far)
+  --depth WHAT    properties of stereodepth, e.g. "near=0.4 far=1.5" (default: near and far of the rig)
+  --png FILE      write one picture instead of opening a window: the first one, or with --learn the 30th with somebody in it
 END
 }
 
@@ -50,28 +50,51 @@ case "$packing" in
   side-by-side | top-bottom) ;;
   *) die "--packing: expected side-by-side or top-bottom, got '$packing'" ;;
 esac
-[ -z "$png" ] || need_place "$png"
+if [ -n "$png" ]; then
+  need_place "$png"
+  [ -n "${RANGECAST_LAUNCH:-}" ] || command -v rangecast-run >/dev/null || die "--png: no program rangecast-run: run $root/setup.sh"
+elif ! has_display; then
+  die "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --png FILE without one"
+fi
 split_properties "$depth" near=0.4 --depth stereodepth
 depth=("${words[@]}")
 if [ -z "$input" ]; then
-  [ -c "$device" ] || die "--device: no camera '$device'; gst-device-monitor-1.0 Video/Source lists cameras"
+  [ -c "$device" ] || die "--device: no camera '$device'; \`source $root/pipelines/env.sh; gst-device-monitor-1.0 Source/Video/Stereo\`" \
+    "lists those with two lenses, with Video/Source all cameras"
   # Most cameras have their larger sizes as JPEG only.
   pixels="width=${size%x*},height=${size#*x},framerate=$fps/1"
   input="v4l2src device=$device ! 'image/jpeg,$pixels;video/x-raw,$pixels' ! decodebin ! videoconvert"
 fi
 if [ ! -e "$rig" ]; then
   need_place "$rig"
+  [[ "$rig" =~ \.(yaml|yml|json)$ ]] || die "--rig: expected a file name that ends in .yaml, .yml or .json, got '$rig'"
   window=(--window --auto-finish)
-  [ -z "$png" ] || window=()
-  "$(dirname "$0")/calibrate.sh" "--$packing" "${calibrate:-$input}" --out "$rig" "${window[@]}" "$@"
+  [ -z "$png" ] || window=(--auto-finish)
+  [ -z "$calibrate" ] || [ -z "$png" ] || window=()
+  "$(dirname "$0")/calibrate.sh" "--$packing" "${calibrate:-$input}" --out "$rig" --far 1.2 "${window[@]}" "$@"
+elif [ $# -gt 0 ]; then
+  echo "webcam.sh: options after -- are for a calibration, but '$rig' exists: they are not used; remove it to calibrate again" >&2
 fi
 
 split_elements "$input" v4l2src --input
 person=()
 [ "$learn" = 0 ] || person=(! roiextract "background-frames=$learn")
-sink=(! videoconvert ! autovideosink)
-[ -z "$png" ] || sink=(! videoconvert ! pngenc snapshot=true ! filesink "location=$png")
-[ -n "$png" ] || sink=(! queue "${sink[@]}")
-launch "${words[@]}" ! queue max-size-buffers=2 ! depth.left \
-  stereodepth name=depth "packing=$packing" "rig=$rig" "${depth[@]}" "${person[@]}" \
-  ! rangerender ! video/x-raw,width=640,height=480 "${sink[@]}"
+view=("${words[@]}" ! queue max-size-buffers=2 ! depth.left
+  stereodepth name=depth "packing=$packing" "rig=$rig" "${depth[@]}" "${person[@]}")
+picture=(! rangerender ! video/x-raw,width=640,height=480)
+if [ -z "$png" ]; then
+  launch "${view[@]}" "${picture[@]}" ! queue ! videoconvert ! autovideosink
+fi
+
+# rangecast-run drops frame sets at the element named decoder until one has points, counts pictures at the one named rendered,
+# and writes the last one.
+frames=1 patience=30 reason="nothing came from the camera"
+if [ "$learn" != 0 ]; then
+  frames=30 patience=$((60 + 2 * learn)) reason+=", or nobody came into the picture after the background was learnt"
+fi
+RANGECAST_LAUNCH="${RANGECAST_LAUNCH:-rangecast-run} --frames $frames --timeout $patience --snapshot $(printf %q "$png")"
+exec 2> >(
+  trap '' INT TERM # ends at the end of its input
+  exec sed -u "s|^ERROR: no end of stream after .*|webcam.sh: no picture within $patience s: $reason|" >&2
+)
+launch "${view[@]}" ! identity name=decoder "${picture[@]}" ! identity name=rendered ! videoconvert ! fakesink name=snapshot

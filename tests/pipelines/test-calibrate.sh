@@ -50,12 +50,79 @@ test_packed_pictures_give_the_rig_of_separate_ones () {
   expect_error "no picture comes from 'filesrc location=nothing%d'" "$pipelines/calibrate.sh" --top-bottom 'filesrc location=nothing%d' --out other.yaml
 }
 
+# As a webcam sends them: in real time, each board for a second.
+test_live_halves_of_a_packed_picture_stay_together () {
+  need_boards
+  pack_boards
+  local file count=0 shared
+  for file in packed-*.png; do
+    mv "$file" "live-$(printf %02d $count).png"
+    count=$((count + 1))
+  done
+  timeout -k 2 60 "$pipelines/calibrate.sh" --out rig.yaml --near 0.2 --far 1 --side-by-side "multifilesrc location=live-%02d.png
+    caps=image/png,framerate=1/1 ! pngdec ! videorate ! video/x-raw,framerate=10/1 ! clocksync" >report.txt
+  shared=$(awk '$1 == "sink_0" && $2 == "sink_1" { print $3 }' report.txt)
+  [ "${shared:-0}" -ge 8 ] || fail "$(tail -n 12 report.txt)"
+}
+
+test_camera_with_one_lens_is_asked_for () {
+  expect_error "pictures of 1280x720 have halves of 640 x 720, an unusual shape: is this a camera with two lenses" \
+    "$pipelines/calibrate.sh" --side-by-side 'videotestsrc num-buffers=3 ! video/x-raw,width=1280,height=720' --out rig.yaml
+  "$pipelines/calibrate.sh" --side-by-side 'videotestsrc num-buffers=3 ! video/x-raw,width=2560,height=720' --out rig.yaml 2>said.txt || true
+  ! grep -q "unusual" said.txt || fail "$(cat said.txt)"
+}
+
+# Sets `simulated` to a source of packed pictures, the first eight of an empty room, with rig.yaml as their rig.
+simulate_webcam () {
+  simulated="avatartestsrc name=cameras empty-frames=8 num-buffers=24 cameras.left ! video/x-raw,width=320,height=240 ! queue ! packed.sink_0
+    cameras.right ! queue ! packed.sink_1 compositor name=packed sink_1::xpos=320 ! videoconvert"
+  gst-launch-1.0 -q avatartestsrc rig-export=rig.yaml num-buffers=1 ! video/x-range,width=320,height=240 ! fakesink
+}
+
+# Prints the fraction of a picture's rows whose middle differs from the corner above left.
+filled_rows () {
+  gst-launch-1.0 -q filesrc location="$1" ! pngdec ! videoconvert ! video/x-raw,format=RGB ! filesink location=pixels.raw
+  python3 -c '
+pixels = open("pixels.raw", "rb").read()
+rows = [pixels[i * 1920 + 960] - pixels[i * 1920 + 30] for i in range(480)]
+print(sum(abs(row) > 8 for row in rows) / 480)'
+}
+
+test_webcam_learns_the_background_before_it_writes_a_picture () {
+  simulate_webcam
+  "$pipelines/webcam.sh" --rig rig.yaml --input "$simulated" --learn 6 --png person.png >said.txt
+  grep -q "learning the background from 6 frames" said.txt || fail "$(cat said.txt)"
+  grep -q "the background is learnt" said.txt || fail "$(cat said.txt)"
+  awk "BEGIN { exit !($(filled_rows person.png) > 0.3) }" || fail "nobody is in the picture"
+  expect_error "ended after 24 frames of the background" "$pipelines/webcam.sh" --rig rig.yaml --input "$simulated" --learn 50 --png none.png
+  [ ! -e none.png ] || fail "an empty picture was written"
+}
+
+test_webcam_that_sends_nothing_is_an_error () {
+  simulate_webcam
+  expect_error "webcam.sh: no picture within 30 s: nothing came from the camera" "$pipelines/webcam.sh" --rig rig.yaml \
+    --input "videotestsrc is-live=true ! video/x-raw,width=640,height=240 ! valve drop=true" --png none.png
+  [ ! -e none.png ] || fail "an empty picture was written"
+}
+
+test_webcam_checks_its_arguments_first () {
+  expect_error "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --png FILE" \
+    env -u DISPLAY -u WAYLAND_DISPLAY "$pipelines/webcam.sh" --rig new.yaml --input videotestsrc
+  expect_error "--rig: expected a file name that ends in .yaml, .yml or .json, got 'new.txt'" \
+    "$pipelines/webcam.sh" --rig new.txt --input videotestsrc --png view.png
+  simulate_webcam
+  "$pipelines/webcam.sh" --rig rig.yaml --input "$simulated" --png view.png -- --square 0.03 2>said.txt
+  grep -q "options after -- are for a calibration, but 'rig.yaml' exists" said.txt || fail "$(cat said.txt)"
+  [ ! -e new.yaml ] || fail "a rig was written"
+}
+
 test_webcam_names_the_device () {
   gst-inspect-1.0 --exists --atleast-version=0.0.0 v4l2src || skip "no v4l2src"
   gst-launch-1.0 -q avatartestsrc rig-export=rig.yaml num-buffers=1 ! fakesink
-  expect_error "no camera '/dev/nothing'" "$pipelines/webcam.sh" --device /dev/nothing
+  expect_error "no camera '/dev/nothing'" "$pipelines/webcam.sh" --device /dev/nothing --png view.png
+  expect_error "env.sh; gst-device-monitor-1.0 Source/Video/Stereo" "$pipelines/webcam.sh" --device /dev/nothing --png view.png
   expect_error "capabilities for device '/dev/null'" "$pipelines/webcam.sh" --device /dev/null --rig rig.yaml --png view.png
-  expect_error "no picture comes from 'v4l2src device=/dev/null" "$pipelines/webcam.sh" --device /dev/null --rig new.yaml --png view.png
+  expect_error "no picture comes from 'v4l2src device=/dev/null ! ...'" "$pipelines/webcam.sh" --device /dev/null --rig new.yaml --png view.png
 }
 
 test_webcam_calibrates_first () {
