@@ -50,6 +50,7 @@
 
 #include "clockconsensus.hpp"
 #include "clockpublisher.hpp"
+#include "common/downstream.hpp"
 #include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 #include "frameset.hpp"
@@ -894,6 +895,7 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
   aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_range_mux_flush);
   aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_range_mux_sink_event);
   aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_range_mux_update_src_caps);
+  aggregator_class->negotiate = GST_DEBUG_FUNCPTR (negotiate_downstream);
   aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_range_mux_get_next_time);
   aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
   aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_range_mux_aggregate);

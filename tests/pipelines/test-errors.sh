@@ -53,6 +53,7 @@ test_media_types_that_do_not_fit_are_named () {
     run "${scene[@]}" ! neighbourcodeenc ! autovideosink
   expect_error "depth makes video/x-range, and autovideosink0 takes video/x-raw$drawn" \
     run "${scene[@]}" a.left ! depth.left a.right ! depth.right stereodepth name=depth focal-length=300 baseline=0.1 ! autovideosink
+  expect_error "m makes video/x-range, video/x-neighbour-code, and autovideosink0 takes video/x-raw$drawn" run "${scene[@]}" ! rangemux name=m ! autovideosink
   expect_error "c makes video/x-range, and autovideosink0 takes video/x-raw$drawn" \
     run videotestsrc num-buffers=2 ! c.colour videotestsrc num-buffers=2 ! video/x-raw,format=GRAY16_LE ! c.depth rangecombine name=c ! autovideosink
   run "${scene[@]}" ! neighbourcodeenc ! filesink location=scene.rcnc
