@@ -6,6 +6,8 @@
 using rangecast::AccessUnitPlace;
 using rangecast::kNoTime;
 using rangecast::StreamFile;
+using rangecast::Take;
+using rangecast::TakeList;
 
 namespace {
 
@@ -28,7 +30,22 @@ choose (StreamFile::Target target, guint64 pts, guint64 last_pts, GstSeekFlags f
   return target.after;
 }
 
+/* The time in the file of a time in a take. */
+guint64
+pts_at (const Take &take, GstClockTime time)
+{
+  const guint64 latest = kNoTime - 1, after = time - std::min (time, take.time_ns);
+  return after < latest - std::min (take.pts_ns, latest) ? take.pts_ns + after : latest;
+}
+
 } // namespace
+
+NeighbourCodeFile::NeighbourCodeFile (GstPad *pad) : pad_ (pad)
+{
+  gint64 size = 0;
+  if (gst_pad_peer_query_duration (pad, GST_FORMAT_BYTES, &size))
+    size_ = guint64 (std::max<gint64> (size, 0));
+}
 
 void
 NeighbourCodeFile::read (guint64 offset, gsize size, std::vector<guint8> &to)
@@ -42,46 +59,54 @@ NeighbourCodeFile::read (guint64 offset, gsize size, std::vector<guint8> &to)
   gst_buffer_unref (buffer);
 }
 
+/* A part of the file, whose offsets begin at 0. */
 StreamFile
-NeighbourCodeFile::stream ()
+NeighbourCodeFile::part (guint64 begin, guint64 end)
 {
-  gint64 size = 0;
-  if (!gst_pad_peer_query_duration (pad_, GST_FORMAT_BYTES, &size))
-    size = 0;
-  return {
-      [this] (guint64 offset, gsize bytes, std::vector<guint8> &to) { read (offset, bytes, to); },
-      guint64 (std::max<gint64> (size, 0))};
+  const guint64 length = end - std::min (begin, end);
+  const auto read_part = [this, begin, length] (
+                             guint64 offset, gsize bytes, std::vector<guint8> &to) {
+    read (
+        begin + offset, gsize (std::min<guint64> (bytes, length - std::min (offset, length))), to);
+  };
+  return {read_part, length};
 }
 
-GstClockTime
-NeighbourCodeFile::last_time ()
+std::optional<AccessUnitPlace>
+NeighbourCodeFile::last ()
 {
-  const auto last = stream ().last ();
-  if (!last || last->header.pts_ns == kNoTime || last->header.pts_ns < first_pts_)
-    return GST_CLOCK_TIME_NONE;
-  return last->header.pts_ns - first_pts_;
+  auto last = part (0, size_).last ();
+  if (last && last->header.pts_ns == kNoTime)
+    last.reset ();
+  return last;
 }
 
-/* The time in the file of a stream time. */
-guint64
-NeighbourCodeFile::pts_at (GstClockTime time) const
+TakeList
+NeighbourCodeFile::takes (guint64 offset, GstClockTime frame_duration)
 {
-  const guint64 latest = kNoTime - 1;
-  return time < latest - std::min (first_pts_, latest) ? first_pts_ + time : latest;
+  return part (0, size_).takes (offset, frame_duration);
 }
 
 std::optional<NeighbourCodeFile::Place>
-NeighbourCodeFile::find (GstClockTime start, GstClockTime stop, GstSeekFlags flags)
+NeighbourCodeFile::find (
+    const TakeList &list, GstClockTime start, GstClockTime stop, GstSeekFlags flags)
 {
-  const guint64 pts = pts_at (start);
-  const StreamFile::Target target = stream ().locate (pts);
-  const auto chosen = choose (target, pts, pts_at (stop), flags);
+  if (list.empty ())
+    return {};
+  const std::vector<Take> &takes = list.takes ();
+  const auto after = std::ranges::upper_bound (takes, start, {}, &Take::time_ns);
+  const auto take = after == takes.begin () ? after : after - 1;
+  const auto next = take + 1;
+  const guint64 end = next == takes.end () ? size_ : next->offset;
+  const guint64 pts = pts_at (*take, start);
+  const StreamFile::Target target = part (take->offset, end).locate (pts);
+  const auto chosen = choose (target, pts, pts_at (*take, stop), flags);
   if (!chosen)
     return {};
-  const guint64 found = chosen->header.pts_ns;
-  Place place = {chosen->offset, found - std::min (first_pts_, found), {}};
+  const guint64 offset = take->offset + chosen->offset;
+  Place place = {offset, list.time_of (offset, chosen->header.pts_ns), {}};
   if (target.rig)
-    read (target.rig->offset + rangecast::kStreamPrefixSize,
+    read (take->offset + target.rig->offset + rangecast::kStreamPrefixSize,
         std::min<gsize> (target.rig->header.size, kMaxRigBytes), place.rig_units);
   return place;
 }

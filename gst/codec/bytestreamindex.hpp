@@ -7,30 +7,31 @@
 #include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
 #include <vector>
 
-/** Finds access units in a file of coded frame sets, through a pad in pull mode. Any thread. Times
- *  are stream times, which begin at 0; `first_pts` is the time in the file there. */
+/** Finds access units in a file of coded frame sets, through a pad in pull mode. Any thread. */
 class NeighbourCodeFile {
 public:
-  NeighbourCodeFile (GstPad *pad, GstClockTime first_pts) : pad_ (pad), first_pts_ (first_pts) {}
+  explicit NeighbourCodeFile (GstPad *pad);
 
-  /** Time of the last access unit; GST_CLOCK_TIME_NONE if it has none. */
-  GstClockTime last_time ();
+  /** The last access unit, if it has a time. */
+  std::optional<rangecast::AccessUnitPlace> last ();
+  /** The takes from an access unit on. */
+  rangecast::TakeList takes (guint64 offset, GstClockTime frame_duration);
 
   /** Where decoding can begin. */
   struct Place {
-    guint64 offset; ///< bytes
-    GstClockTime time;
+    guint64 offset;                ///< bytes
+    GstClockTime time;             ///< on the time line of the takes
     std::vector<guint8> rig_units; ///< the last rig up to there
   };
-  /** The key access unit for a seek to `start` with these flags; not after `stop`, unless it is the
-   *  first one. Nothing if the file has no times. */
-  std::optional<Place> find (GstClockTime start, GstClockTime stop, GstSeekFlags flags);
+  /** The key access unit for a seek to `start` with these flags, in the take of that time; not
+   * after `stop`, unless it is the take's first one. Nothing if the file has no times. */
+  std::optional<Place> find (
+      const rangecast::TakeList &list, GstClockTime start, GstClockTime stop, GstSeekFlags flags);
 
 private:
   void read (guint64 offset, gsize size, std::vector<guint8> &to);
-  rangecast::StreamFile stream ();
-  guint64 pts_at (GstClockTime time) const;
+  rangecast::StreamFile part (guint64 begin, guint64 end);
 
   GstPad *pad_;
-  GstClockTime first_pts_;
+  guint64 size_ = 0;
 };

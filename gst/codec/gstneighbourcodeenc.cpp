@@ -380,8 +380,9 @@ make_output (GstNeighbourCodeEnc *self, std::span<const std::span<const guint8>>
 }
 
 static void
-prepend_prefix (GstNeighbourCodeEncPrivate *priv, GstBuffer *access_unit)
+prepend_prefix (GstNeighbourCodeEnc *self, GstBuffer *access_unit)
 {
+  GstNeighbourCodeEncPrivate *priv = self->priv;
   rangecast::AccessUnitHeader header;
   rangecast::SliceHeader slice;
   rangecast::UnitHeader unit;
@@ -390,8 +391,10 @@ prepend_prefix (GstNeighbourCodeEncPrivate *priv, GstBuffer *access_unit)
   if (first && rangecast::read_slice_header (*first, slice).ok ())
     header.capture_time_ns = slice.capture_time_ns;
   header.key = priv->is_key;
-  gst_buffer_prepend_memory (access_unit, priv->prefixes.make (header, GST_BUFFER_PTS (access_unit),
-                                              gst_buffer_get_size (access_unit)));
+  const GstClockTime time =
+      byte_stream_time (GST_BASE_TRANSFORM (self)->segment, GST_BUFFER_PTS (access_unit));
+  gst_buffer_prepend_memory (
+      access_unit, priv->prefixes.make (header, time, gst_buffer_get_size (access_unit)));
 }
 
 /* The encoder's next slice; empty after the last one. */
@@ -462,7 +465,7 @@ gst_neighbour_code_enc_generate_output (GstBaseTransform *base, GstBuffer **outp
     else
       *output = make_output (self, priv->encoder.parts ());
     if (*output && priv->writes_stream)
-      prepend_prefix (priv, *output);
+      prepend_prefix (self, *output);
     gst_clear_buffer (&priv->input);
   }
   return *output ? GST_FLOW_OK : GST_FLOW_ERROR;

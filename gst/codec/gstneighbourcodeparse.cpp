@@ -80,6 +80,7 @@ struct Stream {               /* streaming thread only */
   bool discont = false; /* bytes were dropped since the last buffer */
   bool ending = false;  /* push mode: EOS has arrived */
   bool in_sync = false; /* the last bytes were an access unit */
+  bool has_rig = false; /* the current access unit begins with rig views */
   bool warned_damage = false;
   gsize leading_rubbish = 0;
   rangecast::RigCollector collector; /* of the byte stream */
@@ -310,14 +311,16 @@ set_key (GstBuffer *buffer, bool key)
 
 /* The access unit in the byte stream; its own bytes are shared, not copied. */
 static GstBuffer *
-make_stream_buffer (Stream &stream, GstBuffer *access_unit, const AccessUnitHeader &header)
+make_stream_buffer (GstBaseParse *base, GstBuffer *access_unit, const AccessUnitHeader &header)
 {
+  StreamPrefixes &prefixes = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.prefixes;
   GstBuffer *buffer = gst_buffer_copy_region (access_unit,
       GstBufferCopyFlags (
           GST_BUFFER_COPY_FLAGS | GST_BUFFER_COPY_TIMESTAMPS | GST_BUFFER_COPY_MEMORY),
       0, gst_buffer_get_size (access_unit));
-  gst_buffer_prepend_memory (buffer, stream.prefixes.make (header, GST_BUFFER_PTS (access_unit),
-                                         gst_buffer_get_size (access_unit)));
+  const GstClockTime time = byte_stream_time (base->segment, GST_BUFFER_PTS (access_unit));
+  gst_buffer_prepend_memory (
+      buffer, prefixes.make (header, time, gst_buffer_get_size (access_unit)));
   return buffer;
 }
 
@@ -354,7 +357,7 @@ handle_access_unit (GstBaseParse *base, GstBaseParseFrame *frame)
   frame->buffer = gst_buffer_make_writable (frame->buffer);
   set_key (frame->buffer, header.key);
   if (stream.writes_stream)
-    frame->out_buffer = make_stream_buffer (stream, frame->buffer, header);
+    frame->out_buffer = make_stream_buffer (base, frame->buffer, header);
   return gst_base_parse_finish_frame (base, frame, gint (size));
 }
 
@@ -433,11 +436,14 @@ handle_units (GstBaseParse *base, Bytes units)
 {
   Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   stream.output.clear ();
+  stream.has_rig = false;
   UnitReader reader (units);
   UnitHeader header;
   gsize offset = kStreamPrefixSize;
   while (const auto unit = reader.next (header)) {
-    if (header.type == guint8 (UnitType::kRigView))
+    const bool is_rig_view = header.type == guint8 (UnitType::kRigView);
+    stream.has_rig |= is_rig_view && offset == kStreamPrefixSize;
+    if (is_rig_view)
       add_rig_view (base, *unit);
     else if (!stream.output.empty () &&
              stream.output.back ().offset + stream.output.back ().size == offset)
@@ -503,6 +509,25 @@ make_output (Stream &stream, GstBuffer *input, gsize length)
   return output;
 }
 
+/* In a segment of time from upstream, the base class sets upstream's time instead. */
+static void
+set_time (GstBaseParse *base, const GstBaseParseFrame *frame, const AccessUnitHeader &header,
+    GstBuffer *output)
+{
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  Stream &stream = priv->stream;
+  const rangecast::TakeList::Time time = priv->seek.time_of (
+      base, {guint64 (frame->offset), header, stream.has_rig}, stream.info.frame_duration ());
+  GST_BUFFER_PTS (output) = GST_BUFFER_DTS (output) = time.time_ns;
+  if (time.begins_take) {
+    GST_DEBUG_OBJECT (base,
+        "a take begins at byte %" G_GUINT64_FORMAT ": %" GST_TIME_FORMAT
+        " in the file is %" GST_TIME_FORMAT,
+        guint64 (frame->offset), GST_TIME_ARGS (header.pts_ns), GST_TIME_ARGS (time.time_ns));
+    stream.discont = true;
+  }
+}
+
 static GstFlowReturn
 finish_access_unit (
     GstBaseParse *base, GstBaseParseFrame *frame, const AccessUnitHeader &header, gsize length)
@@ -510,10 +535,8 @@ finish_access_unit (
   GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
   Stream &stream = priv->stream;
   GstBuffer *output = make_output (stream, frame->buffer, length);
-  const GstClockTime pts = priv->seek.time_of (base, header.pts_ns, stream.info.frame_duration ());
-  /* Without a time the base class interpolates. */
-  if (GST_CLOCK_TIME_IS_VALID (pts))
-    GST_BUFFER_PTS (output) = GST_BUFFER_DTS (output) = pts;
+  if (GST_CLOCK_TIME_IS_VALID (header.pts_ns)) /* else the base class interpolates */
+    set_time (base, frame, header, output);
   GST_BUFFER_DURATION (output) = stream.info.frame_duration ();
   set_key (output, header.key);
   if (stream.discont)
@@ -562,6 +585,7 @@ handle_access_unit_of_stream (GstBaseParse *base, GstBaseParseFrame *frame, cons
 static GstFlowReturn
 handle_stream (GstBaseParse *base, GstBaseParseFrame *frame)
 {
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
   GstMapInfo map;
   if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ))
     return refuse_unreadable_buffer (base);
@@ -572,10 +596,12 @@ handle_stream (GstBaseParse *base, GstBaseParseFrame *frame)
     handle_units (base, bytes.subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
   }
   gst_buffer_unmap (frame->buffer, &map);
-  if (GST_BASE_PARSE_LOST_SYNC (base))
-    GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.in_sync = false;
+  if (GST_BASE_PARSE_LOST_SYNC (base)) {
+    priv->stream.in_sync = false;
+    priv->seek.interrupt ();
+  }
   if (part.rubbish) {
-    if (GST_NEIGHBOUR_CODE_PARSE (base)->priv->seen == Seen::kSlices)
+    if (priv->seen == Seen::kSlices)
       warn_if_truncated (base, frame, part);
     warn_damage (base, frame, part);
     return drop_rubbish (base, frame, part.rubbish);

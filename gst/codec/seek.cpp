@@ -5,6 +5,9 @@
 
 #include "bytestreamindex.hpp"
 
+using rangecast::AccessUnitPlace;
+using rangecast::TakeList;
+
 bool
 NeighbourCodeSeek::reads_file (GstBaseParse *base)
 {
@@ -15,25 +18,21 @@ void
 NeighbourCodeSeek::reset ()
 {
   std::lock_guard guard (lock_);
-  first_pts_ = GST_CLOCK_TIME_NONE;
+  takes_ = {};
+  last_unit_.reset ();
   rig_offset_ = G_MAXUINT64;
   rig_units_ = {};
 }
 
 namespace {
 
-/* From the first time of a file to the end of its last access unit. */
-void
-find_duration (GstBaseParse *base, GstClockTime first_pts, GstClockTime frame_duration)
+/* To the end of the last access unit; none if its time is damaged. */
+GstClockTime
+duration_of (const TakeList &list, const AccessUnitPlace &last, GstClockTime frame_duration)
 {
-  GstClockTime duration =
-      NeighbourCodeFile (GST_BASE_PARSE_SINK_PAD (base), first_pts).last_time ();
-  if (!GST_CLOCK_TIME_IS_VALID (duration))
-    return; /* the base class estimates it */
-  if (GST_CLOCK_TIME_IS_VALID (frame_duration))
-    duration += frame_duration;
-  if (duration <= G_MAXINT64)
-    gst_base_parse_set_duration (base, GST_FORMAT_TIME, gint64 (duration), 0);
+  if (last.header.pts_ns < list.takes ()[list.index_at (last.offset)].pts_ns)
+    return GST_CLOCK_TIME_NONE;
+  return list.time_of (last.offset, last.header.pts_ns) + frame_duration;
 }
 
 /* Where the segment of a seek will end: G_MAXINT64 if it is open. */
@@ -47,23 +46,47 @@ end_of (GstBaseParse *base, GstSeekType stop_type, gint64 stop)
 
 } // namespace
 
-GstClockTime
-NeighbourCodeSeek::time_of (GstBaseParse *base, guint64 pts_ns, GstClockTime frame_duration)
+/* The takes and the end of a file whose first access unit is here. */
+void
+NeighbourCodeSeek::index_file (GstBaseParse *base, guint64 offset, GstClockTime frame_duration)
 {
-  if (!GST_CLOCK_TIME_IS_VALID (pts_ns))
-    return GST_CLOCK_TIME_NONE;
-  bool first = false;
-  GstClockTime first_pts;
+  NeighbourCodeFile file (GST_BASE_PARSE_SINK_PAD (base));
+  TakeList takes = file.takes (offset, frame_duration);
+  auto last_unit = file.last ();
+  std::lock_guard guard (lock_);
+  takes_ = std::move (takes);
+  takes_.interrupt ();
+  last_unit_ = std::move (last_unit);
+}
+
+TakeList::Time
+NeighbourCodeSeek::time_of (
+    GstBaseParse *base, const AccessUnitPlace &unit, GstClockTime frame_duration)
+{
+  if (!GST_CLOCK_TIME_IS_VALID (frame_duration))
+    frame_duration = 0;
+  const bool is_first = takes_.empty (); /* which changes in this thread only */
+  if (is_first && reads_file (base))
+    index_file (base, unit.offset, frame_duration);
+  TakeList::Time time;
+  GstClockTime duration = GST_CLOCK_TIME_NONE; /* the base class estimates it */
   {
     std::lock_guard guard (lock_);
-    first = !GST_CLOCK_TIME_IS_VALID (first_pts_);
-    if (first)
-      first_pts_ = pts_ns;
-    first_pts = first_pts_;
+    const gsize known = takes_.takes ().size ();
+    time = takes_.add (unit, frame_duration);
+    if (last_unit_ && (is_first || takes_.takes ().size () != known))
+      duration = duration_of (takes_, *last_unit_, frame_duration);
   }
-  if (first && reads_file (base))
-    find_duration (base, first_pts, frame_duration);
-  return pts_ns >= first_pts ? pts_ns - first_pts : 0;
+  if (duration <= G_MAXINT64)
+    gst_base_parse_set_duration (base, GST_FORMAT_TIME, gint64 (duration), 0);
+  return time;
+}
+
+void
+NeighbourCodeSeek::interrupt ()
+{
+  std::lock_guard guard (lock_);
+  takes_.interrupt ();
 }
 
 std::vector<guint8>
@@ -82,15 +105,12 @@ GstClockTime
 NeighbourCodeSeek::find_place (
     GstBaseParse *base, GstClockTime time, GstClockTime stop, GstSeekFlags flags)
 {
-  GstClockTime first = GST_CLOCK_TIME_NONE;
+  TakeList takes;
   {
     std::lock_guard guard (lock_);
-    first = first_pts_;
+    takes = takes_;
   }
-  if (!GST_CLOCK_TIME_IS_VALID (first))
-    return GST_CLOCK_TIME_NONE;
-  NeighbourCodeFile file (GST_BASE_PARSE_SINK_PAD (base), first);
-  auto place = file.find (time, stop, flags);
+  auto place = NeighbourCodeFile (GST_BASE_PARSE_SINK_PAD (base)).find (takes, time, stop, flags);
   if (!place)
     return GST_CLOCK_TIME_NONE;
   {

@@ -42,6 +42,15 @@ StreamPrefixes::make (rangecast::AccessUnitHeader header, GstClockTime pts, gsiz
   return gst_memory_new_wrapped (GstMemoryFlags (0), bytes, size, 0, size, bytes, g_free);
 }
 
+GstClockTime
+byte_stream_time (const GstSegment &segment, GstClockTime pts)
+{
+  if (segment.format != GST_FORMAT_TIME || !GST_CLOCK_TIME_IS_VALID (pts))
+    return pts;
+  guint64 time = 0;
+  return gst_segment_to_running_time_full (&segment, GST_FORMAT_TIME, pts, &time) > 0 ? time : 0;
+}
+
 const char *
 preferred_alignment (GstPad *source, const char *otherwise)
 {

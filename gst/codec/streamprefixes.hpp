@@ -21,6 +21,7 @@ public:
     return rangecast::kMaxAccessUnitSize - rig_.size ();
   }
   /** @param header       `capture_time_ns` and `key`; the others are filled in
+   *  @param pts          in the byte stream: see byte_stream_time()
    *  @param access_unit  bytes, at most max_access_unit()
    *  @return (transfer full) */
   GstMemory *make (rangecast::AccessUnitHeader header, GstClockTime pts, gsize access_unit);
@@ -31,6 +32,10 @@ private:
   std::vector<guint8> rig_;
   GstClockTime last_rig_ = GST_CLOCK_TIME_NONE;
 };
+
+/** The time in a byte stream of a buffer's PTS: its running time, so that times go on in a new
+ *  segment, as those of concat. 0 before the segment. */
+GstClockTime byte_stream_time (const GstSegment &segment, GstClockTime pts);
 
 /** Alignment of a source pad's coded frame sets: access-unit, slice or byte-stream, the first that
  *  the peer's caps name.

@@ -412,6 +412,90 @@ GST_START_TEST (test_access_units_pass_where_nothing_fits)
 }
 GST_END_TEST;
 
+/* The time in the header of an access unit of a byte stream. */
+static guint64
+written_time (GstBuffer *written)
+{
+  const auto bytes = bytes_of (written);
+  AccessUnitHeader header;
+  fail_unless (begins_access_unit (bytes, header));
+  return header.pts_ns;
+}
+
+/* Both elements that write byte streams; the segments are those of concat. */
+GST_START_TEST (test_written_times_go_on_in_a_new_segment)
+{
+  const Recording recording (2);
+  const auto info = gstrange::make_info (recording.rig, 25, 1);
+  for (const char *name : {"neighbourcodeparse", "neighbourcodeenc"}) {
+    const bool encodes = g_str_equal (name, "neighbourcodeenc");
+    GstHarness *h = gst_harness_new (name);
+    gst_harness_set_sink_caps_str (h, kStreamCaps);
+    gst_harness_set_src_caps (h, encodes
+                                     ? gstrange::make_range_caps (info)
+                                     : gstrange::make_neighbour_code_caps (info, "access-unit"));
+    for (const GstClockTime base : {0, 7, 2}) {
+      GstSegment segment;
+      gst_segment_init (&segment, GST_FORMAT_TIME);
+      segment.base = base * GST_SECOND;
+      segment.start = segment.time = GST_SECOND + kFrame / 2;
+      gst_harness_push_event (h, gst_event_new_segment (&segment));
+      for (gsize i = 0; i < 2; i++) {
+        const GstClockTime pts = GST_SECOND + i * kFrame;
+        GstBuffer *written =
+            gst_harness_push_and_pull (h, encodes ? make_frame_set (recording.rig, pts)
+                                                  : gst_buffer_ref (recording.access_units[i]));
+        fail_unless_equals_uint64 (GST_BUFFER_PTS (written), pts);
+        const GstClockTime begin = base * GST_SECOND; /* where the first one is not yet */
+        fail_unless_equals_uint64 (written_time (written),
+            i > 0 ? begin + kFrame / 2 : begin - std::min (begin, kFrame / 2));
+        gst_buffer_unref (written);
+      }
+    }
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_byte_stream_in_segments_of_time_keeps_upstreams_times)
+{
+  const Recording recording;
+  GstHarness *h = gst_harness_new ("neighbourcodeparse");
+  gst_harness_set_src_caps_str (h, kStreamCaps);
+  for (const GstClockTime base : {0, 3}) {
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_TIME);
+    segment.base = base * GST_SECOND;
+    gst_harness_push_event (h, gst_event_new_segment (&segment));
+    for (gsize i = 0; i < 10; i++) {
+      const gsize begin = recording.offsets[i],
+                  end = i < 9 ? recording.offsets[i + 1] : recording.bytes.size ();
+      GstBuffer *buffer = gst_buffer_new_memdup (&recording.bytes[begin], end - begin);
+      GST_BUFFER_PTS (buffer) = 5 * GST_SECOND + i * kFrame;
+      GstBuffer *parsed = gst_harness_push_and_pull (h, buffer);
+      fail_unless_equals_uint64 (GST_BUFFER_PTS (parsed), 5 * GST_SECOND + i * kFrame);
+      gst_buffer_unref (parsed);
+    }
+  }
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_each_take_begins_with_discont)
+{
+  const Recording recording;
+  auto bytes = recording.bytes;
+  bytes.insert (bytes.end (), recording.bytes.begin (), recording.bytes.end ());
+  auto parsed = parse (bytes, 5000);
+  fail_unless_equals_int (parsed.size (), 20);
+  for (gsize i = 0; i < 20; i++) {
+    fail_unless_equals_uint64 (GST_BUFFER_PTS (parsed[i]), i * kFrame);
+    fail_unless_equals_int (GST_BUFFER_IS_DISCONT (parsed[i]), i % 10 == 0);
+  }
+  unref_all (parsed);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_typefinder_leaves_what_it_does_not_know)
 {
   const Recording recording (1, 8);
@@ -467,6 +551,9 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_access_units_pass_as_they_are_where_they_are_wanted);
   tcase_add_test (tc, test_access_units_become_a_byte_stream_where_anything_will_do);
   tcase_add_test (tc, test_access_units_pass_where_nothing_fits);
+  tcase_add_test (tc, test_written_times_go_on_in_a_new_segment);
+  tcase_add_test (tc, test_byte_stream_in_segments_of_time_keeps_upstreams_times);
+  tcase_add_test (tc, test_each_take_begins_with_discont);
   tcase_add_test (tc, test_typefinder_leaves_what_it_does_not_know);
   tcase_add_test (tc, test_typefinder_knows_the_stream);
   return suite;

@@ -227,6 +227,96 @@ GST_START_TEST (test_error_after_a_seek_in_a_file_is_posted_too)
 }
 GST_END_TEST;
 
+static std::vector<guint8>
+join (std::vector<guint8> bytes, const std::vector<guint8> &more)
+{
+  bytes.insert (bytes.end (), more.begin (), more.end ());
+  return bytes;
+}
+
+/* Whether all access units came, one frame after another. */
+static bool
+came_evenly (const std::vector<GstClockTime> &seen, gsize frames)
+{
+  for (gsize i = 0; i < seen.size (); i++)
+    if (seen[i] != i * kFrame)
+      return false;
+  return seen.size () == frames;
+}
+
+GST_START_TEST (test_takes_of_a_file_follow_each_other)
+{
+  const Recording first (30, 16), second (20, 16, 3 * GST_SECOND), third (1, 16, 0);
+  const auto bytes = join (join (join (first.bytes, first.bytes), with_times_from (second, 0)),
+      join (third.bytes, third.bytes));
+  const TemporaryFile file (bytes);
+  for (const char *between : {"", "queue !"}) {
+    Player player (file, between);
+    fail_unless (player.wait ());
+    if (!*between)
+      fail_unless_equals_int64 (player.duration (), 82 * kFrame);
+    fail_unless (player.finish ());
+    fail_unless (came_evenly (player.seen, 82), "%s", between);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_seek_finds_its_take_and_the_rig_there)
+{
+  const Recording first (40, 64), second (40, 32);
+  const TemporaryFile file (join (first.bytes, second.bytes));
+  Player player (file);
+  for (const int flags : {int (GST_SEEK_FLAG_KEY_UNIT), int (GST_SEEK_FLAG_ACCURATE)})
+    for (const GstClockTime frame : {50, 10, 39, 40, 79, 0}) { /* which 50 and 79 have no rig */
+      fail_unless (player.seek (frame * kFrame, flags));
+      fail_unless_equals_uint64 (player.shown (), frame * kFrame);
+      fail_unless_equals_int64 (player.position (), frame * kFrame);
+      fail_unless_equals_int (player.widths.back (), frame < 40 ? 64 : 32);
+    }
+  fail_unless (player.finish ());
+  fail_unless_equals_int (player.seen.size (), 80);
+  fail_unless_equals_uint64 (player.seen.back (), 79 * kFrame);
+}
+GST_END_TEST;
+
+/* 30 seconds of 1.2 MB each: longer than what is searched access unit by access unit. */
+GST_START_TEST (test_seek_in_a_long_file_of_two_takes_finds_its_take)
+{
+  const Recording recording (100, 160);
+  auto take = recording.bytes;
+  for (int i = 1; take.size () < (6 << 20); i++)
+    take = join (take, with_times_from (recording, GST_SECOND + i * 100 * kFrame));
+  const auto frames = GstClockTime (take.size () / recording.bytes.size () * 100);
+  const TemporaryFile file (join (take, take));
+  Player player (file);
+  fail_unless (player.wait ());
+  fail_unless_equals_int64 (player.duration (), 2 * frames * kFrame);
+  for (const GstClockTime frame :
+      {frames - 1, frames, frames + 1, 2 * frames - 1, frames / 2, frames * 3 / 2}) {
+    fail_unless (player.seek (frame * kFrame, GST_SEEK_FLAG_KEY_UNIT));
+    fail_unless_equals_uint64 (player.shown (), frame * kFrame);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_damaged_time_moves_no_other_access_unit)
+{
+  const Recording recording (20, 16);
+  for (const char *between : {"", "queue !"})
+    for (const gsize damaged : {9, 10, 18})
+      for (const int bit : {29, 30, 32, 40, 60, 63}) {
+        auto bytes = recording.bytes;
+        bytes[recording.offsets[damaged] + 12 + gsize (bit / 8)] ^= guint8 (1 << bit % 8);
+        const TemporaryFile file (bytes);
+        Player player (file, between);
+        fail_unless (player.finish ());
+        fail_unless_equals_int (player.seen.size (), 20);
+        player.seen[damaged] = damaged * kFrame;
+        fail_unless (came_evenly (player.seen, 20), "bit %d of %d", bit, int (damaged));
+      }
+}
+GST_END_TEST;
+
 /* The byte stream of a person who moves, temporal, with a key access unit every fifth. */
 static std::vector<guint8>
 temporal_stream (const Scene &scene, const char *profile)
@@ -318,6 +408,10 @@ neighbourcodeseek_suite ()
   tcase_add_test (tc, test_pushed_file_is_sought_by_time_too);
   tcase_add_test (tc, test_reverse_playback_is_refused);
   tcase_add_test (tc, test_error_after_a_seek_in_a_file_is_posted_too);
+  tcase_add_test (tc, test_takes_of_a_file_follow_each_other);
+  tcase_add_test (tc, test_seek_finds_its_take_and_the_rig_there);
+  tcase_add_test (tc, test_seek_in_a_long_file_of_two_takes_finds_its_take);
+  tcase_add_test (tc, test_damaged_time_moves_no_other_access_unit);
   tcase_add_test (tc, test_seek_in_a_temporal_file_shows_all_pixels_right_from_there_on);
   return suite;
 }

@@ -177,11 +177,11 @@ TakeList::remove_damaged ()
 }
 
 TakeList::Time
-TakeList::add (const AccessUnitPlace &unit, std::uint64_t frame_ns, std::uint64_t start_ns)
+TakeList::add (const AccessUnitPlace &unit, std::uint64_t frame_ns)
 {
   const std::uint64_t pts = unit.header.pts_ns;
   if (takes_.empty ())
-    takes_.push_back ({unit.offset, pts, start_ns});
+    takes_.push_back ({unit.offset, pts, 0});
   if (std::exchange (is_new_, false) && current_ != kNone && pts > before_)
     remove_damaged ();
   bool begins_take = false;

@@ -53,19 +53,18 @@ struct Take {
   std::uint64_t time_ns = 0; ///< of that one, on the time line of the whole stream
 };
 
-/** The time line of a byte stream, on which each take follows the one before it. A take begins
- * where presentation times go back, or where one is repeated with a rig. One damaged time begins no
- *  take: the access unit after it continues the old one. */
+/** The time line of a byte stream, on which each take follows the one before it. Where times go
+ *  back, or one is repeated with a rig, a take begins. One damaged time begins none: the access unit
+ *  after it continues the old take. */
 class TakeList {
 public:
   struct Time {
     std::uint64_t time_ns;
     bool begins_take; ///< and is not the stream's first one
   };
-  /** Adds the next access unit, which has a time. The first one begins the time line.
-   *  @param start_ns  where the time line begins
+  /** Adds the next access unit, which has a time. The first one has time 0.
    *  @param frame_ns  from the last access unit of a take to the next take */
-  Time add (const AccessUnitPlace &unit, std::uint64_t frame_ns, std::uint64_t start_ns = 0);
+  Time add (const AccessUnitPlace &unit, std::uint64_t frame_ns);
   /** The next access unit does not follow the one before, as after a seek. */
   void interrupt () { current_ = kNone; }
 
@@ -105,9 +104,8 @@ public:
   /** The last access unit. */
   std::optional<AccessUnitPlace> last ();
 
-  /** The takes from an offset on. All of a file of up to 8 MiB. In a longer one, those that take at
-   * least a 32nd of it are found, by bisection; of shorter ones, only some. Empty if there are no
-   * times. */
+  /** The takes from an offset on: all of a file of up to 8 MiB; in a longer one, by bisection, those
+   *  that are at least a 32nd of it and a few of the shorter ones. Empty if there are no times. */
   TakeList takes (std::uint64_t begin, std::uint64_t frame_ns);
 
   struct Target {
