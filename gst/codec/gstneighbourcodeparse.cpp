@@ -65,7 +65,7 @@ using Bytes = std::span<const guint8>;
 constexpr gsize kMaxLeadingRubbish = 2 << 20;
 
 /* What was found in the stream so far; selects the error text at its end. */
-enum class Seen { kNothing, kAccessUnit, kRig, kSlices };
+enum class Seen { kNothing, kBytes, kUnit, kAccessUnit, kRig, kSlices };
 
 /* Some bytes of the input. */
 struct Range {
@@ -202,13 +202,22 @@ gst_neighbour_code_parse_set_sink_caps (GstBaseParse *base, GstCaps *caps)
 
 /* ---- errors ---- */
 
+static constexpr const char *kNoAccessUnit =
+    "No access unit found: expected a neighbour code byte stream of version 3, which begins with "
+    "the start code 00 52 43 55";
+
 static std::string
 missing_data_text (const GstNeighbourCodeParsePrivate *priv)
 {
   switch (priv->seen) {
     case Seen::kNothing:
-      return "No access unit found: expected a neighbour code byte stream of version 3, which "
-             "begins with the start code 00 52 43 55";
+      return "No data arrived: expected a neighbour code byte stream";
+    case Seen::kBytes:
+      return kNoAccessUnit;
+    case Seen::kUnit:
+      return std::string (kNoAccessUnit) +
+             "; these are access units without it: written without neighbourcodeparse before "
+             "filesink?";
     case Seen::kAccessUnit:
       if (!priv->stream.too_large.empty ())
         return "The rig is too large: " + priv->stream.too_large;
@@ -372,6 +381,19 @@ drop (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
   return gst_base_parse_finish_frame (base, frame, gint (size));
 }
 
+/* What a stream begins with. A slice or rig view in front of any access unit is a hint only. */
+static Seen
+first_seen (Bytes bytes)
+{
+  UnitHeader unit;
+  (void)rangecast::read_unit_header (bytes, unit); /* kTruncated, but the header is read */
+  const bool is_known =
+      unit.type == guint8 (UnitType::kSlice) || unit.type == guint8 (UnitType::kRigView);
+  const bool is_unit = is_known && unit.version == rangecast::kBitstreamVersion && unit.flags < 8 &&
+                       unit.size >= rangecast::kSliceHeaderSize;
+  return is_unit ? Seen::kUnit : Seen::kBytes;
+}
+
 /* Posts the first damage of a stream: bytes after an access unit, neither after a seek nor at the
  * end, which warn_if_truncated() reports. */
 static void
@@ -397,7 +419,7 @@ drop_rubbish (GstBaseParse *base, GstBaseParseFrame *frame, gsize size)
   GST_WARNING_OBJECT (base,
       "%" G_GSIZE_FORMAT " bytes at %" G_GUINT64_FORMAT " are not an access unit", size,
       guint64 (frame->offset));
-  if (priv->seen == Seen::kNothing) {
+  if (priv->seen < Seen::kAccessUnit) {
     priv->stream.leading_rubbish += size;
     if (priv->stream.leading_rubbish > kMaxLeadingRubbish) {
       post_missing_data (base);
@@ -590,6 +612,8 @@ handle_stream (GstBaseParse *base, GstBaseParseFrame *frame)
   if (!gst_buffer_map (frame->buffer, &map, GST_MAP_READ))
     return refuse_unreadable_buffer (base);
   const Bytes bytes (map.data, map.size);
+  if (priv->seen == Seen::kNothing)
+    priv->seen = first_seen (bytes);
   const StreamPart part = rangecast::next_part (bytes, GST_BASE_PARSE_DRAINING (base));
   if (part.length) {
     use_rig_of_seek (base, guint64 (frame->offset));
@@ -644,6 +668,16 @@ gst_neighbour_code_parse_src_event (GstBaseParse *base, GstEvent *event)
   return GST_BASE_PARSE_CLASS (gst_neighbour_code_parse_parent_class)->src_event (base, event);
 }
 
+/* An empty file. Where nothing has arrived otherwise, as from a network, it is not an error here.
+ */
+static bool
+upstream_is_empty (GstBaseParse *base)
+{
+  gint64 size = -1;
+  return gst_pad_peer_query_duration (GST_BASE_PARSE_SINK_PAD (base), GST_FORMAT_BYTES, &size) &&
+         size == 0;
+}
+
 static void
 finish_stream (GstBaseParse *base)
 {
@@ -652,7 +686,9 @@ finish_stream (GstBaseParse *base)
   if (base->segment.rate > 0)
     gst_base_parse_drain (base);
   priv->stream.ending = false;
-  if (priv->stream.reads_stream && priv->seen != Seen::kSlices && !priv->stream.had_gaps)
+  if (!priv->stream.reads_stream || priv->seen == Seen::kSlices || priv->stream.had_gaps)
+    return;
+  if (priv->seen != Seen::kNothing || upstream_is_empty (base))
     post_missing_data (base);
 }
 

@@ -274,7 +274,43 @@ expect_one_error (std::span<const guint8> bytes, const char *expected)
 
 GST_START_TEST (test_empty_file_is_one_error)
 {
-  expect_one_error ({}, "start code 00 52 43 55");
+  expect_one_error ({}, "No data arrived");
+}
+GST_END_TEST;
+
+/* As with udpsrc, a jitter buffer and a depayloader that nobody sends to. */
+GST_START_TEST (test_end_without_any_data_is_no_error)
+{
+  for (const bool has_segment : {false, true}) {
+    GstHarness *h = harness_of ("neighbourcodeparse");
+    {
+      ErrorCounter counter (h);
+      gst_harness_push_event (h, gst_event_new_stream_start ("none"));
+      GstSegment segment;
+      gst_segment_init (&segment, GST_FORMAT_TIME);
+      if (has_segment)
+        gst_harness_push_event (h, gst_event_new_segment (&segment));
+      gst_harness_push_event (h, gst_event_new_eos ());
+      fail_unless_equals_int (counter.take (), 0);
+    }
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_access_units_in_a_file_are_one_error_with_a_hint)
+{
+  const Recording recording (2, 64);
+  expect_one_error (bytes_of (recording.access_units[0]), "written without neighbourcodeparse");
+  std::vector<guint8> rig;
+  write_rig_units ({recording.rig, 25, 1}, rig);
+  expect_one_error (rig, "written without neighbourcodeparse");
+  for (const std::string other : {"1. A list\n2. of two", "2021"}) {
+    const auto texts =
+        errors_of ({reinterpret_cast<const guint8 *> (other.data ()), other.size ()}, "");
+    fail_unless_equals_int (texts.size (), 1);
+    fail_unless (texts[0].find ("filesink") == std::string::npos, "%s", texts[0].c_str ());
+  }
 }
 GST_END_TEST;
 
@@ -401,7 +437,7 @@ GST_START_TEST (test_error_that_is_put_better_keeps_its_seqnum_and_details)
   gst_message_parse_error_details (message, &details);
   fail_unless (details && gst_structure_has_field_typed (details, "n", G_TYPE_INT));
   gst_message_parse_error (message, &error, nullptr);
-  fail_unless (g_str_has_prefix (error->message, "No access unit found"));
+  fail_unless (g_str_has_prefix (error->message, "No data arrived"));
   g_error_free (error);
   gst_message_unref (message);
   gst_element_set_bus (h->element, nullptr);
@@ -428,6 +464,8 @@ neighbourcodeparsefaults_suite (void)
   tcase_add_test (tc, test_damage_is_told_by_discont);
   tcase_add_test (tc, test_lost_header_of_a_long_access_unit_is_no_error);
   tcase_add_test (tc, test_empty_file_is_one_error);
+  tcase_add_test (tc, test_end_without_any_data_is_no_error);
+  tcase_add_test (tc, test_access_units_in_a_file_are_one_error_with_a_hint);
   tcase_add_test (tc, test_other_file_is_one_error);
   tcase_add_test (tc, test_future_version_is_one_error);
   tcase_add_test (tc, test_file_cut_before_its_first_slice_is_one_error);
