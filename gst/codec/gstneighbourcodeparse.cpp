@@ -64,6 +64,12 @@ using Bytes = std::span<const guint8>;
  */
 constexpr gsize kMaxLeadingRubbish = 2 << 20;
 
+/* The typefinder looks for an access unit in so many bytes. If it is not at their beginning, H.264
+ * and MPEG, which find start codes of theirs in the rest of an access unit, are less likely, but an
+ * archive that holds a recording is more likely. */
+constexpr guint kTypefindBytes = 65536;
+constexpr auto kProbabilityOfCutStream = GstTypeFindProbability (GST_TYPE_FIND_LIKELY - 1);
+
 /* What was found in the stream so far; selects the error text at its end. */
 enum class Seen { kNothing, kBytes, kUnit, kAccessUnit, kRig, kSlices };
 
@@ -121,15 +127,56 @@ G_DEFINE_TYPE (GstNeighbourCodeParse, gst_neighbour_code_parse, GST_TYPE_BASE_PA
 
 /* ---- typefinder ---- */
 
+/* Whether an access unit begins here, up to the header of its first unit. */
+static bool
+begins_stream (Bytes bytes)
+{
+  AccessUnitHeader header;
+  UnitHeader unit;
+  if (bytes.size () < kStreamPrefixSize + rangecast::kUnitHeaderSize ||
+      !rangecast::begins_access_unit (bytes, header))
+    return false;
+  (void)rangecast::read_unit_header (
+      bytes.subspan (kStreamPrefixSize), unit); /* kTruncated, but the header is read */
+  const bool is_known =
+      unit.type == guint8 (UnitType::kSlice) || unit.type == guint8 (UnitType::kRigView);
+  return is_known && unit.version == rangecast::kBitstreamVersion && unit.size <= header.size;
+}
+
+/* Where a stream was cut: an access unit within the first bytes, which any other type that is sure
+ * of itself overrules. */
+static bool
+has_access_unit (GstTypeFind *find)
+{
+  const guint64 length = gst_type_find_get_length (find); /* 0 = unknown */
+  guint size = kTypefindBytes;
+  if (length > 0)
+    size = guint (std::min<guint64> (size, length));
+  const guint8 *data = nullptr;
+  while (size >= kStreamPrefixSize && !(data = gst_type_find_peek (find, 0, size)))
+    size /= 2;
+  const auto end = data + (data ? size : 0);
+  for (auto at = data; at != end; ++at) {
+    at = std::search (at, end, rangecast::kStartCode.begin (), rangecast::kStartCode.end ());
+    if (at == end)
+      break;
+    if (begins_stream ({at, end}))
+      return true;
+  }
+  return false;
+}
+
 static void
 find_type (GstTypeFind *find, gpointer)
 {
   const guint8 *data = gst_type_find_peek (find, 0, kStreamPrefixSize);
   AccessUnitHeader header;
-  if (!data || !rangecast::begins_access_unit ({data, kStreamPrefixSize}, header))
+  const bool is_at_start =
+      data && rangecast::begins_access_unit ({data, kStreamPrefixSize}, header);
+  if (!is_at_start && !has_access_unit (find))
     return;
   GstCaps *caps = gst_caps_from_string (STREAM_CAPS);
-  gst_type_find_suggest (find, GST_TYPE_FIND_MAXIMUM, caps);
+  gst_type_find_suggest (find, is_at_start ? GST_TYPE_FIND_MAXIMUM : kProbabilityOfCutStream, caps);
   gst_caps_unref (caps);
 }
 

@@ -496,6 +496,23 @@ GST_START_TEST (test_each_take_begins_with_discont)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_typefinder_knows_a_stream_that_was_cut)
+{
+  const Recording recording;
+  for (const gsize cut : {1, 5, 28, 5000}) {
+    const auto rest = std::span (recording.bytes).subspan (cut);
+    GstTypeFindProbability probability;
+    GstCaps *caps =
+        gst_type_find_helper_for_data (nullptr, rest.data (), rest.size (), &probability);
+    fail_unless (caps && gst_structure_has_name (
+                             gst_caps_get_structure (caps, 0), "video/x-neighbour-code"));
+    ck_assert_int_gt (probability, GST_TYPE_FIND_POSSIBLE); /* that of H.264 here */
+    ck_assert_int_lt (probability, GST_TYPE_FIND_LIKELY);   /* that of archives */
+    gst_caps_unref (caps);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_typefinder_leaves_what_it_does_not_know)
 {
   const Recording recording (1, 8);
@@ -554,6 +571,7 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_written_times_go_on_in_a_new_segment);
   tcase_add_test (tc, test_byte_stream_in_segments_of_time_keeps_upstreams_times);
   tcase_add_test (tc, test_each_take_begins_with_discont);
+  tcase_add_test (tc, test_typefinder_knows_a_stream_that_was_cut);
   tcase_add_test (tc, test_typefinder_leaves_what_it_does_not_know);
   tcase_add_test (tc, test_typefinder_knows_the_stream);
   return suite;
