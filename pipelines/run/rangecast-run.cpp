@@ -13,6 +13,7 @@
 
 #include <clocale>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -32,6 +33,7 @@ struct Runner {
   std::unique_ptr<RunMeasure> measure;
   std::unique_ptr<StatsSender> stats;
   std::unique_ptr<LatencyTrace> trace;
+  std::set<int> learning; /* view-ids whose background is being learnt */
   bool failed = false;
   bool ending = false;
   bool looping = false;
@@ -65,9 +67,10 @@ report_recovery (GstMessage *message)
   }
 }
 
-/* When people should leave the picture, and when they may come back. */
+/* When nobody should be in the picture, and when people may come back. While roiextract skips
+ * frames before it learns, it posts 0 frames. */
 void
-report_learning (GstMessage *message)
+report_learning (Runner &runner, GstMessage *message)
 {
   const GstStructure *structure = gst_message_get_structure (message);
   int view_id = 0, frames = 0, of = 0;
@@ -75,11 +78,13 @@ report_learning (GstMessage *message)
       !gst_structure_get (structure, "view-id", G_TYPE_INT, &view_id, "frames", G_TYPE_INT, &frames,
           "of", G_TYPE_INT, &of, nullptr))
     return;
-  if (frames >= of)
+  if (frames >= of) {
     g_print ("view %d: the background is learnt\n", view_id);
-  else if (frames <= 1)
+    runner.learning.erase (view_id);
+  } else if (frames > 0 && runner.learning.insert (view_id).second) {
     g_print ("view %d: learning the background from %d frames; nobody should be in the picture\n",
         view_id, of);
+  }
 }
 
 /* Where browsers find the stream. */
@@ -140,7 +145,7 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
     case GST_MESSAGE_ELEMENT:
       report_recovery (message);
       report_address (message);
-      report_learning (message);
+      report_learning (*runner, message);
       if (runner->stats)
         runner->stats->take (message);
       break;
