@@ -26,7 +26,7 @@ usage: demo.sh [options]
   --port N      first of views + 2 UDP ports (default 18400)
   --window      also show it in a window
   --web [PORT]  show it in a browser instead, until interrupted: prints a link to a page that this machine
-                serves (port 8080), and one to a dashboard of the rig
+                serves (port 8080), and one to a dashboard of the rig; writes no picture, video or report
   --no-film     do not write avatar.webm, whose encoding takes CPU time
   --trace       write the time at which each buffer passed each pad to DIR/log/HOST.trace, for
                 tests/bench/latency-budget.py
@@ -195,10 +195,15 @@ start parent pipelines/parent-host.sh --views "$views" --listen "$parent_port" -
   ${jitter:+--jitter "$jitter"} ${latency:+--latency "$latency"} ${mtu:+--mtu "$mtu"}
 
 if [ -n "$web" ]; then
+  for file in avatar.png avatar.webm report.json; do
+    [ ! -e "$out/$file" ] || echo "$out/$file is of an earlier run"
+  done
   RANGECAST_HOST=web-server pipelines/web-server.sh --listen "$viewer_port" --port "$web" --stats "$stats_port" ${jitter:+--jitter "$jitter"} \
     --title "gst-rangecast: $views stereo cameras" > >(
     trap '' INT TERM # ends at the end of its input
+    hint="open the first link in a browser, or the second one for a dashboard of the rig; Ctrl-C ends the demo:"
     while IFS= read -r line; do
+      [[ "$line" != http* ]] || [ -z "$hint" ] || { echo "$hint"; hint=; }
       printf '%s\n' "$line"
       [[ "$line" != http* ]] || echo "${line}rig"
     done
