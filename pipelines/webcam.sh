@@ -18,12 +18,13 @@ usage: webcam.sh [--device /dev/videoN] [--rig FILE] [options] [-- options of ca
   --calibrate WHAT  the pictures for that, as --side-by-side of calibrate.sh (default: those of the camera)
   --learn N       number of frames from which the background is learnt: leave the picture until a line says that it is
                   (default 0: keep everything between near and far)
+  --settle N      number of frames to skip before that, while you leave and exposure settles (default: 10 s of --device)
   --depth WHAT    properties of stereodepth, e.g. "near=0.4 far=1.5" (default: near and far of the rig)
   --png FILE      write one picture instead of opening a window: the first one, or with --learn the 30th with somebody in it
 END
 }
 
-device=/dev/video0 input= packing=side-by-side size=1280x480 fps=30 rig=webcam.yaml calibrate= learn=0 depth= png=
+device=/dev/video0 input= packing=side-by-side size=1280x480 fps=30 rig=webcam.yaml calibrate= learn=0 settle= depth= png=
 while [ $# -gt 0 ]; do
   option=$1
   case "$1" in
@@ -35,6 +36,7 @@ while [ $# -gt 0 ]; do
     --rig) rig=${2:-}; shift ;;
     --calibrate) calibrate=${2:-}; shift ;;
     --learn) learn=${2:-}; shift ;;
+    --settle) settle=${2:-}; shift ;;
     --depth) depth=${2:-}; shift ;;
     --png) png=${2:-}; shift ;;
     --) shift; break ;;
@@ -45,7 +47,11 @@ while [ $# -gt 0 ]; do
 done
 need_size "$size" --size
 need_number "$fps" --fps 1 1000
-need_number "$learn" --learn 0 100000
+need_number "$learn" --learn 0 10000
+if [ -z "$settle" ]; then
+  [ -n "$input" ] && settle=0 || settle=$((10 * fps))
+fi
+need_number "$settle" --settle 0 100000
 case "$packing" in
   side-by-side | top-bottom) ;;
   *) die "--packing: expected side-by-side or top-bottom, got '$packing'" ;;
@@ -78,7 +84,10 @@ fi
 
 split_elements "$input" v4l2src --input
 person=()
-[ "$learn" = 0 ] || person=(! roiextract "background-frames=$learn")
+if [ "$learn" != 0 ]; then
+  person=(! roiextract "settle-frames=$settle" "background-frames=$learn")
+  [ "$settle" = 0 ] || echo "leave the picture now; learning the background begins in about $(((settle + fps - 1) / fps)) s"
+fi
 view=("${words[@]}" ! queue max-size-buffers=2 ! depth.left
   stereodepth name=depth "packing=$packing" "rig=$rig" "${depth[@]}" "${person[@]}")
 picture=(! rangerender ! video/x-raw,width=640,height=480)
@@ -90,7 +99,7 @@ fi
 # and writes the last one.
 frames=1 patience=30 reason="nothing came from the camera"
 if [ "$learn" != 0 ]; then
-  frames=30 patience=$((60 + 2 * learn)) reason+=", or nobody came into the picture after the background was learnt"
+  frames=30 patience=$((60 + 2 * learn + settle)) reason+=", or nobody came into the picture after the background was learnt"
 fi
 RANGECAST_LAUNCH="${RANGECAST_LAUNCH:-rangecast-run} --frames $frames --timeout $patience --snapshot $(printf %q "$png")"
 exec 2> >(
