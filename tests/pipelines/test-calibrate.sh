@@ -94,6 +94,8 @@ test_webcam_learns_the_background_before_it_writes_a_picture () {
   grep -q "learning the background from 6 frames" said.txt || fail "$(cat said.txt)"
   grep -q "the background is learnt" said.txt || fail "$(cat said.txt)"
   awk "BEGIN { exit !($(filled_rows person.png) > 0.3) }" || fail "nobody is in the picture"
+  "$pipelines/webcam.sh" --rig rig.yaml --input "$simulated" --settle 3 --learn 4 --png person.png >said.txt
+  [ "$(grep -c "leave the picture now" said.txt)$(grep -c "learning the background from 4" said.txt)" = 11 ] || fail "$(cat said.txt)"
   expect_error "ended after 24 frames of the background" "$pipelines/webcam.sh" --rig rig.yaml --input "$simulated" --learn 50 --png none.png
   [ ! -e none.png ] || fail "an empty picture was written"
 }
