@@ -42,6 +42,7 @@
 #include <vector>
 
 #include "common/codedunits.hpp"
+#include "common/downstream.hpp"
 #include "seek.hpp"
 #include "streamprefixes.hpp"
 
@@ -207,6 +208,9 @@ static bool
 set_source_caps (GstBaseParse *base)
 {
   Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  stream.src_caps_set = false;
+  if (!require_downstream (GST_ELEMENT (base), GST_BASE_PARSE_SRC_PAD (base)))
+    return false;
   gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)); /* clears the flag */
   /* Decoders that decodebin plugs later take access units. */
   const char *alignment = preferred_alignment (

@@ -59,6 +59,8 @@ test_media_types_that_do_not_fit_are_named () {
   run "${scene[@]}" ! neighbourcodeenc ! filesink location=scene.rcnc
   expect_error "neighbourcodedec0 makes video/x-range, and autovideosink0 takes video/x-raw$drawn" \
     run filesrc location=scene.rcnc ! neighbourcodeparse ! neighbourcodedec ! autovideosink
+  expect_error "neighbourcodeparse0 makes video/x-neighbour-code, and autovideosink0 takes video/x-raw; neighbourcodedec ! striprender draw it" \
+    run filesrc location=scene.rcnc ! neighbourcodeparse ! autovideosink
   expect_error "neighbourcodedec0: pad sink: alignment=byte-stream; expected neighbourcodeparse before this element" \
     run filesrc location=scene.rcnc ! typefind ! neighbourcodedec ! fakesink
   ! run multifilesrc location=scene.rcnc num-buffers=9 caps=video/x-neighbour-code ! neighbourcodedec ! fakesink 2>said.txt || fail "no error"
