@@ -44,9 +44,11 @@ wait_for () { # file regular-expression seconds
   holds () { grep -qE "$2" "$1" 2>/dev/null; }
   until_true "$3" holds "$1" "$2"
 }
-# The process has a handler for Ctrl-C. Until then it misses one: bash starts what is in the background without.
+# The process is the program that a script becomes, and has a handler for Ctrl-C. Until then it misses one: bash starts what is in the
+# background without.
 takes_interrupt () { # pid
   local caught
+  [ "$(cat "/proc/$1/comm")" != bash ] || return 1
   caught=$(awk '/^SigCgt/ { print $2 }' "/proc/$1/status") && ((0x$caught >> 1 & 1))
 }
 
