@@ -99,7 +99,7 @@ fi
 # and writes the last one.
 frames=1 patience=30 reason="nothing came from the camera"
 if [ "$learn" != 0 ]; then
-  frames=30 patience=$((60 + 2 * learn + settle)) reason+=", or nobody came into the picture after the background was learnt"
+  frames=30 patience=$((60 + 2 * (learn + settle) / fps)) reason+=", or nobody came into the picture after the background was learnt"
 fi
 RANGECAST_LAUNCH="${RANGECAST_LAUNCH:-rangecast-run} --frames $frames --timeout $patience --snapshot $(printf %q "$png")"
 exec 2> >(

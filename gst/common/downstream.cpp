@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <gstrange/gstrangecaps.h>
-#include <string_view>
 #include <vector>
 
 namespace {
@@ -11,7 +10,7 @@ namespace {
 constexpr int kMaxHops = 64;
 constexpr std::size_t kMaxTypes = 3; /* in a sentence */
 
-using Types = std::vector<std::string_view>;
+using Types = std::vector<std::string>;
 
 Types
 media_types (const GstCaps *caps)
@@ -24,17 +23,26 @@ media_types (const GstCaps *caps)
   return types;
 }
 
+bool
+shares_type (const Types &types, const GstCaps *caps)
+{
+  const auto is_taken = [taken = media_types (caps)] (const std::string &type) {
+    return std::ranges::find (taken, type) != taken.end ();
+  };
+  return gst_caps_is_any (caps) || std::ranges::any_of (types, is_taken);
+}
+
 std::string
 join (const Types &types)
 {
   std::string text;
   for (std::size_t i = 0; i < std::min (types.size (), kMaxTypes); i++)
-    text += (i > 0 ? ", " : "") + std::string (types[i]);
+    text += (i > 0 ? ", " : "") + types[i];
   return types.size () > kMaxTypes ? text + " ..." : text;
 }
 
 const char *
-how_to_draw (std::string_view made, const Types &taken)
+how_to_draw (const std::string &made, const Types &taken)
 {
   if (std::ranges::find (taken, "video/x-raw") == taken.end ())
     return "";
@@ -68,24 +76,75 @@ next_source_pad (GstPad *sink)
   return next;
 }
 
-/* @param[out] next  transfer full: the pad to go on with, where the peer takes nothing because of
- *                   what comes after it */
-std::string
-explain_link (GstPad *src, GstPad *sink, GstPad *&next)
-{
-  GstCaps *made = gst_pad_get_pad_template_caps (src), *taken = gst_pad_query_caps (sink, nullptr);
-  std::string text;
-  if (gst_caps_is_empty (taken)) {
-    next = next_source_pad (sink);
-  } else if (!gst_caps_can_intersect (made, taken)) {
-    const Types from = media_types (made), to = media_types (taken);
-    text = name_of_parent (src) + " makes " + join (from) + ", and " + name_of_parent (sink) +
-           " takes " + join (to) + how_to_draw (from.front (), to);
+/* Follows the links as long as elements could pass the media types on. */
+class Walk {
+public:
+  explicit Walk (GstPad *src) : pad_ (static_cast<GstPad *> (gst_object_ref (src))) { make (src); }
+  ~Walk () { gst_clear_object (&pad_); }
+  Walk (const Walk &) = delete;
+  Walk &operator= (const Walk &) = delete;
+
+  /* @return false at the end; `text` then says why, if media types differ there */
+  bool step (std::string &text)
+  {
+    GstPad *peer = GST_PAD_IS_FLUSHING (pad_) ? nullptr : gst_pad_get_peer (pad_);
+    if (!peer)
+      return false;
+    GstPad *next = nullptr;
+    if (GST_IS_PROXY_PAD (peer) && !GST_IS_GHOST_PAD (peer)) /* out of a bin */
+      next = GST_PAD (gst_pad_get_parent (peer));
+    else
+      next = pass (peer, text);
+    gst_object_unref (peer);
+    gst_object_unref (pad_);
+    pad_ = next;
+    return pad_ != nullptr;
   }
-  gst_caps_unref (made);
-  gst_caps_unref (taken);
-  return text;
-}
+
+private:
+  /* Elements such as queue make what they get. */
+  void make (GstPad *src)
+  {
+    GstCaps *caps = gst_pad_get_pad_template_caps (src);
+    if (!gst_caps_is_any (caps)) {
+      maker_ = name_of_parent (src);
+      made_ = media_types (caps);
+    }
+    gst_caps_unref (caps);
+  }
+
+  void explain (GstPad *sink, const GstCaps *taken, std::string &text) const
+  {
+    if (made_.empty () || gst_caps_is_empty (taken))
+      return;
+    const Types types = media_types (taken);
+    text = maker_ + " makes " + join (made_) + ", and " + name_of_parent (sink) + " takes " +
+           join (types) + how_to_draw (made_.front (), types);
+  }
+
+  /* @return transfer full: where to look next for what takes none of the types */
+  GstPad *pass (GstPad *sink, std::string &text)
+  {
+    GstCaps *possible = gst_pad_get_pad_template_caps (sink),
+            *taken = gst_pad_query_caps (sink, nullptr);
+    GstPad *next = nullptr;
+    if (!shares_type (made_, taken)) {
+      if (!shares_type (made_, possible))
+        explain (sink, possible, text);
+      else if ((next = next_source_pad (sink)))
+        make (next);
+      else
+        explain (sink, taken, text);
+    }
+    gst_caps_unref (possible);
+    gst_caps_unref (taken);
+    return next;
+  }
+
+  GstPad *pad_;
+  std::string maker_;
+  Types made_; /* media types */
+};
 
 } // namespace
 
@@ -93,16 +152,9 @@ std::string
 explain_downstream (GstPad *src)
 {
   std::string text;
-  auto pad = static_cast<GstPad *> (gst_object_ref (src));
-  for (int i = 0; pad && i < kMaxHops && text.empty (); i++) {
-    GstPad *peer = gst_pad_get_peer (pad), *next = nullptr;
-    if (peer && !GST_PAD_IS_FLUSHING (pad))
-      text = explain_link (pad, peer, next);
-    gst_clear_object (&peer);
-    gst_object_unref (pad);
-    pad = next;
-  }
-  gst_clear_object (&pad);
+  Walk walk (src);
+  for (int i = 0; i < kMaxHops && walk.step (text); i++)
+    ;
   return text;
 }
 

@@ -5,8 +5,10 @@
 
 #include <string>
 
-/** Finds the first link downstream of a source pad whose elements have no media type in common.
- *  @return one sentence that names both elements; empty if there is none, or the pad is flushing */
+/** Finds the first element downstream of a source pad that takes none of the media types that reach
+ *  it, by the caps of pads and their templates.
+ *  @return one sentence that names it and what makes them; empty if there is none, or the pad is
+ *  flushing */
 std::string explain_downstream (GstPad *src);
 
 /** Posts explain_downstream() as an error. @return whether it was empty */

@@ -14,6 +14,8 @@ using gstrange::running_time_of;
 
 /* Of a live pipeline, ahead of its clock. */
 static constexpr GstClockTime kFarAhead = 10 * GST_SECOND;
+/* More in a row are no accident, but what a pad has. */
+static constexpr int kMaxFarAhead = 5;
 
 /* The oldest buffer of a pad. */
 struct PairMatcher::Front {
@@ -49,24 +51,25 @@ PairMatcher::pop_pair (GstClockTime frame_duration, Pair &pair)
       return GST_AGGREGATOR_FLOW_NEED_DATA;
 
     const bool timed = GST_CLOCK_TIME_IS_VALID (a.time) && GST_CLOCK_TIME_IS_VALID (b.time);
-    if (a.gap != b.gap && timed) { /* drop what the gap covers, then the gap itself */
+    const int newer = a.time < b.time ? 1 : 0;
+    if (timed && is_far_ahead (fronts[newer], fronts[1 - newer], newer)) {
+      drop (fronts, newer, tolerance);
+      warn_far_ahead (fronts[newer], newer);
+    } else if (a.gap != b.gap && timed) { /* drop what the gap covers, then the gap itself */
       const int gap = a.gap ? 0 : 1;
       const GstClockTime last = gap_end (fronts[gap].time, fronts[gap].buffer, tolerance);
       drop (fronts, fronts[1 - gap].time > last ? gap : 1 - gap, tolerance);
     } else if (a.gap || b.gap)
       drop (fronts, a.gap ? 0 : 1, tolerance);
-    else if (timed && (a.time > b.time ? a.time - b.time : b.time - a.time) > tolerance) {
-      const int newer = a.time < b.time ? 1 : 0;
-      const bool wrong = is_far_ahead (fronts[newer], fronts[1 - newer]);
-      drop (fronts, wrong ? newer : 1 - newer, tolerance);
-      if (wrong)
-        warn_far_ahead (fronts[newer], pads_[newer]);
-    } else
+    else if (timed && fronts[newer].time - fronts[1 - newer].time > tolerance)
+      drop (fronts, 1 - newer, tolerance);
+    else
       break;
   }
   pair.first = gst_aggregator_pad_pop_buffer (pads_[0]);
   pair.second = gst_aggregator_pad_pop_buffer (pads_[1]);
   if (pair.first && pair.second) {
+    far_ahead_[0] = far_ahead_[1] = 0;
     pair.discont = std::exchange (discont_, false) || GST_BUFFER_IS_DISCONT (pair.first) ||
                    GST_BUFFER_IS_DISCONT (pair.second);
     return GST_FLOW_OK;
@@ -79,8 +82,10 @@ PairMatcher::pop_pair (GstClockTime frame_duration, Pair &pair)
 /* Sources that are not live and stamp buffers by the clock (fdsrc do-timestamp=true) may do so in
  * the moment between the pipeline's clock and its base time, and be hours ahead. */
 bool
-PairMatcher::is_far_ahead (const Front &front, const Front &other) const
+PairMatcher::is_far_ahead (const Front &front, const Front &other, int side) const
 {
+  if (far_ahead_[side] >= kMaxFarAhead)
+    return false;
   GstElement *element = GST_PAD_PARENT (pads_[0]);
   if (front.time < other.time + kFarAhead || GST_STATE (element) != GST_STATE_PLAYING ||
       !GST_CLOCK_TIME_IS_VALID (gst_aggregator_get_latency (GST_AGGREGATOR (element))))
@@ -90,8 +95,10 @@ PairMatcher::is_far_ahead (const Front &front, const Front &other) const
 }
 
 void
-PairMatcher::warn_far_ahead (const Front &front, GstAggregatorPad *pad)
+PairMatcher::warn_far_ahead (const Front &front, int side)
 {
+  GstAggregatorPad *pad = pads_[side];
+  far_ahead_[side]++;
   if (std::exchange (warned_far_ahead_, true))
     return;
   GstElement *element = GST_PAD_PARENT (pad);
@@ -181,6 +188,7 @@ void
 PairMatcher::flush ()
 {
   gap_begin_ = GST_CLOCK_TIME_NONE;
+  far_ahead_[0] = far_ahead_[1] = 0;
   output_end_ = 0;
   segment_sent_ = false;
 }

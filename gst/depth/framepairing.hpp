@@ -27,8 +27,8 @@ public:
    *  gstrange::pairing_tolerance() are a pair; of two that differ more, the older one is dropped
    *  and counted. Buffers without PTS are paired in order of arrival. A GAP on one pad drops (and
    *  counts) the buffers of the other pad during that time. In a live pipeline, of two that differ
-   *  by more than 10 s the newer one is dropped if it is that far ahead of the clock, too; the
-   *  first of those is a warning message.
+   *  by more than 10 s the newer one is dropped if it is that far ahead of the clock, too, but not
+   *  more than five in a row; the first of those is a warning message.
    *  @param frame_duration  ns, or GST_CLOCK_TIME_NONE
    *  @return GST_FLOW_OK with a pair, GST_FLOW_EOS once one pad has ended,
    *          GST_AGGREGATOR_FLOW_NEED_DATA while one pad has no buffer */
@@ -58,8 +58,8 @@ public:
 private:
   struct Front;
 
-  bool is_far_ahead (const Front &front, const Front &other) const;
-  void warn_far_ahead (const Front &front, GstAggregatorPad *pad);
+  bool is_far_ahead (const Front &front, const Front &other, int side) const;
+  void warn_far_ahead (const Front &front, int side);
   void drop (const Front (&fronts)[2], int side, GstClockTime tolerance);
 
   GstAggregatorPad *pads_[2];
@@ -68,6 +68,7 @@ private:
   GstClockTime gap_begin_ = GST_CLOCK_TIME_NONE, gap_end_ = 0; /* NONE: no gap found */
   GstClockTime output_end_ = 0;
   bool segment_sent_ = false;
+  int far_ahead_[2] = {0, 0}; /* dropped for that since the last pair */
   bool warned_far_ahead_ = false;
   bool discont_ = false; /* of the buffers dropped since the last pair */
 };

@@ -384,8 +384,7 @@ warn_of_range (GstRangeCombine *self)
   priv->frames_to_check = 0;
   GST_ELEMENT_WARNING (self, STREAM, FORMAT,
       ("pad depth: hardly any pixel lies between near (%g m) and far (%g m); values are %d to %d, "
-       "with "
-       "depth-scale=%g %g to %g m; expected another %snear or far",
+       "with depth-scale=%g %g to %g m; expected another %snear or far",
           priv->view.near_m, priv->view.far_m, range.min, range.max, priv->depth_scale,
           range.min * priv->depth_scale, range.max * priv->depth_scale,
           priv->has_caps_scale ? "" : "depth-scale, "),

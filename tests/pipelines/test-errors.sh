@@ -49,6 +49,7 @@ test_left_and_right_of_different_size_are_named () {
 test_media_types_that_do_not_fit_are_named () {
   local scene=(avatartestsrc name=a num-buffers=2) drawn="; striprender draws it"
   expect_error "a makes video/x-range, and autovideosink0 takes video/x-raw$drawn" run "${scene[@]}" ! autovideosink
+  expect_error "a makes video/x-range, and autovideosink0 takes video/x-raw$drawn" run "${scene[@]}" ! queue ! tee ! identity ! autovideosink
   expect_error "neighbourcodeenc0 makes video/x-neighbour-code, and autovideosink0 takes video/x-raw; neighbourcodedec ! striprender draw it" \
     run "${scene[@]}" ! neighbourcodeenc ! autovideosink
   expect_error "depth makes video/x-range, and autovideosink0 takes video/x-raw$drawn" \
