@@ -98,7 +98,7 @@ class Stage {
     this.show ();
   }
   // What is shown goes on until a recording has been found good.
-  async open ({ recording, live, paused, time }) {
+  async open ({ number, recording, live, paused, time }) {
     const source = live ? new LiveSource (this, live) : new RecordingSource (this, recording), before = this.wanted;
     this.wanted = source;
     const failure = recording ? await source.load () : '';
@@ -112,7 +112,7 @@ class Stage {
     this.source?.close ();
     this.network = null;
     this.source = source;
-    this.post ({ type: 'opened' });
+    this.post ({ type: 'opened', number });
     source.start (paused, time);
   }
   points () {

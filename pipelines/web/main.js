@@ -54,8 +54,9 @@ class Page {
     this.camera = new Core (module);
     this.renderer = new Renderer (canvas, (number) => this.camera.text (this.camera.call ('rc_shader', number)));
     this.speech = new Speech (say, (wait) => this.worker.postMessage ({ type: 'hold', wait }));
-    this.recordedSound = new RecordedSound (say, (available) => this.audio ({ available }));
+    this.recordedSound = new RecordedSound (say, () => this.audio ({ available: this.recordedSound.isOpen }));
     this.stats = new Stats (element ('stats'), parameters.has ('stats'), (latency) => this.speech.follow (latency));
+    this.asked = new Map (); // recordings that were opened, by number
     this.pending = null; // the newest frame set, not uploaded yet
     this.resolution = new Resolution ();
     this.wanted = this.painting = false; // another picture; one is under way
@@ -149,10 +150,13 @@ class Page {
     this.channel = null;
   }
 
-  // What was asked for last is shown from now on.
-  opened () {
-    const { recording, files } = this.opening;
+  // What was asked for with this number is shown from now on.
+  opened ({ number }) {
+    const { recording, files } = this.asked.get (number);
     this.recordedSound.close ();
+    if (this.speech.isOn)
+      this.speech.stop ();
+    this.audio ({ available: false }); // until there is some
     if (recording)
       this.recordedSound.open (recording, files);
   }
@@ -241,14 +245,16 @@ class Page {
   // ---- from the user ----
 
   openLive (url, token) {
-    this.opening = {};
     this.server = { url, token };
-    this.worker.postMessage ({ type: 'open', live: this.server });
+    this.ask ({}, { live: this.server });
+  }
+  ask (what, message) {
+    this.asked.set (this.asked.size, what);
+    this.worker.postMessage ({ type: 'open', number: this.asked.size - 1, ...message });
   }
   // recording: a File or an address; files: that and what was chosen with it
   open (recording, files) {
-    this.opening = { recording, files };
-    this.worker.postMessage ({ type: 'open', recording, paused: parameters.has ('paused'), time: Number (parameters.get ('time') ?? 0) });
+    this.ask ({ recording, files }, { recording, paused: parameters.has ('paused'), time: Number (parameters.get ('time') ?? 0) });
   }
 
   // A recording, and its speech where that was chosen, too.
