@@ -52,6 +52,7 @@ export class RecordingSource {
     this.stage.core.call ('rc_recording_open', this.size);
     this.atEnd = this.failed = this.saidDamage = false;
     this.time = 0;
+    this.last = { pts: 0, shift: 0 }; // of the last frame set
   }
 
   close () {
@@ -74,7 +75,7 @@ export class RecordingSource {
       if (badSlices > 0 && !this.saidDamage)
         this.stage.say (`The recording is damaged: ${badSlices} slices of a frame set cannot be decoded.`, 'note');
       this.saidDamage ||= badSlices > 0;
-      this.time = pts >= 0 ? pts : this.time + (this.frameDuration () || 40);
+      this.time = pts >= 0 ? this.timeOf (pts) : this.time + (this.frameDuration () || 40);
       this.stage.decoded (this.playing ? this.dueOf (this.time) : performance.timeOrigin + performance.now (), !this.playing);
       this.reportPosition ();
       return true;
@@ -84,6 +85,16 @@ export class RecordingSource {
     if (core.message () !== '' || this.failed)
       this.stage.say (core.message (), this.atEnd ? 'note' : 'error');
     return this.stop ();
+  }
+
+  // Where times go back, another take begins: it follows the one before. A single one that does so is damaged.
+  timeOf (pts) {
+    const last = this.last, frame = this.frameDuration () || 40;
+    if (pts < last.pts)
+      this.last = { pts, shift: this.time + frame - pts, before: last };
+    else
+      this.last = { pts, shift: (last.before && pts > last.before.pts ? last.before : last).shift };
+    return pts + this.last.shift;
   }
 
   stop () {
@@ -146,6 +157,7 @@ export class RecordingSource {
     if (core.call ('rc_recording_seek', time) === NOTHING) {
       this.open ();
     }
+    this.last = { pts: 0, shift: 0 };
     this.atEnd = false;
     while (this.next () && this.time + period / 2 < time)
       ;

@@ -19,6 +19,7 @@ const prepareFolder = () => {
     fs.copyFileSync (path.join (work, name), path.join (folder, name));
   fs.writeFileSync (path.join (folder, 'foreign.rcnc'), 'this is a text, and no recording\n'.repeat (100));
   const scene = fs.readFileSync (path.join (work, 'moving.rcnc'));
+  fs.writeFileSync (path.join (folder, 'joined.rcnc'), Buffer.concat ([scene, scene]));
   fs.writeFileSync (path.join (folder, 'cut.rcnc'), scene.subarray (0, scene.length - 20));
   return folder;
 };
@@ -171,6 +172,24 @@ test ('a file that is dropped onto the page is played, and the button and the sp
   await page.focus ('#picture');
   await page.keyboard.press ('Space');
   await stateIs ('playing');
+  await page.close ();
+});
+
+test ('the takes of a joined recording follow one another', async () => {
+  const page = await open ('src=joined.rcnc&mode=strips', undefined, (made) => made.evaluateOnNewDocument (() => { window.times = []; }));
+  await page.waitForFunction (() => window.rangecastPage);
+  await page.evaluate (() => {
+    const { rangecastPage: shown } = window, { position } = shown;
+    shown.position = function (message) {
+      window.times.push (message.time);
+      return position.call (this, message);
+    };
+  });
+  await page.waitForFunction (() => document.body.dataset.state === 'paused' && window.times.length > 10);
+  const times = await page.evaluate (() => window.times);
+  assert.ok (times.every ((time, i) => i === 0 || time >= times[i - 1]), `${times}`);
+  assert.ok (times.at (-1) > 5000, `${times.at (-1)} ms of two takes of 2.7 s`);
+  assert.equal (await message (page), '');
   await page.close ();
 });
 
