@@ -30,6 +30,14 @@ choose (StreamFile::Target target, guint64 pts, guint64 last_pts, GstSeekFlags f
   return target.after;
 }
 
+/* Whether a seek to `start` is to land on the first place of the next take instead of the last one
+ * of its own. */
+bool
+is_better (GstClockTime next, GstClockTime own, GstClockTime start, GstClockTime stop, bool nearest)
+{
+  return next <= stop && (!nearest || next - start < start - std::min (start, own));
+}
+
 /* The time in the file of a time in a take. */
 guint64
 pts_at (const Take &take, GstClockTime time)
@@ -105,6 +113,11 @@ NeighbourCodeFile::find (
     return {};
   const guint64 offset = take->offset + chosen->offset;
   Place place = {offset, list.time_of (offset, chosen->header.pts_ns), {}};
+  const bool snaps_after = flags & GST_SEEK_FLAG_KEY_UNIT && flags & GST_SEEK_FLAG_SNAP_AFTER;
+  const bool nearest = flags & GST_SEEK_FLAG_SNAP_BEFORE; /* and after */
+  if (snaps_after && !target.after && next != takes.end () && next->time_ns > start &&
+      is_better (next->time_ns, place.time, start, stop, nearest))
+    return find (list, next->time_ns, stop, GST_SEEK_FLAG_KEY_UNIT);
   if (target.rig)
     read (take->offset + target.rig->offset + rangecast::kStreamPrefixSize,
         std::min<gsize> (target.rig->header.size, kMaxRigBytes), place.rig_units);

@@ -23,8 +23,9 @@ public:
     GstClockTime time;             ///< on the time line of the takes
     std::vector<guint8> rig_units; ///< the last rig up to there
   };
-  /** The key access unit for a seek to `start` with these flags, in the take of that time; not
-   * after `stop`, unless it is the take's first one. Nothing if the file has no times. */
+  /** The key access unit for a seek to `start` with these flags, in the take of that time or,
+   *  if it snaps after that, the first one of the next; not after `stop`, unless it is the take's
+   *  first one. Nothing if the file has no times. */
   std::optional<Place> find (
       const rangecast::TakeList &list, GstClockTime start, GstClockTime stop, GstSeekFlags flags);
 

@@ -87,6 +87,8 @@ struct Stream {               /* streaming thread only */
   bool discont = false; /* bytes were dropped since the last buffer */
   bool ending = false;  /* push mode: EOS has arrived */
   bool in_sync = false; /* the last bytes were an access unit */
+  bool flushed = false; /* since the last segment */
+  bool is_new = false;  /* since the last segment another stream has begun */
   bool has_rig = false; /* the current access unit begins with rig views */
   bool warned_damage = false;
   gsize leading_rubbish = 0;
@@ -756,6 +758,16 @@ handle_key_unit_event (GstBaseParse *base, GstEvent *event)
     GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream.prefixes.repeat_rig ();
 }
 
+/* The base class drains the stream before at the next stream's segment, and counts bytes anew. */
+static void
+begin_segment (GstBaseParse *base)
+{
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
+  const bool flushed = std::exchange (priv->stream.flushed, false);
+  if (std::exchange (priv->stream.is_new, false))
+    priv->seek.begin_stream (flushed);
+}
+
 static gboolean
 gst_neighbour_code_parse_sink_event (GstBaseParse *base, GstEvent *event)
 {
@@ -766,10 +778,15 @@ gst_neighbour_code_parse_sink_event (GstBaseParse *base, GstEvent *event)
     finish_stream (base);
   else if (type == GST_EVENT_GAP)
     stream.had_gaps = true;
-  else if (type == GST_EVENT_STREAM_START)
+  else if (type == GST_EVENT_STREAM_START) {
     stream.warned_damage = false;
+    stream.is_new = true;
+  } else if (type == GST_EVENT_FLUSH_STOP)
+    stream.flushed = true;
   const gboolean done =
       GST_BASE_PARSE_CLASS (gst_neighbour_code_parse_parent_class)->sink_event (base, event);
+  if (type == GST_EVENT_SEGMENT)
+    begin_segment (base);
   if (type == GST_EVENT_FLUSH_STOP || type == GST_EVENT_SEGMENT)
     reset_min_frame_size (base);
   return done;

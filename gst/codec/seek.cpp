@@ -83,6 +83,17 @@ NeighbourCodeSeek::time_of (
 }
 
 void
+NeighbourCodeSeek::begin_stream (bool flushed)
+{
+  std::lock_guard guard (lock_);
+  last_unit_.reset ();
+  if (flushed)
+    takes_ = {};
+  else
+    takes_.begin_stream ();
+}
+
+void
 NeighbourCodeSeek::interrupt ()
 {
   std::lock_guard guard (lock_);

@@ -21,6 +21,9 @@ public:
    *  @param frame_duration  ns, or none */
   rangecast::TakeList::Time time_of (
       GstBaseParse *base, const rangecast::AccessUnitPlace &unit, GstClockTime frame_duration);
+  /** Upstream pushes another stream: its times begin a frame after the last ones, or at 0 after a
+   *  flush. */
+  void begin_stream (bool flushed);
   /** The next access unit does not follow the one before. */
   void interrupt ();
   /** The rig units that apply at `offset`, bytes, if a seek has chosen it; else empty. Only the

@@ -496,6 +496,42 @@ GST_START_TEST (test_each_take_begins_with_discont)
 }
 GST_END_TEST;
 
+/* A file of two takes and one of one take, as concat pushes them, or after a flush. */
+GST_START_TEST (test_next_stream_begins_a_frame_after_the_last)
+{
+  const Recording recording (20, 16);
+  auto twice = recording.bytes;
+  twice.insert (twice.end (), recording.bytes.begin (), recording.bytes.end ());
+  for (const bool flushes : {false, true}) {
+    GstHarness *h = new_parser ();
+    push_bytes (h, twice, 5000);
+    if (flushes) {
+      gst_harness_push_event (h, gst_event_new_flush_start ());
+      gst_harness_push_event (h, gst_event_new_flush_stop (TRUE));
+    }
+    gst_harness_push_event (h, gst_event_new_stream_start ("another"));
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_BYTES);
+    gst_harness_push_event (h, gst_event_new_segment (&segment));
+    push_bytes (h, recording.bytes, 5000);
+    gst_harness_push_event (h, gst_event_new_eos ());
+    std::vector<GstClockTime> times;
+    while (GstBuffer *buffer = gst_harness_try_pull (h)) {
+      times.push_back (GST_BUFFER_PTS (buffer));
+      gst_buffer_unref (buffer);
+    }
+    ck_assert_uint_ge (times.size (), 20);
+    if (!flushes)
+      fail_unless_equals_int (times.size (), 60);
+    const gsize first = flushes ? times.size () - 20 : 0;
+    for (gsize i = first; i < times.size (); i++)
+      fail_unless (times[i] == (i - first) * kFrame, "%d: %d of %d: %" GST_TIME_FORMAT, flushes,
+          int (i), int (times.size ()), GST_TIME_ARGS (times[i]));
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_typefinder_knows_a_stream_that_was_cut)
 {
   const Recording recording;
@@ -571,6 +607,7 @@ neighbourcodeparse_suite ()
   tcase_add_test (tc, test_written_times_go_on_in_a_new_segment);
   tcase_add_test (tc, test_byte_stream_in_segments_of_time_keeps_upstreams_times);
   tcase_add_test (tc, test_each_take_begins_with_discont);
+  tcase_add_test (tc, test_next_stream_begins_a_frame_after_the_last);
   tcase_add_test (tc, test_typefinder_knows_a_stream_that_was_cut);
   tcase_add_test (tc, test_typefinder_leaves_what_it_does_not_know);
   tcase_add_test (tc, test_typefinder_knows_the_stream);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Seeks, durations and times of files in neighbourcodeparse. */
+#include <array>
 #include <cstring>
 
 #include "../scene-check.hpp"
@@ -279,6 +280,25 @@ GST_START_TEST (test_seek_finds_its_take_and_the_rig_there)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_seek_snaps_across_the_end_of_a_take)
+{
+  const Recording recording (20, 16);
+  const auto take = with_delta_units (recording); /* the last key one is 15 */
+  const TemporaryFile file (join (take, take));
+  Player player (file);
+  const int after = GST_SEEK_FLAG_KEY_UNIT | GST_SEEK_FLAG_SNAP_AFTER;
+  const int nearest = GST_SEEK_FLAG_KEY_UNIT | GST_SEEK_FLAG_SNAP_NEAREST;
+  const std::pair<int, std::array<GstClockTime, 2>> seeks[] = {
+      {after, {16, 20}}, {nearest, {16, 15}}, {nearest, {19, 20}}, {after, {39, 35}}};
+  for (const auto &[flags, frames] : seeks) {
+    fail_unless (player.seek (frames[0] * kFrame, flags));
+    fail_unless_equals_uint64 (player.shown (), frames[1] * kFrame);
+  }
+  fail_unless (player.seek_part (18 * kFrame, after, GST_SEEK_TYPE_SET, 19 * kFrame));
+  fail_unless_equals_uint64 (player.shown (), 15 * kFrame); /* not behind the stop */
+}
+GST_END_TEST;
+
 /* 30 seconds of 1.2 MB each: longer than what is searched access unit by access unit. */
 GST_START_TEST (test_seek_in_a_long_file_of_two_takes_finds_its_take)
 {
@@ -410,6 +430,7 @@ neighbourcodeseek_suite ()
   tcase_add_test (tc, test_error_after_a_seek_in_a_file_is_posted_too);
   tcase_add_test (tc, test_takes_of_a_file_follow_each_other);
   tcase_add_test (tc, test_seek_finds_its_take_and_the_rig_there);
+  tcase_add_test (tc, test_seek_snaps_across_the_end_of_a_take);
   tcase_add_test (tc, test_seek_in_a_long_file_of_two_takes_finds_its_take);
   tcase_add_test (tc, test_damaged_time_moves_no_other_access_unit);
   tcase_add_test (tc, test_seek_in_a_temporal_file_shows_all_pixels_right_from_there_on);

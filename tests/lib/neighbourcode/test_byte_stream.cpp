@@ -349,3 +349,83 @@ TEST (Takes, TakeThatSamplingMissedMovesLaterOnes)
   }
   EXPECT_EQ (list.takes ().size (), 3u);
 }
+
+TEST (Takes, ShortTakesAreFoundInAnyOrder)
+{
+  for (int order = 0; order < 256; order++) { /* of four takes of 1 to 4 access units */
+    std::vector<File> files;
+    std::vector<std::size_t> begins;
+    std::size_t frames = 0;
+    for (int take = 0; take < 4; take++) {
+      const int length = 1 + (order >> 2 * take) % 4;
+      begins.push_back (frames);
+      files.emplace_back (length, 0);
+      frames += std::size_t (length);
+    }
+    File file = join (files);
+    EXPECT_EQ (takes_of (file), begins) << order;
+    const auto times = times_of (file);
+    for (std::size_t i = 0; i < frames; i++)
+      EXPECT_EQ (times[i], i * kFrame_ns) << order;
+  }
+}
+
+TEST (Takes, TakeAfterTwoAccessUnitsIsFoundThoughTimesVary)
+{
+  for (const std::uint64_t later_ns : {0, 1, 400'000, 40'000'000}) {
+    TakeList list;
+    std::uint64_t offset = 0;
+    for (const std::uint64_t pts : {std::uint64_t{0}, kFrame_ns, std::uint64_t{0},
+             kFrame_ns + later_ns, 2 * kFrame_ns + later_ns})
+      list.add ({offset++, {600, pts, 0, true}, pts == 0}, kFrame_ns);
+    ASSERT_EQ (list.takes ().size (), 2u) << later_ns;
+    EXPECT_EQ (list.takes ()[1].time_ns, 2 * kFrame_ns);
+  }
+}
+
+TEST (Takes, ListHoldsNoMoreThan4096)
+{
+  TakeList list;
+  constexpr std::uint64_t units = 3 * kMaxTakes;
+  for (std::uint64_t i = 0; i < units; i++) {
+    const auto time = list.add ({i, {600, 1000 * (units - i), 0, true}, false}, kFrame_ns);
+    ASSERT_EQ (time.time_ns, i * kFrame_ns);
+    ASSERT_LE (list.takes ().size (), kMaxTakes);
+  }
+  EXPECT_TRUE (std::ranges::is_sorted (list.takes (), {}, &Take::offset));
+  EXPECT_EQ (list.time_of (100, 1000 * (units - 100)), 100 * kFrame_ns);
+  /* One damaged time, which would begin one more, still changes no other. */
+  const std::uint64_t base = list.time_of (units - 1, 1000);
+  for (const std::uint64_t i : {1, 2, 3, 4})
+    list.add ({units + i, {600, i == 3 ? 5 : 1000 + i * kFrame_ns, 0, true}, false}, kFrame_ns);
+  EXPECT_EQ (list.time_of (units + 4, 1000 + 4 * kFrame_ns), base + 4 * kFrame_ns);
+  list.interrupt (); /* more takes than were known, found at the beginning */
+  for (const std::uint64_t pts : {3, 2, 1})
+    list.add ({0, {600, pts, 0, true}, false}, kFrame_ns);
+  EXPECT_EQ (list.takes ().size (), kMaxTakes);
+}
+
+TEST (Takes, NextStreamBeginsAFrameAfterTheLast)
+{
+  TakeList list;
+  std::uint64_t frame = 0;
+  for (const std::uint64_t stream : {0, 1, 2}) {
+    list.begin_stream ();
+    for (std::uint64_t i = 0; i < 5; i++) {
+      const auto time = list.add ({i, {600, stream + i * kFrame_ns, 0, true}, i == 0}, kFrame_ns);
+      EXPECT_EQ (time.time_ns, frame++ * kFrame_ns);
+    }
+    EXPECT_EQ (list.takes ().size (), 1u);
+  }
+}
+
+TEST (Takes, SamplingAnyShortFileEnds)
+{
+  File file = join ({File (30), File (1), File (2), File (40)});
+  for (std::size_t size = 0; size < file.bytes.size (); size += size < 100 ? 1 : 997) {
+    File part (0);
+    part.bytes.assign (file.bytes.begin (), file.bytes.begin () + std::ptrdiff_t (size));
+    (void)part.open ().takes (0, kFrame_ns, 0);
+  }
+  EXPECT_EQ (file.open ().takes (0, kFrame_ns, 0).takes ().front ().offset, 0u);
+}

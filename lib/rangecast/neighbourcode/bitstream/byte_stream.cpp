@@ -17,9 +17,7 @@ constexpr std::uint64_t kWalkBytes = 4 * kBlock;
 /* Rigs come once a second: linear search begins so much earlier that it finds one. */
 constexpr std::uint64_t kRigWindow_ns = 2'000'000'000;
 
-/* Files up to this size are searched for takes access unit by access unit; longer ones are sampled
- * at so many places. */
-constexpr std::uint64_t kWalkFile = 8 << 20;
+/* Longer files than kWalkFile are sampled for takes at so many places. */
 constexpr std::uint64_t kTakeSamples = 64;
 
 enum class End { kSound, kDamaged, kOpen };
@@ -143,12 +141,14 @@ TakeList::time_of (std::uint64_t offset, std::uint64_t pts_ns) const
   return take.time_ns + (pts_ns - std::min (pts_ns, take.pts_ns));
 }
 
-/* Also compared with the one before the last, because the time of the last may be damaged. */
+/* Also compared with the one before the last, because the time of the last may be damaged. Rigs
+ * begin takes: with one, the same time is early enough, as that of a take after two access units.
+ */
 bool
 TakeList::goes_back (const AccessUnitPlace &unit) const
 {
   const std::uint64_t pts = unit.header.pts_ns;
-  return (pts < last_ && pts < before_) || (unit.has_rig && pts == last_ && pts <= before_);
+  return (pts < last_ && pts < before_) || (unit.has_rig && pts <= last_ && pts <= before_);
 }
 
 void
@@ -164,16 +164,35 @@ TakeList::insert (const AccessUnitPlace &unit, std::uint64_t frame_ns)
   const Take &old = takes_[current_];
   const Take take = {unit.offset, unit.header.pts_ns, last_time_ns_ + frame_ns};
   shift_ns_ = take.time_ns - (old.time_ns + (take.pts_ns - old.pts_ns));
-  shift_from (++current_, shift_ns_);
-  takes_.insert (takes_.begin () + std::ptrdiff_t (current_), take);
+  previous_ = current_;
+  replaced_.reset ();
+  if (takes_.size () < kMaxTakes) {
+    takes_.insert (takes_.begin () + std::ptrdiff_t (++current_), take);
+  } else {
+    current_ = std::max<std::size_t> (current_, 1);
+    replaced_ = std::exchange (takes_[current_], take);
+  }
+  shift_from (current_ + 1, shift_ns_);
 }
 
 void
 TakeList::remove_damaged ()
 {
-  takes_.erase (takes_.begin () + std::ptrdiff_t (current_));
-  shift_from (current_--, 0 - shift_ns_);
+  shift_from (current_ + 1, 0 - shift_ns_);
+  if (replaced_)
+    takes_[current_] = *replaced_;
+  else
+    takes_.erase (takes_.begin () + std::ptrdiff_t (current_));
+  current_ = previous_;
   last_ = before_;
+}
+
+void
+TakeList::begin_stream ()
+{
+  resumes_ |= !takes_.empty ();
+  takes_.clear ();
+  interrupt ();
 }
 
 TakeList::Time
@@ -181,8 +200,11 @@ TakeList::add (const AccessUnitPlace &unit, std::uint64_t frame_ns)
 {
   const std::uint64_t pts = unit.header.pts_ns;
   if (takes_.empty ())
-    takes_.push_back ({unit.offset, pts, 0});
-  if (std::exchange (is_new_, false) && current_ != kNone && pts > before_)
+    takes_.push_back ({unit.offset, pts, resumes_ ? last_time_ns_ + frame_ns : 0});
+  /* Two frames after the one before the damaged one; the second one of a take after two access
+   * units may be a little later than that one, too. */
+  const bool continues_old = pts > before_ && pts - before_ > frame_ns;
+  if (std::exchange (is_new_, false) && current_ != kNone && continues_old)
     remove_damaged ();
   bool begins_take = false;
   const std::size_t known = index_at (unit.offset);
@@ -367,16 +389,17 @@ StreamFile::search_takes (
 }
 
 TakeList
-StreamFile::takes (std::uint64_t begin, std::uint64_t frame_ns)
+StreamFile::takes (std::uint64_t begin, std::uint64_t frame_ns, std::uint64_t walk_size)
 {
   TakeList list;
   auto from = next (begin, size_);
-  if (from && size_ <= kWalkFile) {
+  if (from && size_ <= walk_size) {
     walk_takes (*from, size_, frame_ns, list);
     return list;
   }
+  const std::uint64_t step = std::max<std::uint64_t> (size_ / kTakeSamples, 1);
   while (from) {
-    const auto to = next (from->offset + size_ / kTakeSamples, size_);
+    const auto to = next (from->offset + step, size_);
     const auto end = to ? to : last ();
     if (end && from->header.pts_ns != kNoTime)
       search_takes (*from, *end, frame_ns, list);

@@ -16,6 +16,10 @@ namespace rangecast {
 inline constexpr std::size_t kStreamPrefixSize = kStartCode.size () + kAccessUnitHeaderSize;
 /** Presentation time of an access unit that has none. */
 inline constexpr std::uint64_t kNoTime = UINT64_MAX;
+/** Takes that a list holds. */
+inline constexpr std::size_t kMaxTakes = 4096;
+/** Files up to this size, bytes, are searched for takes access unit by access unit. */
+inline constexpr std::uint64_t kWalkFile = 8 << 20;
 
 /** Whether `bytes` begins with a start code and a sound access-unit unit. */
 bool begins_access_unit (std::span<const std::uint8_t> bytes, AccessUnitHeader &header);
@@ -54,8 +58,9 @@ struct Take {
 };
 
 /** The time line of a byte stream, on which each take follows the one before it. Where times go
- *  back, or one is repeated with a rig, a take begins. One damaged time begins none: the access unit
- *  after it continues the old take. */
+ *  back, or one is repeated with a rig, a take begins. One damaged time begins none: the access
+ * unit after it continues the old take. Of more than kMaxTakes takes, a new one replaces the one
+ * before: that one's times are then unknown, but not those of the first takes. */
 class TakeList {
 public:
   struct Time {
@@ -67,6 +72,8 @@ public:
   Time add (const AccessUnitPlace &unit, std::uint64_t frame_ns);
   /** The next access unit does not follow the one before, as after a seek. */
   void interrupt () { current_ = kNone; }
+  /** Another byte stream begins, a frame after the last access unit. Offsets begin anew. */
+  void begin_stream ();
 
   [[nodiscard]] bool empty () const { return takes_.empty (); }
   [[nodiscard]] const std::vector<Take> &takes () const { return takes_; }
@@ -90,6 +97,9 @@ private:
   std::uint64_t last_time_ns_ = 0; /* of the last access unit */
   bool is_new_ = false;            /* the last access unit has gone back, maybe by damage */
   std::uint64_t shift_ns_ = 0;     /* of the later takes, by that one */
+  std::size_t previous_ = 0;       /* take before that one */
+  std::optional<Take> replaced_;   /* by that one */
+  bool resumes_ = false;           /* another byte stream came before */
 };
 
 /** Finds access units by time in a file without reading all of it. */
@@ -104,9 +114,11 @@ public:
   /** The last access unit. */
   std::optional<AccessUnitPlace> last ();
 
-  /** The takes from an offset on: all of a file of up to 8 MiB; in a longer one, by bisection, those
-   *  that are at least a 32nd of it and a few of the shorter ones. Empty if there are no times. */
-  TakeList takes (std::uint64_t begin, std::uint64_t frame_ns);
+  /** The takes from an offset on: all of a file of up to 8 MiB; in a longer one, by bisection,
+   * those that are at least a 32nd of it and a few of the shorter ones. Empty if there are no
+   * times.
+   *  @param walk_size  instead of the 8 MiB */
+  TakeList takes (std::uint64_t begin, std::uint64_t frame_ns, std::uint64_t walk_size = kWalkFile);
 
   struct Target {
     std::optional<AccessUnitPlace> before; ///< the last key one not later than the time
