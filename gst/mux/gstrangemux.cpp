@@ -152,6 +152,38 @@ private:
 
 } // namespace
 
+/* Removes the next buffer of a stream: priv->waiting has a reference. */
+static void
+drop_buffer (GstRangeMuxPrivate *priv, MuxStream &stream)
+{
+  if (stream.held) {
+    gst_clear_buffer (&stream.held); /* was counted */
+    return;
+  }
+  gst_aggregator_pad_drop_buffer (stream.pad);
+  std::lock_guard guard (priv->lock);
+  stream.received++;
+}
+
+/* Takes buffers from their pads that may have a damaged capture time: the next ones will tell.
+ * @return whether any */
+static bool
+hold_unsure (GstRangeMuxPrivate *priv)
+{
+  bool any = false;
+  for (const WaitingBuffer &w : priv->waiting.next_round) {
+    MuxStream &stream = *w.stream;
+    if (!stream.round.unsure || stream.held)
+      continue;
+    drop_buffer (priv, stream);
+    stream.held = gst_buffer_ref (w.buffer);
+    stream.held_capture = w.capture;
+    stream.held_running = w.running;
+    any = true;
+  }
+  return any;
+}
+
 /* ---- 2. which streams make up frame sets; caps with the union of their rigs ---- */
 
 static void
@@ -366,7 +398,7 @@ classify_buffer (const GstRangeMuxPrivate *priv, const WaitingBuffer &w, GstCloc
     return StreamState::kOutOfSync;
   const bool late =
       GST_CLOCK_TIME_IS_VALID (priv->last.capture) && w.capture <= priv->last.capture + tolerance;
-  if (late && w.stream->round.went_back && priv->waiting.missing > 0)
+  if (!priv->live && late && w.stream->round.went_back && priv->waiting.missing > 0)
     return StreamState::kIn; /* recordings begin again if the others' next buffers went back, too */
   return late ? StreamState::kLate : StreamState::kIn;
 }
@@ -389,10 +421,9 @@ drop_unusable (GstRangeMux *self, GstClockTime tolerance)
     any = true;
     if (state == StreamState::kLate && !priv->live)
       stream.ahead = GST_CLOCK_DIFF (priv->last.capture, w.capture);
-    gst_aggregator_pad_drop_buffer (stream.pad);
+    drop_buffer (priv, stream);
     {
       std::lock_guard guard (priv->lock);
-      stream.received++;
       switch (state) {
         case StreamState::kLate:
           stream.late++;
@@ -444,7 +475,7 @@ join_matching (GstRangeMux *self, GstClockTime first, GstClockTime tolerance)
       match.times.running = w.running;
       match.speed = speed_of (w);
     }
-    gst_aggregator_pad_drop_buffer (stream.pad); /* priv->waiting has a reference */
+    drop_buffer (priv, stream);
     if (!priv->joiner.add (w.buffer)) {
       GST_DEBUG_OBJECT (stream.pad, "dropping a buffer with the view-id of another pad");
       if (!stream.clash_reported)
@@ -457,7 +488,6 @@ join_matching (GstRangeMux *self, GstClockTime first, GstClockTime tolerance)
     stream.matched_others = stream.matched_others || match.streams > 1;
     set_state (self, stream, StreamState::kIn, w.running);
     std::lock_guard guard (priv->lock);
-    stream.received++;
     stream.matched++;
     stream.last_skew = GST_CLOCK_DIFF (first, w.capture);
   }
@@ -530,6 +560,8 @@ make_frame_set (GstRangeMux *self, const MuxStreams &streams, bool timeout)
     compare_clocks (self, streams);
   else
     compare_recordings (self);
+  if (!priv->live && hold_unsure (priv))
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
   const GstClockTime tolerance = matching_tolerance (priv);
   if (drop_past_gaps (self, tolerance, timeout) || drop_unusable (self, tolerance))
     return GST_AGGREGATOR_FLOW_NEED_DATA; /* GstAggregator looks at the pads again: the next buffers
@@ -547,7 +579,11 @@ gst_range_mux_aggregate (GstAggregator *aggregator, gboolean timeout)
   auto self = GST_RANGE_MUX (aggregator);
   GstRangeMuxPrivate *priv = self->priv;
   const CurrentStreams streams (priv);
-  priv->live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
+  const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
+  if (live != priv->live)
+    for (const auto &stream : *streams)
+      stream->round = {};
+  priv->live = live;
   priv->waiting.collect (*streams, priv->live);
   const GstFlowReturn flow = make_frame_set (self, *streams, timeout);
   priv->waiting.release ();
@@ -643,6 +679,7 @@ gst_range_mux_flush (GstAggregator *aggregator)
     stream->offset_known = stream->shift_known = false;
     stream->seen = GST_CLOCK_TIME_NONE;
     stream->round = {};
+    gst_clear_buffer (&stream->held);
   }
   return GST_FLOW_OK;
 }
@@ -797,6 +834,9 @@ gst_range_mux_stop (GstAggregator *aggregator)
   priv->reporter.stop ();
   priv->clock.stop ();
   priv->joiner.drop ();
+  std::lock_guard guard (priv->lock);
+  for (const auto &stream : priv->streams)
+    gst_clear_buffer (&stream->held);
   return TRUE;
 }
 

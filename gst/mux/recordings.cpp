@@ -8,13 +8,19 @@
 /* Finds whether a buffer is of the next round. One that comes late within its round has the running
  * time of its place there, and seldom precedes the stream's first one. Where a clock was set back,
  * capture times go back less far than to the first one: all streams together have begun again, one
- * alone is late. */
+ * alone is late. If its running time goes on, as that of the next take of concat does, one capture
+ * time may be damaged: it is if that of the buffer after it follows the newest one. */
 static void
 compare_with_round (const WaitingBuffer &w)
 {
   RecordingRound &round = w.stream->round;
-  round.over = false;
+  round.over = round.unsure = round.damaged = false;
   if (!GST_CLOCK_TIME_IS_VALID (round.newest) || w.capture > round.newest) {
+    round.went_back = false;
+    return;
+  }
+  if (GST_CLOCK_TIME_IS_VALID (w.next_capture) && w.next_capture > round.newest) {
+    round.damaged = true;
     round.went_back = false;
     return;
   }
@@ -24,16 +30,21 @@ compare_with_round (const WaitingBuffer &w)
                                GST_CLOCK_TIME_IS_VALID (round.newest_running) &&
                                w.running > round.newest_running;
   round.over = from_begin && back > Recordings::kMaxReordered;
+  round.unsure = round.over && running_goes_on && !w.stream->held;
   round.went_back = round.went_back || from_begin || running_goes_on || back > Recordings::kMaxBack;
 }
 
-/* Those that wait for the next round vote for the time that the others have reached.
+/* Those that wait for the next round, and damaged capture times, vote for the time that the others
+ * have reached.
  * @return the median capture time */
 GstClockTime
 Recordings::vote (std::span<const WaitingBuffer> waiting, GstClockTime last_capture)
 {
-  const auto time_of = [last_capture] (const WaitingBuffer &w) {
-    return w.stream->round.over ? last_capture : w.capture;
+  const auto has_no_vote = [] (const WaitingBuffer &w) {
+    return w.stream->round.over || w.stream->round.damaged;
+  };
+  const auto time_of = [&] (const WaitingBuffer &w) {
+    return has_no_vote (w) ? last_capture : w.capture;
   };
   captures_.clear ();
   for (const WaitingBuffer &w : waiting)
@@ -44,7 +55,7 @@ Recordings::vote (std::span<const WaitingBuffer> waiting, GstClockTime last_capt
   const GstClockTime others = can_vote ? *middle : std::ranges::min (captures_);
   for (const WaitingBuffer &w : waiting) {
     const GstClockTimeDiff distance = GST_CLOCK_DIFF (others, time_of (w));
-    w.stream->ahead = w.stream->round.over ? GST_CLOCK_DIFF (last_capture, w.capture) : distance;
+    w.stream->ahead = has_no_vote (w) ? GST_CLOCK_DIFF (last_capture, w.capture) : distance;
     w.stream->in_sync = !can_vote || GstClockTime (ABS (distance)) <= kMaxLater;
   }
   return *middle;
@@ -75,6 +86,9 @@ Recordings::compare (WaitingBuffers &waiting, GstClockTime last_capture)
     vote (waiting.list, last_capture);
     return true;
   }
+  if (!known || all)
+    for (const WaitingBuffer &w : waiting.list)
+      w.stream->round.unsure = false;
   /* Gaps of the old round are dropped first. */
   std::erase_if (waiting.list, [&] (const WaitingBuffer &w) {
     const bool next = w.stream->round.over || (all && went_back (w));
@@ -117,7 +131,7 @@ Recordings::find_unmatched (const MuxStreams &streams)
       continue;
     }
     unreported++;
-    if (gst_aggregator_pad_is_eos (stream->pad))
+    if (!stream->held && gst_aggregator_pad_is_eos (stream->pad))
       ended = stream.get ();
   }
   const bool all_others_reported = reported > 0 && unreported == 1;

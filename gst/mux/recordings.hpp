@@ -31,7 +31,8 @@ public:
 
   /** Sets `in_sync`, `ahead` and `round` of each stream. Between two streams there is no majority:
    *  the earlier one continues alone, and the other one waits. The buffers of recordings that have
-   *  begun again become waiting.next_round, until all recordings have.
+   *  begun again become waiting.next_round, until all recordings have. Those of which this is
+   *  `round.unsure` are to be held.
    *  @param last_capture  of the last frame set, or GST_CLOCK_TIME_NONE
    *  @return whether all of them have begun again: the buffers are the first ones of a round */
   bool compare (WaitingBuffers &waiting, GstClockTime last_capture);

@@ -27,6 +27,7 @@ MuxStream::reset ()
       different_time_reported = false;
   other_rig = clash = {};
   round = {};
+  gst_clear_buffer (&held);
   seen = since = GST_CLOCK_TIME_NONE;
   reported = state = StreamState::kIn;
   received = late = out_of_sync = left_out = matched = views = 0;

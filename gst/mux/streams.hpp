@@ -32,6 +32,8 @@ struct RecordingRound {
   GstClockTime newest_running = GST_CLOCK_TIME_NONE; ///< running time of that buffer
   bool went_back = false; ///< the buffer at its pad is of the next round if all others' are
   bool over = false;      ///< the buffer at its pad is of the next round
+  bool unsure = false;    ///< `over` is; the buffer after it tells whether its time is damaged
+  bool damaged = false;   ///< the capture time of the buffer is; later ones go on
 
   void add (const WaitingBuffer &w);
 };
@@ -39,7 +41,11 @@ struct RecordingRound {
 /** A sink pad of rangemux and its stream. */
 struct MuxStream {
   explicit MuxStream (GstAggregatorPad *p) : pad (GST_AGGREGATOR_PAD (gst_object_ref (p))) {}
-  ~MuxStream () { gst_object_unref (pad); }
+  ~MuxStream ()
+  {
+    gst_clear_buffer (&held);
+    gst_object_unref (pad);
+  }
   MuxStream (const MuxStream &) = delete;
 
   /** Resets everything but the pad. */
@@ -70,6 +76,10 @@ struct MuxStream {
   GstClockTime since = GST_CLOCK_TIME_NONE; ///< running time at which it got its state
   StreamState reported = StreamState::kIn;  ///< the state that was reported last
 
+  /** Its next buffer, taken from the pad to see the one after it; or nullptr. Streaming thread. */
+  GstBuffer *held = nullptr;
+  GstClockTime held_capture = GST_CLOCK_TIME_NONE, held_running = GST_CLOCK_TIME_NONE;
+
   /* the element's lock */
   StreamState state = StreamState::kIn;
   guint64 views = 0; ///< bits by view-id, for statistics
@@ -80,11 +90,12 @@ struct MuxStream {
 
 using MuxStreams = std::vector<std::shared_ptr<MuxStream>>;
 
-/** A buffer at a sink pad. */
+/** A buffer at a sink pad, or held. */
 struct WaitingBuffer {
   MuxStream *stream;
   GstBuffer *buffer; ///< a reference
   GstClockTime capture, running;
+  GstClockTime next_capture = GST_CLOCK_TIME_NONE; ///< of the buffer after one that is held
 };
 
 /** What the frame sets of the chosen streams are. */

@@ -18,4 +18,7 @@ public:
   std::vector<WaitingBuffer> list, gaps;
   std::vector<WaitingBuffer> next_round; ///< taken out of `list` by Recordings::compare()
   int missing = 0, ended = 0;            ///< pads without a buffer
+
+private:
+  void add_held (MuxStream &stream, GstBuffer *next, bool live);
 };

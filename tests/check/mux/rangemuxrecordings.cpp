@@ -23,12 +23,18 @@ struct Recording {
   int rounds = 1;
   bool pts_go_on = false;      /* where capture times go back */
   std::vector<int> order = {}; /* of the frames; empty: as they were captured */
+  int damaged = -1;            /* a frame of which the capture time has a bit cleared */
+  int bit = 0;
   int total () const { return frames * rounds; }
   GstClockTime time (int i) const
   {
     return GstClockTime (order.empty () ? i % frames : order[i % frames]) * period;
   }
-  GstClockTime capture (int i) const { return begin + time (i); }
+  GstClockTime capture (int i) const
+  {
+    const GstClockTime right = begin + time (i);
+    return i == damaged ? right & ~(GstClockTime (1) << bit) : right;
+  }
   GstClockTime pts (int i) const { return pts_go_on ? GstClockTime (i) * period : time (i); }
 };
 
@@ -440,6 +446,41 @@ GST_START_TEST (test_a_reordered_buffer_is_late_and_no_restart)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_one_damaged_capture_time_is_late_and_no_restart)
+{
+  constexpr GstClockTime kBegin = (1ULL << 60) | (1ULL << 40) | (1ULL << 31);
+  for (const int streams : {2, 3})
+    for (const int at : {0, streams - 1})
+      for (const int bit : {60, 40, 31})
+        for (const int frame : {7, 10, 38}) {
+          std::vector<Recording> list (streams, {kBegin, 40});
+          list[at].damaged = frame;
+          list[at].bit = bit;
+          Recordings mux (list);
+          const std::vector<FrameSet> sets = mux.play ();
+          fail_unless_equals_int (sets.size (), 40);
+          fail_unless_equals_int (count_views (sets, (1U << streams) - 1), 39);
+          check_distances (sets);
+          fail_unless_equals_uint64 (mux.stat ("dropped-late"), 1);
+          fail_unless (mux.n_warnings == 0, mux.warnings.c_str ());
+        }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_an_earlier_take_loses_nothing_beside_a_longer_recording)
+{
+  Recording takes = {kHour, 20, kFrame, 1, true};
+  for (int i = 0; i < 20; i++) /* one of 12 frames, and one of 8 captured 5 s before */
+    takes.order.push_back (i < 12 ? 125 + i : i - 12);
+  Recordings mux ({takes, {kHour + 125 * kFrame, 30}});
+  const std::vector<FrameSet> sets = mux.play ();
+  fail_unless_equals_int (sets.size (), 38);
+  for (int i = 0; i < 38; i++)
+    fail_unless_equals_int (sets[i].views, i < 12 ? 0b11 : i < 30 ? 0b10 : 0b01);
+  fail_unless_equals_uint64 (mux.stat ("dropped-late"), 0);
+}
+GST_END_TEST;
+
 /* 100 frames; after 60 of them the clock is set back by as many. */
 static Recording
 with_clock_set_back (int frames)
@@ -639,6 +680,8 @@ rangemuxrecordings_suite ()
   tcase_add_test (tc, test_a_recording_of_another_clock_stays_left_out_when_the_others_begin_again);
   tcase_add_test (tc, test_a_gap_at_the_end_of_a_round_does_not_reach_into_the_next);
   tcase_add_test (tc, test_a_reordered_buffer_is_late_and_no_restart);
+  tcase_add_test (tc, test_one_damaged_capture_time_is_late_and_no_restart);
+  tcase_add_test (tc, test_an_earlier_take_loses_nothing_beside_a_longer_recording);
   tcase_add_test (tc, test_clocks_set_back_together_lose_nothing);
   tcase_add_test (tc, test_a_clock_set_back_alone_is_late_until_it_is_where_it_was);
   tcase_add_test (tc, test_of_two_recordings_of_other_clocks_one_is_told_once);
