@@ -47,5 +47,5 @@ test_relays_of_two_levels_have_a_row_each () {
   # A latency is that of frame sets of which every packet came.
   grep -qE '^\| 1 \| [1-9].* [0-9.]+ \| [0-9.]+ \| [0-9.]+ \|$' table.txt && grep -qE '^\| 2 \| [1-9].* [0-9.]+ \| [0-9.]+ \| [0-9.]+ \|$' table.txt ||
     fail "$(cat table.txt)"
-  expect_error "expected SECONDS (1 to 9999) and LEVELS (1 to 99), got '3' and 'x'" "$source_dir/tests/bench/relays.sh" 3 x
+  expect_error "LEVELS: expected a whole number from 1 to 99, got 'x'" "$source_dir/tests/bench/relays.sh" 3 x
 }

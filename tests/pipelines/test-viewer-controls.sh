@@ -78,14 +78,14 @@ shows_the_keys () {
   settle
   ! cmp -s hint.png settled.png || fail "there was no hint, or it stays"
   press h
-  wait_for looks_unlike settled.png
+  until_true 20 looks_unlike settled.png
   mv now.png keys.png
   snap during.png
   press h
-  wait_for looks_like settled.png
+  until_true 20 looks_like settled.png
   snap after.png
   press h
-  wait_for looks_like keys.png
+  until_true 20 looks_like keys.png
   quits_with q
 }
 
@@ -110,48 +110,48 @@ moves_in_time () {
   sleep 1
   snap first.png
   press period
-  wait_for snap_differs first.png
+  until_true 20 snap_differs first.png
   snap second.png
   press period
-  wait_for snap_differs second.png
+  until_true 20 snap_differs second.png
   press comma
-  wait_for snap_equals second.png
+  until_true 20 snap_equals second.png
   press comma
-  wait_for snap_equals first.png
+  until_true 20 snap_equals first.png
   press comma # there is none before
   sleep 0.5
   snap_equals first.png || fail "before the first"
   press Right
-  wait_for snap_differs first.png
+  until_true 20 snap_differs first.png
   snap later.png
   press Left
-  wait_for snap_equals first.png
+  until_true 20 snap_equals first.png
   # to the same place by hand: the view does not turn
   xdotool mousemove --window "$window" 60 230 click 1
-  wait_for snap_differs first.png
+  until_true 20 snap_differs first.png
   snap clicked.png
   xdotool mousemove --window "$window" 3 230 mousedown 1
   xdotool mousemove --window "$window" 40 100
   xdotool mousemove --window "$window" 60 20 mouseup 1
-  wait_for snap_equals clicked.png
+  until_true 20 snap_equals clicked.png
   # another button on the way is the camera's, which has its release
   xdotool mousemove --window "$window" 3 230 mousedown 1
   xdotool mousemove --window "$window" 60 100 mousedown 3 mouseup 3 mouseup 1
   xdotool mousemove --window "$window" 120 60
-  wait_for snap_equals clicked.png
+  until_true 20 snap_equals clicked.png
   sleep 0.5
   snap_equals clicked.png || fail "the camera still has the other button"
   # begun above the bar it is a turn, and goes over it
   xdotool mousemove --window "$window" 60 150 mousedown 1
   xdotool mousemove --window "$window" 90 200
   xdotool mousemove --window "$window" 120 230 mouseup 1
-  wait_for snap_differs clicked.png
+  until_true 20 snap_differs clicked.png
   press Home
-  wait_for snap_differs clicked.png # fitted to that frame set
+  until_true 20 snap_differs clicked.png # fitted to that frame set
   press space
   sleep 1
   snap playing.png
-  wait_for snap_differs playing.png
+  until_true 20 snap_differs playing.png
   quits_with q
 }
 
@@ -166,8 +166,8 @@ bar_comes_and_goes () {
   press space
   settle
   xdotool mousemove --window "$window" 100 100
-  wait_for looks_unlike settled.png
-  wait_for looks_like settled.png
+  until_true 20 looks_unlike settled.png
+  until_true 20 looks_like settled.png
   quits_with q
 }
 
@@ -191,11 +191,11 @@ has_no_bar () {
   sleep 3
   snap first.png
   press Right # turns
-  wait_for snap_differs first.png
+  until_true 20 snap_differs first.png
   press 1
   press 0
   press r
-  wait_for snap_equals first.png
+  until_true 20 snap_equals first.png
   quits_with q
 }
 
@@ -210,16 +210,16 @@ switches_views () {
   open_viewer still.rcnc --size 320x240
   snap both.png
   press 1
-  wait_for snap_differs both.png
+  until_true 20 snap_differs both.png
   snap second.png
   press space # the same while paused
   press 2
-  wait_for snap_differs second.png
+  until_true 20 snap_differs second.png
   snap none.png
   press 1
-  wait_for snap_differs none.png
+  until_true 20 snap_differs none.png
   press 0
-  wait_for snap_equals both.png
+  until_true 20 snap_equals both.png
   press 7 # there is none
   sleep 0.5
   snap_equals both.png || fail "a view that is not there"
@@ -227,8 +227,8 @@ switches_views () {
   settle
   press 2
   press 0
-  wait_for looks_unlike settled.png # a line says so
-  wait_for looks_like settled.png
+  until_true 20 looks_unlike settled.png # a line says so
+  until_true 20 looks_like settled.png
   quits_with q
 }
 
@@ -257,7 +257,7 @@ survives () {
   snap all.png
   for key in 1 2 3 4 5 6 7 8 9; do press $key; done
   press 0
-  wait_for test -s all.png
+  until_true 20 test -s all.png
   quits_with q
   # all keys at once, and some that come while it ends
   open_viewer moving.rcnc --size 320x240
@@ -265,7 +265,7 @@ survives () {
   xdotool mousemove --window "$window" 20 235 mousedown 1 mousemove 300 235 mousemove 10 235
   xdotool key --window "$window" --delay 0 Right q s h 1 period 2>/dev/null || true
   xdotool mouseup 1
-  wait_for has_ended
+  until_true 20 has_ended
   wait "$pipeline" || fail "exit status $?: $(tail -n 5 log.txt)"
   ! grep -i critical log.txt || fail "$(cat log.txt)"
 }

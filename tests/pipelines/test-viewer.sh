@@ -23,16 +23,16 @@ open_viewer () { # arguments of the viewer
   rangecast-viewer "$@" >log.txt 2>&1 &
   pipeline=$!
   trap 'kill -KILL $pipeline 2>/dev/null || true' EXIT
-  wait_for window_id
+  until_true 20 window_id
   window=$(cat window.txt)
-  wait_for first_picture
+  until_true 20 first_picture
 }
 press () { xdotool key --window "$window" "$1"; }
 has_ended () { ! kill -0 "$pipeline" 2>/dev/null; }
 # The window is gone before xdotool lets the key go.
 quits_with () { # key
   press "$1" 2>/dev/null || true
-  wait_for has_ended
+  until_true 20 has_ended
   wait "$pipeline" || fail "exit status $?: $(tail -n 5 log.txt)"
 }
 turned () { look after.png && ! cmp -s before.png after.png; }
@@ -40,7 +40,7 @@ turned () { look after.png && ! cmp -s before.png after.png; }
 snap () {
   rm -f rangecast-0001.png
   press s
-  wait_for test -s rangecast-0001.png
+  until_true 20 test -s rangecast-0001.png
   mv rangecast-0001.png "$1"
 }
 snap_equals () { snap now.png && cmp -s "$1" now.png; }
@@ -71,11 +71,11 @@ END
 writes_files () {
   open_viewer still.rcnc --size 320x240
   press s
-  wait_for test -s rangecast-0001.png
+  until_true 20 test -s rangecast-0001.png
   press p
-  wait_for grep -q 'wrote ./rangecast-0001.ply' log.txt
+  until_true 20 grep -q 'wrote ./rangecast-0001.ply' log.txt
   press s
-  wait_for test -s rangecast-0002.png
+  until_true 20 test -s rangecast-0002.png
   quits_with q
 }
 
@@ -116,9 +116,9 @@ turns_while_paused () {
   xdotool mousemove --window "$window" 160 120 mousedown 1
   xdotool mousemove --window "$window" 120 120
   xdotool mousemove --window "$window" 80 120 mouseup 1
-  wait_for snap_differs first.png
+  until_true 20 snap_differs first.png
   press r
-  wait_for snap_equals first.png
+  until_true 20 snap_equals first.png
   quits_with Escape
 }
 
@@ -151,7 +151,7 @@ closes_while_paused () {
   press space
   sleep 1
   ask_to_close "$window"
-  wait_for has_ended
+  until_true 20 has_ended
   wait "$pipeline" || fail "exit status $?: $(tail -n 5 log.txt)"
 }
 
@@ -166,7 +166,7 @@ follows_the_window () {
   xdotool windowsize "$window" 200 260
   sleep 1
   press s
-  wait_for test -s rangecast-0001.png
+  until_true 20 test -s rangecast-0001.png
   quits_with Escape
 }
 
@@ -242,9 +242,9 @@ shows_and_turns () { # command...
   "$@" >log.txt 2>&1 &
   pipeline=$!
   trap 'kill -KILL $pipeline 2>/dev/null || true' EXIT
-  wait_for first_picture
+  until_true 20 first_picture
   xdotool mousemove 160 120 mousedown 1 mousemove 120 120 mousemove 80 120 mouseup 1
-  wait_for turned
+  until_true 20 turned
 }
 gst_play_shows () { shows_and_turns gst-play-1.0 --no-interactive still.rcnc; }
 playbin_shows () { shows_and_turns gst-launch-1.0 playbin "uri=file://$PWD/still.rcnc"; }
