@@ -28,8 +28,6 @@ usage: demo.sh [options]
   --web [PORT]  show it in a browser instead, until interrupted: prints a link to a page that this machine
                 serves (port 8080), and one to a dashboard of the rig; writes no picture, video or report
   --no-film     do not write avatar.webm, whose encoding takes CPU time
-  --trace       write the time at which each buffer passed each pad to DIR/log/HOST.trace, for
-                tests/bench/latency-budget.py
   --jitter MS   jitter buffers of the parent and the viewer (default: see parent-host.sh, viewer-host.sh)
   --mtu BYTES   maximum packet size (default 1400); larger packets take less CPU time
   --threads N   maximum number of CPU cores for each camera host (default: the machine's cores divided by
@@ -47,7 +45,7 @@ for signal in INT TERM HUP; do
 done
 stop_hosts () { :; } # until there are any
 
-input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 web= window= film=yes trace= jitter= latency= loop= threads= mtu= depth= render=
+input=avatar views= size=320x240 frames=150 fps=15 out=out port=18400 web= window= film=yes jitter= latency= loop= threads= mtu= depth= render=
 while [ $# -gt 0 ]; do
   option=$1
   case "$1" in
@@ -68,7 +66,6 @@ while [ $# -gt 0 ]; do
       web=8080
       [[ ! "${2:-}" =~ ^[0-9]+$ ]] || { web=$2; shift; } ;;
     --no-film) film= ;;
-    --trace) trace=yes ;;
     --jitter) jitter=${2:-}; shift ;;
     --latency) latency=${2:-}; shift ;;
     -h | --help) usage; exit 0 ;;
@@ -82,7 +79,7 @@ need_number "$frames" --frames 1 1000000
 need_number "$fps" --fps 1 120
 need_number "$port" --port 1024 65000
 [ -z "$web" ] || need_number "$web" --web 0 65535
-[ -z "$web" ] || [ -z "$window$trace" ] || die "--web: expected without --window and --trace"
+[ -z "$web" ] || [ -z "$window" ] || die "--web and --window cannot be combined"
 [ -z "$jitter" ] || need_number "$jitter" --jitter 0 10000
 [ -z "$latency" ] || need_number "$latency" --latency 0 10000
 [ -z "$mtu" ] || need_number "$mtu" --mtu 256 65000
@@ -161,12 +158,11 @@ case "$input" in
   *) cp "$input/rig.yaml" "$rig" ;;
 esac
 
-trace_option () { [ -z "$trace" ] || printf -- '--trace-latency %q' "$out/log/$1.trace"; }
 
 start () { # name command...
   local name=$1
   shift
-  RANGECAST_HOST=$name RANGECAST_LAUNCH="rangecast-run $run_options $(trace_option "$name") --report $(printf %q "$out/log/$name.json")" \
+  RANGECAST_HOST=$name RANGECAST_LAUNCH="rangecast-run $run_options --report $(printf %q "$out/log/$name.json")" \
     "$@" >"$out/log/$name.log" 2>&1 &
   pids+=($!)
   names[$!]=$name
@@ -210,7 +206,7 @@ if [ -n "$web" ]; then
   ) &
 else
   [ -n "$film" ] || rm -f "$out/avatar.webm" # of another run
-  RANGECAST_HOST=viewer RANGECAST_LAUNCH="rangecast-run $(trace_option viewer) --progress --frames $frames --views $views --turn --timeout $((60 + 4 * frames / fps)) \
+  RANGECAST_HOST=viewer RANGECAST_LAUNCH="rangecast-run --progress --frames $frames --views $views --turn --timeout $((60 + 4 * frames / fps)) \
     --snapshot $(printf %q "$out/avatar.png") --report $(printf %q "$out/log/viewer.json")" \
     pipelines/viewer-host.sh --listen "$viewer_port" ${film:+--out "$out"} ${jitter:+--jitter "$jitter"} \
     ${render:+--render "$render"} $window &

@@ -17,7 +17,7 @@ build_is_complete () {
 if [ -d "$root/build/gst" ]; then
   export GST_PLUGIN_PATH="$root/build/gst${GST_PLUGIN_PATH:+:$GST_PLUGIN_PATH}"
   export GST_REGISTRY="${GST_REGISTRY:-$root/build/registry.bin}"
-  PATH="$root/build/pipelines:$PATH"
+  PATH="$root/build/pipelines:$root/build/tests/simulators:$PATH"
   build_is_complete || echo "env.sh: $root/build is incomplete: run $root/setup.sh" >&2
 elif ! gst-inspect-1.0 --exists --atleast-version=0.0.0 neighbourcodeenc 2>/dev/null; then
   echo "env.sh: gst-rangecast is neither built nor installed: run $root/setup.sh" >&2

@@ -7,8 +7,7 @@
 
 RunOptions::~RunOptions ()
 {
-  for (gchar *text :
-      {stats, trace, report, snapshot, frame_log, threads_left, memory_log, srtp_key, clock})
+  for (gchar *text : {stats, report, snapshot, frame_log, srtp_key, clock})
     g_free (text);
   g_strfreev (drop_empty);
   g_strfreev (launch);
@@ -34,8 +33,6 @@ RunOptions::parse (int *argc, char ***argv)
           "Send the elements' statistics to udp://HOST:PORT or a file, for top.sh (default: "
           "environment variable RANGECAST_STATS; none)",
           "ADDRESS"},
-      {"trace-latency", 0, 0, G_OPTION_ARG_FILENAME, &trace,
-          "Write the time at which each buffer passed each pad (the first 4 million)", "FILE"},
       {"report", 0, 0, G_OPTION_ARG_FILENAME, &report, "Write the measurements", "JSON"},
       {"snapshot", 0, 0, G_OPTION_ARG_FILENAME, &snapshot,
           "Write the last picture with all views, or else the last sample of the sink named "
@@ -43,10 +40,6 @@ RunOptions::parse (int *argc, char ***argv)
           "PNG"},
       {"frame-log", 0, 0, G_OPTION_ARG_FILENAME, &frame_log,
           "Write a line for each frame: time, latency, number of views with points", "CSV"},
-      {"memory-log", 0, 0, G_OPTION_ARG_FILENAME, &memory_log,
-          "Append a line every 5 s: time and heap in use, KiB", "CSV"},
-      {"threads-left", 0, 0, G_OPTION_ARG_FILENAME, &threads_left,
-          "Write the names of threads that are left when the pipeline is gone", "FILE"},
       {"srtp-key", 0, 0, G_OPTION_ARG_FILENAME, &srtp_key,
           "File with the key (60 hexadecimal digits) of every srtpenc and srtpdec", "FILE"},
       {"drop-empty", 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &drop_empty,

@@ -12,12 +12,10 @@ struct RunOptions {
   gint timeout_s = 0;
   gboolean loop = FALSE;
   gboolean progress = FALSE;
-  gchar *stats = nullptr, *trace = nullptr;
+  gchar *stats = nullptr;
   gchar *report = nullptr;
   gchar *snapshot = nullptr;
   gchar *frame_log = nullptr;
-  gchar *threads_left = nullptr;
-  gchar *memory_log = nullptr;
   gchar *srtp_key = nullptr;
   gchar *clock = nullptr;
   gchar **drop_empty = nullptr;

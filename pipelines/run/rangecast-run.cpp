@@ -19,7 +19,6 @@
 
 #include "clock.hpp"
 #include "common/dump-graph.hpp"
-#include "latency-trace.hpp"
 #include "report.hpp"
 #include "srtp-key.hpp"
 #include "stats-sender.hpp"
@@ -32,7 +31,6 @@ struct Runner {
   GMainLoop *loop = nullptr;
   std::unique_ptr<RunMeasure> measure;
   std::unique_ptr<StatsSender> stats;
-  std::unique_ptr<LatencyTrace> trace;
   std::set<int> learning; /* view-ids whose background is being learnt */
   bool failed = false;
   bool ending = false;
@@ -225,12 +223,6 @@ add_sources (Runner &runner)
   };
   if (runner.options.progress)
     g_timeout_add_seconds (2, progress, &runner);
-  const auto memory = [] (gpointer data) -> gboolean {
-    log_memory (static_cast<Runner *> (data)->options.memory_log);
-    return G_SOURCE_CONTINUE;
-  };
-  if (runner.options.memory_log)
-    g_timeout_add_seconds (5, memory, &runner);
 }
 
 /* A file without a byte, or WebM without a cluster: webmmux writes a header even without frames. */
@@ -264,10 +256,6 @@ finish (Runner &runner)
   for (gchar **path = options.drop_empty; path && *path; path++)
     if (is_empty (*path))
       g_remove (*path);
-  if (runner.trace && !runner.trace->write (options.trace)) {
-    g_printerr ("rangecast-run: %s: cannot be written\n", options.trace);
-    runner.failed = true;
-  }
 }
 
 void
@@ -282,8 +270,6 @@ play (Runner &runner)
     gst_element_set_base_time (runner.pipeline, GstClockTime (runner.options.base_time));
   }
   runner.measure->start ();
-  if (runner.options.trace)
-    runner.trace = std::make_unique<LatencyTrace> (runner.pipeline);
 
   if (gst_element_set_state (runner.pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
     report_failure (runner, bus);
@@ -342,7 +328,6 @@ run (Runner &runner)
     runner.failed = true;
   else
     play (runner);
-  runner.trace.reset ();
   runner.measure.reset ();
   gst_object_unref (runner.pipeline);
   return !runner.failed;
@@ -360,9 +345,7 @@ main (int argc, char **argv)
   runner.pipeline = parse_pipeline (runner.options.launch);
   if (!runner.pipeline)
     return 1;
-  bool good = run (runner);
-  if (runner.options.threads_left)
-    good = write_threads_left (runner.options.threads_left) && good;
+  const bool good = run (runner);
   gst_deinit (); /* tracers write now what they found */
   return good ? 0 : 1;
 }

@@ -2,11 +2,8 @@
 #include "report.hpp"
 
 #include <gst/video/video.h>
-#include <malloc.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
-#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -123,50 +120,4 @@ write_snapshot (GstElement *pipeline, RunMeasure &measure, const char *path)
     g_printerr ("rangecast-run: %s: %s\n", path, error ? error->message : "cannot be written");
   g_clear_error (&error);
   return written;
-}
-
-/* ---- what the process holds ---- */
-
-void
-log_memory (const char *path)
-{
-  const auto heap = mallinfo2 ();
-  std::ofstream (path, std::ios::app) << g_get_monotonic_time () / G_USEC_PER_SEC << ','
-                                      << (heap.uordblks + heap.hblkhd) / 1024 << '\n';
-}
-
-namespace {
-
-std::vector<std::string>
-other_threads ()
-{
-  std::vector<std::string> names;
-  std::error_code error;
-  const std::string own = std::to_string (getpid ());
-  for (const auto &task : std::filesystem::directory_iterator ("/proc/self/task", error)) {
-    std::string name;
-    std::ifstream (task.path () / "comm") >> name;
-    if (task.path ().filename () != own)
-      names.push_back (name);
-  }
-  return names;
-}
-
-} // namespace
-
-bool
-write_threads_left (const char *path)
-{
-  g_thread_pool_set_max_unused_threads (0); /* idle threads of the pool */
-  std::vector<std::string> left = other_threads ();
-  for (int i = 0; !left.empty () && i < 20; i++) {
-    g_usleep (50000);
-    left = other_threads ();
-  }
-  std::ofstream file (path);
-  for (const std::string &name : left)
-    file << name << '\n';
-  if (!file.flush ())
-    g_printerr ("rangecast-run: %s: cannot be written\n", path);
-  return bool (file);
 }

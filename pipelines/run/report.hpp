@@ -13,9 +13,3 @@ bool write_report (RunMeasure &measure, const char *path);
 /** Writes the last picture that shows all views, or else the last one of the sink named "snapshot",
  *  as a PNG. */
 bool write_snapshot (GstElement *pipeline, RunMeasure &measure, const char *path);
-/** Appends a line: seconds, KiB that the process holds of its heap, without what the allocator
- *  keeps of what was given back. */
-void log_memory (const char *path);
-/** Writes the names of the process's threads but for the first; those that end by themselves get a
- *  second for it. */
-bool write_threads_left (const char *path);

@@ -50,6 +50,5 @@ gst-launch-1.0 -q $(side "$people/left.mp4" depth.left) $(side "$people/right.mp
   ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink "location=$out/people.rcnc"
 measure people --recording "$out/people.rcnc" --skip 76 --frames 10
 
-"$here/plot-codecs.py" "$out/head.json" --out "$out/head.svg" --title "Scanned head, four views of 320x240"
 "$here/codec-table.py" "head 320x240=$out/head.json" "head 640x480=$out/head-640x480.json" "bunny=$out/bunny.json" \
   "room=$out/room.json" "people=$out/people.json"

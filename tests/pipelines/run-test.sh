@@ -4,12 +4,23 @@
 # usage: run-test.sh FILE [TEST...]; without TEST, all of them. A test fails when a command in it fails; `skip REASON` skips it.
 set -uo pipefail
 
+# A network of its own, so that all files of tests can run side by side with the same ports.
+if [ -z "${RANGECAST_NETWORK:-}" ]; then
+  export RANGECAST_NETWORK=own
+  for rights in --net "--net --map-root-user"; do
+    # shellcheck disable=SC2086
+    ! unshare $rights true 2>/dev/null || exec unshare $rights bash "$0" "$@"
+  done
+  exec flock "${TMPDIR:-/tmp}/rangecast-network" bash "$0" "$@" # one after the other
+fi
+ip link set lo up multicast on 2>/dev/null && ip route add 224.0.0.0/4 dev lo 2>/dev/null
+
 source_dir=${RANGECAST_SOURCE:-$(cd "$(dirname "$0")/../.." && pwd)}
 data=${RANGECAST_DATA:-$source_dir/../shared/data}
 pipelines=$source_dir/pipelines
 source "$pipelines/env.sh"
 export GST_PLUGIN_PATH="${RANGECAST_BUILD:-$source_dir/build}/gst"
-PATH="${RANGECAST_BUILD:-$source_dir/build}/pipelines:$PATH"
+PATH="${RANGECAST_BUILD:-$source_dir/build}/pipelines:${RANGECAST_BUILD:-$source_dir/build}/tests/simulators:$PATH"
 
 skip () { echo "skipped: $*"; exit 77; }
 fail () { echo "FAILED: $*" >&2; exit 1; }
@@ -59,14 +70,7 @@ need_gl () {
 }
 need_data () { [ -e "$data/$1" ] || skip "no test data $1"; }
 
-# Each run has 250 UDP ports of its own, below those that the kernel gives away, until the last process that it started
-# has ended. Where the locks cannot be had (other users' files), the number of this process decides.
-slot=$(($$ % 48))
-for ((try = 0; try < 48; try++)); do
-  { exec {port_lock}>>"/tmp/rangecast-ports-$slot"; } 2>/dev/null && flock -n "$port_lock" && break
-  slot=$(((slot + 1) % 48))
-done
-ports=$((20000 + slot * 250))
+ports=20000 # from here on, free: see below
 
 # A file of tests that mostly wait says side_by_side=N: so many of them run at a time. Their ports must differ.
 side_by_side=1

@@ -310,15 +310,6 @@ test_hosts_that_cannot_adapt_say_so () {
   [ ! -s fixed.txt ] || fail "it said: $(cat fixed.txt)"
 }
 
-test_udp_relay_names_what_is_missing () {
-  expect_error "--between lo,lo: expected two interfaces" udp-relay --between lo,lo
-  expect_error "--between lo: expected two interfaces" udp-relay --between lo
-  expect_error "--listen 20400: expected --to HOST:PORT" udp-relay --listen 20400
-  expect_error "--to 127.0.0.1:5: expected after its --listen PORT" udp-relay --to 127.0.0.1:5
-  expect_error "--listen and --between" udp-relay --listen 20400 --to 127.0.0.1:5 --between a,b
-  [ "$(id -u)" != 0 ] || expect_error "lo: is the loopback interface" udp-relay --between lo,eth0
-}
-
 test_recordings_that_there_are_are_kept () {
   "$pipelines/record.sh" good.rcnc --frames 3 --size 160x120 --views 1
   cp good.rcnc before.rcnc
@@ -330,26 +321,6 @@ test_recordings_that_there_are_are_kept () {
   cp before.rcnc film.webm
   expect_error "is not a recording" "$pipelines/play.sh" old.txt --film film.webm
   cmp film.webm before.rcnc || fail "the film before is gone"
-}
-
-test_programs_of_benchmarks_give_their_usage () {
-  local call status tests=$source_dir/tests
-  local programs=("$tests"/bench/{measure-parent,measure-codecs,copies,rate-table,cylinder-pictures,loss-picture,people-sheet,relays}.sh
-    "python3 $tests/bench/cylinder-table.py" "python3 $tests/fuzz/make-seeds.py")
-  ! command -v node >/dev/null || programs+=("node $tests/bench/web/clients.mjs" "node $tests/bench/web/decode.mjs")
-  for call in "${programs[@]}"; do
-    $call --help >help.txt 2>&1 || fail "$call --help: $(cat help.txt)"
-    grep -q '^usage: ' help.txt || fail "$call --help: $(cat help.txt)"
-    status=0
-    $call --nosuch >bad.txt 2>&1 || status=$?
-    [ "$status" = 2 ] || fail "$call --nosuch: $status $(cat bad.txt)"
-    grep -q '^usage: ' bad.txt || fail "$call --nosuch: $(cat bad.txt)"
-  done
-  "$tests/fuzz/make-seeds.py" seeds
-  expect_file seeds/slice/000 1
-  echo '{}' >empty.json
-  expect_error "empty.json: expected what cylinder_bench wrote" python3 "$tests/bench/cylinder-table.py" empty.json
-  expect_error "SECONDS: expected a whole number" "$tests/bench/measure-parent.sh" out x
 }
 
 test_required_options_are_named () {

@@ -494,7 +494,7 @@ test_demo_ends_with_term_and_says_when_the_server_failed () {
   need_server
   make_tree
   local demo
-  expect_error "--web: expected without --window and --trace" tree/pipelines/demo.sh --web --window
+  expect_error "--web and --window cannot be combined" tree/pipelines/demo.sh --web --window
   expect_error "--web: expected a whole number from 0 to 65535" tree/pipelines/demo.sh --web 65536
   [ ! -e setup.txt ] || fail "setup.sh was run"
   set -m
