@@ -100,7 +100,7 @@ test_another_version_alone_is_one_warning () {
   start_job $((ports + 60)) 0
   wait_for_sets '0 ' 5 60 # the parent is there
   send_version_4 $((port + 1)) 1000
-  wait_for parent.log 'another codec or version (this is version 3' 20
+  wait_for parent.log 'another codec or version .this is version 3' 20
   end_job
   [ "$(grep -c 'version 3' parent.log)" = 1 ] || fail "more than one warning: $(tail -n 20 parent.log)"
 }
