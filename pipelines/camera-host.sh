@@ -111,8 +111,8 @@ fi
 rtp_check sender
 # Spellings that GStreamer accepts for true.
 [[ ! "${encoder,,}" =~ adaptive-bitrate\ *=\ *[\"\']?(true|t|yes|1)([^a-z0-9]|$) ]] || rtp_adaptive=yes
-[ -z "$rtp_adaptive" ] || [ -n "$rtp_feedback" ] ||
-  echo "camera-host.sh: --encoder: adaptive-bitrate has no effect without --feedback, because no receiver reports arrive" >&2
+[ -z "$rtp_adaptive" ] || { [ -n "$rtp_feedback" ] && one_receiver "$to"; } ||
+  echo "camera-host.sh: --encoder: adaptive-bitrate has no effect; set --feedback, and one receiver in --to" >&2
 split_properties "$depth" algorithm=bm --depth stereodepth
 depth=("${words[@]}")
 split_properties "$encoder" profile=entropy --encoder neighbourcodeenc

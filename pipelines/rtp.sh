@@ -75,6 +75,8 @@ rtp_fb='rtcp-fb-nack-pli=(boolean)true,rtcp-fb-nack=(boolean)true'
 rtp_twcc='extmap-1=(string)http://www.ietf.org/id/draft-holmer-rmcat-transport-wide-cc-extensions-01'
 rtx_map='application/x-rtp-pt-map,96=(uint)97,122=(uint)123'
 
+one_receiver () { [[ "$1" != *,* && ! "$1" =~ ^(22[4-9]|23[0-9])\. ]]; } # HOST:PORT[,HOST:PORT...]
+
 # usage: send_rtp HOST:PORT[,HOST:PORT...] -> sets `rtp` to the elements that send coded frame sets to all of them.
 send_rtp () {
   local target twcc=
@@ -82,8 +84,8 @@ send_rtp () {
   rtp=(rtpneighbourcodepay ${rtp_mtu:+"mtu=$rtp_mtu"})
   # rtpsession would mix the transport-wide feedback of several receivers. It also keeps a record of every packet (70 bytes)
   # until feedback arrives, forever if none does. So it is enabled only where the bit rate adapts to it.
-  [[ -z "$rtp_adaptive" || "$1" == *,* || "$1" =~ ^(22[4-9]|23[0-9])\. ]] || twcc=,$rtp_twcc
-  [ -z "$rtp_feedback" ] || rtp+=(! "application/x-rtp,$rtp_fb$twcc" ! rtcpreports name=reports)
+  [ -z "$rtp_adaptive" ] || ! one_receiver "$1" || twcc=,$rtp_twcc
+  [ -z "$rtp_feedback" ] || rtp+=(! "application/x-rtp,$rtp_fb$twcc")
   [ -z "$rtp_fec" ] || rtp+=(! rtpulpfecenc "percentage=$rtp_fec" pt=122)
   [ -z "$rtp_rtx" ] || rtp+=(! rtprtxsend max-size-time=500 "payload-type-map=$rtx_map")
   [ -z "$rtp_feedback" ] || rtp+=(! session.send_rtp_sink session.send_rtp_src)
@@ -94,11 +96,10 @@ send_rtp () {
   rtp+=(rtpsession name=session rtp-profile=avpf)
   if [ -n "$rtp_key" ]; then
     rtp+=(udpsrc "port=$rtp_feedback" reuse=false caps=application/x-srtcp ! decrypt.rtcp_sink
-      srtpdec name=decrypt decrypt.rtcp_src ! reports.rtcp_sink)
+      srtpdec name=decrypt decrypt.rtcp_src ! session.recv_rtcp_sink)
   else
-    rtp+=(udpsrc "port=$rtp_feedback" reuse=false caps=application/x-rtcp ! reports.rtcp_sink)
+    rtp+=(udpsrc "port=$rtp_feedback" reuse=false caps=application/x-rtcp ! session.recv_rtcp_sink)
   fi
-  rtp+=(reports.rtcp_src ! session.recv_rtcp_sink)
 }
 
 # usage: receive_rtp NUMBER PORT JITTER_MS BUFFER_BYTES [GROUP] -> sets `rtp` to the elements that receive coded frame

@@ -8,7 +8,7 @@ cd "$(dirname "$0")/.."
 build=${RANGECAST_BUILD_TSAN:-build-tsan}
 tests=("$@")
 [ ${#tests[@]} -gt 0 ] || tests=(rangemux rangemuxclock rangemuxfaults rangemuxmany rangemuxrecordings rangedemux rangedemuxpads statistics
-  rtpneighbourcodeguard senderfilter rtcpreports adaptiverate stereodepth stereodepththird roiextract neighbourcodeenc neighbourcoderate
+  rtpneighbourcodeguard adaptiverate stereodepth stereodepththird roiextract neighbourcodeenc neighbourcoderate
   neighbourcodedec concealment temporal rangecombine cylinderfilter cylindercolour rangesplit rtploss avatarstream
   avatartestsrc neighbourcodeparse neighbourcodeseek stopqueries rangewebsink rangewebsinkclients rangewebsinkstream)
 [ -d "$build" ] || meson setup "$build" -Db_sanitize=thread -Db_lundef=false -Dbenchmarks=disabled || exit 1

@@ -2,10 +2,8 @@
 #include "adaptiverate.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 using rangecast::PacketReport;
-using rangecast::ReceiverReport;
 
 namespace {
 
@@ -41,7 +39,6 @@ AdaptiveRate::reset ()
 {
   std::lock_guard guard (lock_);
   control_.reset ();
-  sent_bits_per_s_ = 0;
   reports_ = 0;
 }
 
@@ -67,42 +64,15 @@ AdaptiveRate::handle_packets (const GstStructure *structure)
   control_.packets (packets_, now_ns ());
 }
 
-void
-AdaptiveRate::handle_report (const GstStructure *structure)
-{
-  guint ssrc = 0, packets = 0;
-  guint64 jitter = 0, round_trip = 0;
-  gdouble lost = 0;
-  gst_structure_get_uint (structure, "ssrc", &ssrc);
-  gst_structure_get_uint (structure, "packets", &packets);
-  gst_structure_get_uint64 (structure, "jitter", &jitter);
-  gst_structure_get_uint64 (structure, "round-trip-time", &round_trip);
-  if (!gst_structure_get_double (structure, "fraction-lost", &lost) || !std::isfinite (lost))
-    return;
-  const auto seconds = [] (guint64 ns) {
-    return double (std::min<guint64> (ns, 60 * GST_SECOND)) / 1e9;
-  };
-  const ReceiverReport report = {
-      ssrc, lost, double (packets), seconds (jitter), seconds (round_trip)};
-  std::lock_guard guard (lock_);
-  reports_++;
-  control_.receiver_report (report, sent_bits_per_s_, now_ns ());
-}
-
 bool
 AdaptiveRate::handle_event (GstEvent *event)
 {
   if (GST_EVENT_TYPE (event) != GST_EVENT_CUSTOM_UPSTREAM)
     return false;
   const GstStructure *structure = gst_event_get_structure (event);
-  if (!structure)
+  if (!structure || !gst_structure_has_name (structure, "RTPTWCCPackets"))
     return false;
-  if (gst_structure_has_name (structure, "RTPTWCCPackets"))
-    handle_packets (structure);
-  else if (gst_structure_has_name (structure, "RangecastReceiverReport"))
-    handle_report (structure);
-  else
-    return false;
+  handle_packets (structure);
   return true;
 }
 
@@ -110,7 +80,6 @@ double
 AdaptiveRate::update (const AdaptiveRateLimits &limits, double sent_bits_per_s)
 {
   std::lock_guard guard (lock_);
-  sent_bits_per_s_ = sent_bits_per_s;
   control_.configure ({limits.min_bits_per_s, limits.max_bits_per_s});
   control_.tick (sent_bits_per_s, now_ns ());
   return control_.bits_per_s ();

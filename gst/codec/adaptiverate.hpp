@@ -12,14 +12,13 @@ struct AdaptiveRateLimits {
   double min_bits_per_s = 0, max_bits_per_s = 0;
 };
 
-/** Estimates the bit rate that the network allows from two upstream events: RTPTWCCPackets
- *  (transport-wide feedback, from rtpsession) and RangecastReceiverReport (RTCP receiver reports,
- *  from rtcpreports or an application). Any thread. */
+/** Estimates the bit rate that the network allows from transport-wide feedback: RTPTWCCPackets, an
+ *  upstream event of rtpsession. Any thread. */
 class AdaptiveRate {
 public:
   void reset ();
 
-  /** Handles either event, whatever it holds. @return false if it is another one */
+  /** Handles it, whatever it holds. @return false if it is another event */
   bool handle_event (GstEvent *event);
 
   /** Call it before each frame set.
@@ -33,11 +32,9 @@ public:
 
 private:
   void handle_packets (const GstStructure *structure);
-  void handle_report (const GstStructure *structure);
 
   mutable std::mutex lock_;
   rangecast::CongestionControl control_;
-  double sent_bits_per_s_ = 0;
   guint64 reports_ = 0;
   std::vector<rangecast::PacketReport> packets_; /* of the current event; kept for its memory */
 };

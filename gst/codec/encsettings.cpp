@@ -123,8 +123,8 @@ encoder_properties ()
           "least colour-threshold)",
           0, 255, kControllable),
       P::boolean<&S::rate, &Rate::adaptive> ("adaptive-bitrate", "Adaptive bit rate",
-          "Adapt the bit rate between min-bitrate and target-bitrate to the receiver reports "
-          "(RTPTWCCPackets and RangecastReceiverReport events)",
+          "Adapt the bit rate between min-bitrate and target-bitrate to the receiver's "
+          "transport-wide feedback (RTPTWCCPackets events)",
           kMutablePlaying),
       P::number<&S::rate, &Rate::min_bitrate> ("min-bitrate", "Minimum bit rate",
           "Lower limit of the bit rate with adaptive-bitrate, in bits per second (at most "

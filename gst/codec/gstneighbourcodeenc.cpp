@@ -641,7 +641,7 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
   g_object_class_install_property (object_class, PROP_ESTIMATED_BITRATE,
       g_param_spec_uint64 ("estimated-bitrate", "Estimated bit rate",
           "Bit rate in bits per second that the network allows with adaptive-bitrate (before the "
-          "first receiver report: target-bitrate; 0 = no limit known)",
+          "first feedback: target-bitrate; 0 = no limit known)",
           0, G_MAXUINT64, 0, kReadOnly));
   install_stats (object_class, PROP_STATS,
       "Counters since the element was started (frames, left-out, points, full-pixels, slices, "

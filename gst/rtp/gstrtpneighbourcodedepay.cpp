@@ -21,6 +21,8 @@
 
 #include <gst/rtp/rtp.h>
 
+#include <algorithm>
+#include <cstring>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
@@ -28,10 +30,11 @@
 #include <optional>
 #include <rangecast/neighbourcode/bitstream/key_check.hpp>
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
+#include <span>
 #include <vector>
 
-#include "accessunitassembler.hpp"
 #include "common/properties.hpp"
+#include "common/recycledmemories.hpp"
 #include "common/statsreporter.hpp"
 
 using rangecast::Status;
@@ -51,6 +54,90 @@ struct Counters {
   guint64 packets = 0, units = 0, bad_units = 0, access_units = 0, unmarked = 0, without_rig = 0,
           lost_packets = 0, bytes = 0;
 };
+
+/* Assembles the units of an access unit, as they arrive, within the limits of one. The memory goes
+ * out as a buffer without being copied, and is used again once downstream is done with it. */
+class AccessUnitAssembler {
+public:
+  AccessUnitAssembler () = default;
+  ~AccessUnitAssembler () { reset (); }
+  AccessUnitAssembler (const AccessUnitAssembler &) = delete;
+
+  [[nodiscard]] bool empty () const { return size_ == 0; }
+
+  /* @return false, and the unit is lost, if the access unit would become longer than
+   * kMaxAccessUnitSize or have more than kMaxSlices units, or if memory is short */
+  bool add (std::span<const guint8> unit)
+  {
+    const gsize end = size_ + unit.size ();
+    if (end > rangecast::kMaxAccessUnitSize || units_ == rangecast::kMaxSlices)
+      return false;
+    if (end > map_.size && !grow (end))
+      return false;
+    std::memcpy (map_.data + size_, unit.data (), unit.size ());
+    size_ = end;
+    units_++;
+    return true;
+  }
+  void clear () { size_ = units_ = 0; }
+  /* The access unit, which is not empty; empty afterwards. @return transfer full */
+  GstBuffer *finish ()
+  {
+    /* A single huge access unit does not claim memory for all that follow it. */
+    constexpr gsize kMaxExpected = gsize{1} << 20;
+    expected_ = std::min (size_ + size_ / 8, kMaxExpected);
+    gst_memory_unmap (memory_, &map_);
+    gst_memory_resize (memory_, 0, size_);
+    GstBuffer *buffer = gst_buffer_new ();
+    gst_buffer_append_memory (buffer, memory_);
+    memory_ = nullptr;
+    map_ = {};
+    clear ();
+    return buffer;
+  }
+  /* Discards the units and frees all memory. */
+  void reset ()
+  {
+    clear ();
+    if (memory_) {
+      gst_memory_unmap (memory_, &map_);
+      gst_memory_unref (memory_);
+    }
+    memory_ = nullptr;
+    map_ = {};
+    memories_.drop ();
+  }
+
+private:
+  bool grow (gsize needed)
+  {
+    GstMemory *larger = memories_.acquire (std::min<gsize> (
+        std::max ({needed, 2 * map_.size, expected_}), rangecast::kMaxAccessUnitSize));
+    if (!larger)
+      return false;
+    GstMapInfo map;
+    gst_memory_resize (larger, 0, larger->maxsize);
+    if (!gst_memory_map (larger, &map, GST_MAP_WRITE)) {
+      gst_memory_unref (larger);
+      return false;
+    }
+    if (memory_) {
+      std::memcpy (map.data, map_.data, size_);
+      gst_memory_unmap (memory_, &map_);
+      gst_memory_unref (memory_);
+    }
+    memory_ = larger;
+    map_ = map;
+    return true;
+  }
+
+  RecycledMemories memories_;
+  GstMemory *memory_ = nullptr; /* mapped, or nullptr */
+  GstMapInfo map_{};
+  gsize size_ = 0, units_ = 0; /* bytes and units so far */
+  gsize expected_ = 0;         /* size of the next access unit, a guess */
+};
+
 } // namespace
 
 struct GstRtpNeighbourCodeDepayPrivate {

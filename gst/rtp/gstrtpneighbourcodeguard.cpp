@@ -4,11 +4,10 @@
  * @title: rtpneighbourcodeguard
  *
  * Passes the RTP packets of one sender of coded frame sets (or of another payload, such as speech,
- * whose encoding-name is in the caps) and drops everything else that arrives at its port. A sender
- * is accepted after consecutive valid packets, and replaced by another when it has been silent,
- * sooner from the same address and port. Place it between udpsrc and rtpjitterbuffer, which accepts
- * any RTP packet. Directly behind udpsrc it attaches a socket filter, so that the kernel drops
- * floods of foreign packets.
+ * whose encoding-name is in the caps) and drops all others at its port. It accepts the address and
+ * SSRC of the first three consecutive packets, until they are silent for half a second. Place it
+ * between udpsrc (or srtpdec) and rtpjitterbuffer, which accepts any RTP packet. It is no
+ * protection against forged packets; SRTP is.
  *
  * ## Example launch line
  * |[
@@ -25,65 +24,78 @@
 #include <gst/net/gstnet.h>
 #include <gst/rtp/rtp.h>
 
+#include <array>
 #include <mutex>
-#include <new>
 #include <optional>
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <span>
+#include <string>
+#include <utility>
 
 #include "common/properties.hpp"
-#include "netarrival.hpp"
-#include "senderfilter.hpp"
-#include "senderprobation.hpp"
-#include "senderrivals.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_guard_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_guard_debug
 
-enum : guint { PROP_STATS = 1, PROP_SETTINGS };
+enum : guint { PROP_STATS = 1 };
 
 namespace {
 
-/* Of two streams from one address and port the second waits for this silence of the first: it may
- * be a sender that was restarted, but also two senders behind one socket or relay. */
-constexpr GstClockTime kRestartTimeout = 250 * GST_MSECOND;
-/* Minimum number and duration of invalid packets, without a sender, for a warning. */
-constexpr guint kMinInvalidPackets = 20;
-constexpr GstClockTime kMinInvalidTime = 3 * GST_SECOND;
+constexpr gsize kConsecutive = 3;                     /* packets of a new sender */
+constexpr GstClockTime kSilence = 500 * GST_MSECOND;  /* then another sender is accepted */
+constexpr GstClockTime kBothSend = 2 * GST_SECOND;    /* then there is a warning, ... */
+constexpr guint kInvalidPackets = 20;                 /* ... and after so many invalid packets */
+constexpr GstClockTime kInvalidTime = 3 * GST_SECOND; /* in this time */
 constexpr char kEncoding[] = "X-NEIGHBOUR-CODE";
-constexpr std::size_t kRtxHeader = 2; /* the original sequence number, RFC 4588 */
 
-struct Settings {
-  GstClockTime timeout = 500 * GST_MSECOND; /* silence after which another sender is accepted */
+struct Packet {
+  bool valid = false; /* RTP with coded frame sets, or with the other payload of the caps */
+  bool is_rtp = false;
+  guint32 ssrc = 0;
+  guint16 sequence = 0;
+  guint8 payload_type = 0;
+  GSocketAddress *address = nullptr; /* of the buffer; null: unknown */
 };
 
-/* Since start. */
-struct Counters {
-  guint64 passed = 0, foreign = 0, senders = 0;
+/* Consecutive packets of one address and SSRC that may become the sender. The first one is valid,
+ * FEC may follow. */
+struct Candidate {
+  GSocketAddress *address = nullptr; /* a reference */
+  guint32 ssrc = 0;
+  guint8 payload_type = 0;
+  guint16 next = 0; /* sequence number */
+  gsize count = 0;
+  std::array<GstBuffer *, kConsecutive> packets = {}; /* references */
+
+  void clear ()
+  {
+    for (gsize i = 0; i < count; i++)
+      gst_buffer_unref (packets[i]);
+    count = 0;
+    g_clear_object (&address);
+  }
 };
 
 } // namespace
 
 struct GstRtpNeighbourCodeGuardPrivate {
   std::mutex lock; /* guards what follows; never held while pushing or posting */
-  Settings settings;
-  Counters counters;
-  std::optional<guint32> ssrc; /* of the accepted sender */
-  guint8 payload_type = 0;     /* of its packets of slices */
+  guint64 passed = 0, foreign = 0, senders = 0; /* since start */
+  std::optional<guint32> ssrc;                  /* of the sender */
+  guint8 payload_type = 0;                      /* of its coded frame sets */
 
   /* streaming thread only */
-  GstClockTime last_time = 0;          /* of the sender's last packet */
-  std::optional<guint32> rtx_ssrc;     /* of its retransmissions */
-  GSocketAddress *address = nullptr;   /* of the sender; null: unknown */
-  SenderProbation probation;           /* of sources, before one is accepted */
-  SenderRivals rivals, other_versions; /* while the sender sends */
-  guint64 invalid = 0;                 /* packets since the last one that passed */
+  GSocketAddress *address = nullptr; /* of the sender; null: unknown */
+  GstClockTime last_time = 0;        /* of the sender's last packet */
+  Candidate candidate;
+  std::string other; /* a second sender, not yet warned of */
+  GstClockTime other_since = 0;
+  bool has_other = false; /* a second sender was found since the sender was accepted */
+  guint invalid = 0;      /* packets in a row without a sender */
   GstClockTime invalid_since = 0;
-  bool warned_of_version = false, warned_of_invalid = false;
-  GSocket *filtered = nullptr; /* udpsrc's socket, if it has a filter */
-  bool filter_paused = false;  /* while the sender is silent */
-  GstCaps *caps = nullptr;     /* of the sink pad */
-  bool any_payload = false;    /* the caps name another encoding, whose packets are not examined */
+  bool warned_of_invalid = false;
+  GstCaps *caps = nullptr;  /* of the sink pad */
+  bool any_payload = false; /* the caps name another encoding, whose packets are not examined */
 };
 
 struct _GstRtpNeighbourCodeGuard {
@@ -103,67 +115,26 @@ GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodeguard, "rtpneighbourcodeguard", GST
 
 /* ---- packets ---- */
 
-/* As version_of_units(); may throw std::bad_alloc. */
-static int
-read_units (std::span<const guint8> payload)
-{
-  using namespace rangecast;
-  UnitReader reader (payload);
-  UnitHeader header;
-  SliceHeader slice;
-  bool any = false;
-  while (const auto unit = reader.next (header)) {
-    if (header.type == static_cast<guint8> (UnitType::kSlice)) {
-      if (!read_slice_header (*unit, slice).ok ())
-        return 0;
-      any = true;
-    }
-    any |= header.type == static_cast<guint8> (UnitType::kRigView);
-  }
-  if (reader.status ().ok ())
-    return any ? kBitstreamVersion : 0;
-  /* Of other versions only the sizes of units are known: they must lead to the end. */
-  const int version = payload.empty () ? 0 : payload[0] >> 4;
-  if (version == kBitstreamVersion)
-    return 0;
-  while (payload.size () >= kUnitHeaderSize) {
-    const gsize size = payload[2] | payload[3] << 8;
-    if (payload[0] >> 4 != version || size < kUnitHeaderSize || size > payload.size ())
-      return 0;
-    payload = payload.subspan (size);
-  }
-  return payload.empty () ? version : 0;
-}
-
-/* The version of the neighbour code if all bytes are its units, with a slice or a rig view among
- * them, which distinguishes them from other codecs and FEC; else 0. */
-static int
-version_of_units (std::span<const guint8> payload) noexcept
-{
-  try {
-    return read_units (payload);
-  } catch (const std::bad_alloc &) { /* for the text of a Status */
-    return 0;
-  }
-}
-
 namespace {
 
-/* What decides about a packet. */
-struct Packet {
-  bool is_rtp = false; /* else only its address is set */
-  guint32 ssrc = 0;
-  guint16 sequence = 0;
-  guint8 payload_type = 0;
-  int version = 0; /* of the neighbour code; 0: another payload */
-  bool units = false, repeated_units = false;
-  GSocketAddress *address = nullptr; /* of the buffer */
-};
+/* Whether all bytes are units of this version: those of other codecs, of FEC and of encrypted
+ * packets are not. */
+bool
+is_units (std::span<const guint8> payload)
+{
+  if (payload.empty ())
+    return false;
+  while (payload.size () >= rangecast::kUnitHeaderSize) {
+    const gsize size = payload[2] | payload[3] << 8;
+    if (payload[0] >> 4 != rangecast::kBitstreamVersion || size < rangecast::kUnitHeaderSize ||
+        size > payload.size ())
+      return false;
+    payload = payload.subspan (size);
+  }
+  return payload.empty ();
+}
 
-} // namespace
-
-/* @param any_payload  whether every RTP packet is a valid one */
-static Packet
+Packet
 read_packet (GstBuffer *buffer, bool any_payload)
 {
   Packet packet;
@@ -173,68 +144,96 @@ read_packet (GstBuffer *buffer, bool any_payload)
   if (!gst_rtp_buffer_map (buffer, GST_MAP_READ, &rtp))
     return packet;
   packet.is_rtp = true;
-  const std::span<const guint8> payload (
-      static_cast<const guint8 *> (gst_rtp_buffer_get_payload (&rtp)),
-      gst_rtp_buffer_get_payload_len (&rtp));
   packet.ssrc = gst_rtp_buffer_get_ssrc (&rtp);
   packet.sequence = gst_rtp_buffer_get_seq (&rtp);
   packet.payload_type = gst_rtp_buffer_get_payload_type (&rtp);
-  packet.version = any_payload ? rangecast::kBitstreamVersion : version_of_units (payload);
-  packet.units = packet.version == rangecast::kBitstreamVersion;
-  packet.repeated_units =
-      !packet.units && payload.size () > kRtxHeader &&
-      version_of_units (payload.subspan (kRtxHeader)) == rangecast::kBitstreamVersion;
+  packet.valid =
+      any_payload || is_units ({static_cast<const guint8 *> (gst_rtp_buffer_get_payload (&rtp)),
+                         gst_rtp_buffer_get_payload_len (&rtp)});
   gst_rtp_buffer_unmap (&rtp);
   return packet;
 }
 
-/* ---- the socket filter ---- */
-
-/* The socket of the udpsrc that is linked to the sink pad, or nullptr. */
-static GSocket *
-find_socket (GstRtpNeighbourCodeGuard *self)
+/* Whether both are one address and port; unknown ones (null) are equal. */
+bool
+same_address (GSocketAddress *a, GSocketAddress *b)
 {
-  GSocket *socket = nullptr;
-  GstPad *peer = gst_pad_get_peer (self->sinkpad);
-  GstElement *source = peer ? gst_pad_get_parent_element (peer) : nullptr;
-  if (source && g_object_class_find_property (G_OBJECT_GET_CLASS (source), "used-socket"))
-    g_object_get (source, "used-socket", &socket, nullptr);
-  gst_clear_object (&source);
-  gst_clear_object (&peer);
-  return socket;
+  if (a == b)
+    return true;
+  if (!G_IS_INET_SOCKET_ADDRESS (a) || !G_IS_INET_SOCKET_ADDRESS (b))
+    return false;
+  const auto x = G_INET_SOCKET_ADDRESS (a), y = G_INET_SOCKET_ADDRESS (b);
+  return g_inet_socket_address_get_port (x) == g_inet_socket_address_get_port (y) &&
+         g_inet_address_equal (
+             g_inet_socket_address_get_address (x), g_inet_socket_address_get_address (y));
 }
 
-static void
-stop_filter (GstRtpNeighbourCodeGuardPrivate *priv)
+std::string
+sender_text (guint32 ssrc, GSocketAddress *address)
 {
-  if (priv->filtered && !priv->filter_paused)
-    SenderFilter::detach (priv->filtered);
-  g_clear_object (&priv->filtered);
-  priv->filter_paused = false;
+  gchar *from = G_IS_INET_SOCKET_ADDRESS (address)
+                    ? g_socket_connectable_to_string (G_SOCKET_CONNECTABLE (address))
+                    : g_strdup ("an unknown address");
+  gchar *text = g_strdup_printf ("SSRC %08x from %s", ssrc, from);
+  const std::string result = text;
+  g_free (text);
+  g_free (from);
+  return result;
 }
 
-/* While the sender is silent all packets are let in: the next sender may be among them. */
-static void
-pause_filter (GstRtpNeighbourCodeGuardPrivate *priv, bool paused)
+/* @return whether it is the last one needed */
+bool
+add_packet (Candidate &candidate, const Packet &packet, GstBuffer *buffer)
 {
-  if (!priv->filtered || priv->filter_paused == paused)
-    return;
-  priv->filter_paused = paused;
-  if (paused)
-    SenderFilter::detach (priv->filtered);
-  else
-    SenderFilter::attach (priv->filtered, priv->address);
+  const bool follows = candidate.count > 0 && packet.is_rtp && packet.ssrc == candidate.ssrc &&
+                       packet.sequence == candidate.next &&
+                       same_address (packet.address, candidate.address);
+  if (!follows && !packet.valid)
+    return false;
+  if (!follows) {
+    candidate.clear ();
+    candidate.ssrc = packet.ssrc;
+    candidate.payload_type = packet.payload_type;
+    g_set_object (&candidate.address, packet.address);
+  }
+  candidate.next = guint16 (packet.sequence + 1);
+  candidate.packets[candidate.count++] = gst_buffer_ref (buffer);
+  return candidate.count == kConsecutive;
 }
 
-static void
-start_filter (GstRtpNeighbourCodeGuard *self)
+/* The running time at which udpsrc received a packet, or the current one if the buffer has no time.
+ * Without a pipeline clock, when no packet can have a time, it is the monotonic time. */
+GstClockTime
+arrival_time (GstElement *element, GstBuffer *buffer)
 {
-  GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
-  stop_filter (priv);
-  GSocket *socket = priv->address ? find_socket (self) : nullptr;
-  if (socket && SenderFilter::attach (socket, priv->address))
-    priv->filtered = G_SOCKET (g_object_ref (socket));
-  g_clear_object (&socket);
+  GstClockTime time = GST_BUFFER_DTS_OR_PTS (buffer);
+  if (!GST_CLOCK_TIME_IS_VALID (time))
+    time = gst_element_get_current_running_time (element);
+  return GST_CLOCK_TIME_IS_VALID (time) ? time : gst_util_get_timestamp ();
+}
+
+} // namespace
+
+/* Whether it is a packet of the sender: with its SSRC coded frame sets and FEC, with another SSRC
+ * retransmissions, which have another payload type. */
+static bool
+is_of_sender (const GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet)
+{
+  if (!priv->ssrc || !packet.is_rtp)
+    return false;
+  /* Packets that rtprtxreceive has restored have no address. */
+  if (!packet.address || !same_address (packet.address, priv->address))
+    return !packet.address && packet.ssrc == *priv->ssrc;
+  return packet.ssrc == *priv->ssrc || packet.payload_type != priv->payload_type;
+}
+
+/* A sender counts its SSRC up when its sequence numbers have wrapped (pipelines/run/srtp-key.cpp);
+ * the numbers go on. */
+static bool
+is_next_ssrc (const GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet)
+{
+  return priv->ssrc && packet.valid && packet.ssrc == *priv->ssrc + 1 &&
+         (!packet.address || same_address (packet.address, priv->address));
 }
 
 /* Adds the sender's SSRC to the caps, and removes the payload type, because of which the jitter
@@ -255,184 +254,76 @@ push_caps (GstRtpNeighbourCodeGuard *self)
   gst_caps_unref (caps);
 }
 
-/* ---- classification of packets, under the lock ---- */
-
-namespace {
-enum class Verdict {
-  kPasses,
-  kPassesAsFirst, /* a new sender is accepted */
-  kForeign,       /* dropped */
-  /* dropped, with a warning */
-  kInvalid,
-  kRival,
-  kOtherVersion
-};
-} // namespace
-
-/* Whether it is a packet of the sender, or a retransmission.
- * @param here  it comes from the sender's address and port */
-static bool
-is_of_sender (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, bool here)
-{
-  if (!priv->ssrc || !here || !packet.is_rtp)
-    return false;
-  if (packet.ssrc == *priv->ssrc) /* slices, or FEC */
-    return packet.units || packet.payload_type != priv->payload_type;
-  if (packet.payload_type == priv->payload_type ||
-      (!packet.repeated_units && packet.ssrc != priv->rtx_ssrc))
-    return false;
-  priv->rtx_ssrc = packet.ssrc;
-  return true;
-}
-
-static void
-accept_sender (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet)
-{
-  priv->ssrc = packet.ssrc;
-  priv->payload_type = packet.payload_type;
-  g_set_object (&priv->address, packet.address);
-  priv->rtx_ssrc.reset ();
-  priv->probation.clear ();
-  priv->rivals.clear ();
-  priv->other_versions.clear ();
-  priv->warned_of_invalid = false;
-  priv->counters.senders++;
-}
-
-/* An invalid packet while there is no sender, or it is silent. */
-static Verdict
-classify_invalid (GstRtpNeighbourCodeGuardPrivate *priv, GstClockTime now)
-{
-  if (priv->invalid++ == 0)
-    priv->invalid_since = now;
-  const bool report = !priv->warned_of_invalid && priv->invalid >= kMinInvalidPackets &&
-                      now >= priv->invalid_since && now - priv->invalid_since >= kMinInvalidTime;
-  priv->warned_of_invalid |= report;
-  return report ? Verdict::kInvalid : Verdict::kForeign;
-}
-
-/* A valid packet of another source while the sender sends. */
-static Verdict
-classify_rival (GstRtpNeighbourCodeGuardPrivate *priv, const SenderProbation::Packet &packet)
-{
-  if (packet.version == rangecast::kBitstreamVersion)
-    return priv->rivals.add (packet, priv->last_time) ? Verdict::kRival : Verdict::kForeign;
-  /* A source that sends this version, too, sends damaged copies. */
-  if (packet.ssrc == *priv->ssrc || priv->rivals.comes_from (packet.address) ||
-      priv->warned_of_version || !priv->other_versions.add (packet, priv->last_time))
-    return Verdict::kForeign;
-  priv->warned_of_version = true;
-  return Verdict::kOtherVersion;
-}
-
-/* @param[out] stream  the packets that pass with kPassesAsFirst */
-static Verdict
-classify_packet (GstRtpNeighbourCodeGuardPrivate *priv, const Packet &packet, GstClockTime now,
-    GstBuffer *buffer, SenderProbation::Stream &stream)
-{
-  /* Packets that rtprtxreceive has restored have no address; those from the network have one. */
-  const bool here = !packet.address || same_sender (packet.address, priv->address);
-  if (is_of_sender (priv, packet, here)) {
-    if (packet.ssrc == *priv->ssrc)
-      priv->last_time = now;
-    priv->invalid = 0;
-    pause_filter (priv, false);
-    return Verdict::kPasses;
-  }
-  const GstClockTime waited = now > priv->last_time ? now - priv->last_time : 0;
-  const bool silent =
-      !priv->ssrc || waited >= priv->settings.timeout || (here && waited >= kRestartTimeout);
-  if (!priv->ssrc || waited >= priv->settings.timeout)
-    pause_filter (priv, true);
-  if (packet.version == 0)
-    return silent ? classify_invalid (priv, now) : Verdict::kForeign;
-  const SenderProbation::Packet known = {
-      packet.address, packet.ssrc, packet.sequence, packet.version, now};
-  if (!silent)
-    return classify_rival (priv, known);
-  if (!packet.units && priv->warned_of_version)
-    return Verdict::kForeign;
-  if (!priv->probation.add (known, buffer, stream))
-    return Verdict::kForeign;
-  if (!packet.units) {
-    priv->warned_of_version = true;
-    return Verdict::kOtherVersion;
-  }
-  accept_sender (priv, packet);
-  priv->last_time = now;
-  priv->invalid = 0;
-  return Verdict::kPassesAsFirst;
-}
-
-/* ---- output ---- */
-
-/* Pushes the packets that a new sender sent during probation; `stream` is empty afterwards. */
+/* Makes the candidate the sender, and pushes its packets. */
 static GstFlowReturn
-push_first (GstRtpNeighbourCodeGuard *self, SenderProbation::Stream &stream)
+accept_candidate (GstRtpNeighbourCodeGuard *self)
 {
-  GST_INFO_OBJECT (self, "accepting packets of SSRC %08x", *self->priv->ssrc);
-  start_filter (self);
-  push_caps (self);
-  GstFlowReturn flow = GST_FLOW_OK;
-  bool first = true;
-  for (GstBuffer *buffer : stream) {
-    if (flow != GST_FLOW_OK) {
-      gst_buffer_unref (buffer);
-      continue;
-    }
-    if (first) {
-      buffer = gst_buffer_make_writable (buffer);
-      GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
-    }
-    first = false;
-    flow = gst_pad_push (self->srcpad, buffer);
+  GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
+  Candidate &candidate = priv->candidate;
+  const gsize count = std::exchange (candidate.count, 0);
+  {
+    std::lock_guard guard (priv->lock);
+    priv->ssrc = candidate.ssrc;
+    priv->payload_type = candidate.payload_type;
+    priv->senders++;
+    priv->passed += count;
+    priv->foreign -= count - 1; /* counted when they came */
   }
-  stream.release ();
+  g_set_object (&priv->address, candidate.address);
+  g_clear_object (&candidate.address);
+  priv->has_other = priv->warned_of_invalid = false;
+  priv->other.clear ();
+  GST_INFO_OBJECT (self, "accepting %s", sender_text (*priv->ssrc, priv->address).c_str ());
+  push_caps (self);
+  candidate.packets[0] = gst_buffer_make_writable (candidate.packets[0]);
+  GST_BUFFER_FLAG_SET (candidate.packets[0], GST_BUFFER_FLAG_DISCONT);
+  GstFlowReturn flow = GST_FLOW_OK;
+  for (gsize i = 0; i < count; i++)
+    if (flow == GST_FLOW_OK)
+      flow = gst_pad_push (self->srcpad, candidate.packets[i]);
+    else
+      gst_buffer_unref (candidate.packets[i]);
   return flow;
 }
 
-/* (transfer full) */
-static gchar *
-text_of (GSocketAddress *address)
-{
-  return G_IS_INET_SOCKET_ADDRESS (address)
-             ? g_socket_connectable_to_string (G_SOCKET_CONNECTABLE (address))
-             : g_strdup ("somewhere");
-}
+/* ---- warnings ---- */
 
 static void
-warn_of_rival (GstRtpNeighbourCodeGuard *self, const Packet &packet)
+warn_of_second_sender (GstRtpNeighbourCodeGuard *self, GstClockTime now)
 {
-  gchar *rival = text_of (packet.address), *sender = text_of (self->priv->address);
+  GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
+  if (priv->other.empty () || now < priv->other_since + kBothSend)
+    return;
   GST_ELEMENT_WARNING (self, RESOURCE, BUSY,
-      ("Two senders at one port: dropping packets of SSRC %08x from %s, accepting those of %08x "
-       "from %s",
-          packet.ssrc, rival, *self->priv->ssrc, sender),
+      ("Two senders at one port: dropping packets of %s, accepting those of %s; give one of them "
+       "another port",
+          std::exchange (priv->other, {}).c_str (),
+          sender_text (*priv->ssrc, priv->address).c_str ()),
       (nullptr));
-  g_free (sender);
-  g_free (rival);
 }
 
 static void
-warn_of (GstRtpNeighbourCodeGuard *self, Verdict verdict, const Packet &packet, guint64 invalid)
+warn_of_invalid (GstRtpNeighbourCodeGuard *self, GstClockTime now)
 {
-  if (verdict == Verdict::kInvalid && self->priv->any_payload)
+  GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
+  if (priv->invalid++ == 0)
+    priv->invalid_since = now;
+  if (priv->warned_of_invalid || priv->invalid < kInvalidPackets ||
+      now < priv->invalid_since + kInvalidTime)
+    return;
+  priv->warned_of_invalid = true;
+  if (priv->any_payload)
     GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-        ("%" G_GUINT64_FORMAT " packets that are not RTP, and no valid one", invalid), (nullptr));
-  else if (verdict == Verdict::kInvalid)
+        ("%u packets that are not RTP, and no valid one", priv->invalid), (nullptr));
+  else
     GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-        ("%" G_GUINT64_FORMAT " invalid packets and no valid one: expected coded frame sets of "
-         "version %d; the stream is of another codec, or encrypted (--key)",
-            invalid, rangecast::kBitstreamVersion),
-        (nullptr));
-  if (verdict == Verdict::kRival)
-    warn_of_rival (self, packet);
-  if (verdict == Verdict::kOtherVersion)
-    GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-        ("A sender uses version %d of the neighbour code: dropped; expected version %d",
-            packet.version, rangecast::kBitstreamVersion),
+        ("%u invalid packets and no valid one: the sender uses another codec or version (this is "
+         "version %d of the neighbour code), or encrypts (set --key)",
+            priv->invalid, rangecast::kBitstreamVersion),
         (nullptr));
 }
+
+/* ---- chain ---- */
 
 static GstFlowReturn
 gst_rtp_neighbour_code_guard_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
@@ -440,48 +331,60 @@ gst_rtp_neighbour_code_guard_chain (GstPad *, GstObject *parent, GstBuffer *buff
   auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
   GstRtpNeighbourCodeGuardPrivate *priv = self->priv;
   const Packet packet = read_packet (buffer, priv->any_payload);
-  Verdict verdict = Verdict::kForeign;
-  SenderProbation::Stream stream;
   const GstClockTime now = arrival_time (GST_ELEMENT (self), buffer);
-  guint64 invalid = 0;
-  {
-    std::lock_guard guard (priv->lock);
-    verdict = classify_packet (priv, packet, now, buffer, stream);
-    invalid = priv->invalid;
-    priv->counters.passed += verdict == Verdict::kPasses          ? 1
-                             : verdict == Verdict::kPassesAsFirst ? stream.size ()
-                                                                  : 0;
-    if (verdict == Verdict::kPassesAsFirst)
-      priv->counters.foreign -= stream.size () - 1; /* counted during probation */
-    else
-      priv->counters.foreign += verdict != Verdict::kPasses;
-  }
-  if (verdict == Verdict::kPasses)
+  if (is_of_sender (priv, packet)) {
+    if (packet.ssrc == *priv->ssrc)
+      priv->last_time = now;
+    priv->invalid = 0;
+    {
+      std::lock_guard guard (priv->lock);
+      priv->passed++;
+    }
+    warn_of_second_sender (self, now);
     return gst_pad_push (self->srcpad, buffer);
-  if (verdict == Verdict::kPassesAsFirst) {
-    gst_buffer_unref (buffer); /* the stream has a reference */
-    return push_first (self, stream);
+  }
+  const bool next = is_next_ssrc (priv, packet);
+  if (next)
+    priv->candidate.clear ();
+  const bool complete = add_packet (priv->candidate, packet, buffer) || next;
+  const bool silent = !priv->ssrc || now >= priv->last_time + kSilence;
+  if (complete && (silent || next)) {
+    gst_buffer_unref (buffer); /* the candidate has a reference */
+    priv->last_time = now;
+    priv->invalid = 0;
+    return accept_candidate (self);
   }
   GST_DEBUG_OBJECT (self, "dropping a packet: SSRC %08x, %s", packet.ssrc,
-      !packet.is_rtp        ? "not RTP"
-      : packet.version == 0 ? "not the neighbour code"
-                            : "not of the sender");
-  warn_of (self, verdict, packet, invalid);
-  stream.unref ();
+      !packet.is_rtp  ? "not RTP"
+      : !packet.valid ? "not the neighbour code"
+                      : "not of the sender");
+  {
+    std::lock_guard guard (priv->lock);
+    priv->foreign++;
+  }
+  if (complete) {
+    priv->candidate.clear ();
+    if (!std::exchange (priv->has_other, true)) {
+      priv->other = sender_text (packet.ssrc, packet.address);
+      priv->other_since = now;
+    }
+  }
+  if (!packet.valid && silent)
+    warn_of_invalid (self, now);
   gst_buffer_unref (buffer);
   return GST_FLOW_OK;
 }
 
-/* Under the lock. */
 static void
 reset_sender (GstRtpNeighbourCodeGuardPrivate *priv)
 {
-  stop_filter (priv);
-  priv->ssrc.reset ();
-  priv->rtx_ssrc.reset ();
-  priv->probation.clear ();
-  priv->rivals.clear ();
-  priv->other_versions.clear ();
+  {
+    std::lock_guard guard (priv->lock);
+    priv->ssrc.reset ();
+  }
+  priv->candidate.clear ();
+  priv->other.clear ();
+  priv->has_other = priv->warned_of_invalid = false;
   priv->invalid = 0;
   g_clear_object (&priv->address);
 }
@@ -492,10 +395,8 @@ static gboolean
 gst_rtp_neighbour_code_guard_sink_event (GstPad *pad, GstObject *parent, GstEvent *event)
 {
   auto self = GST_RTP_NEIGHBOUR_CODE_GUARD (parent);
-  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) { /* times may start again */
-    std::lock_guard guard (self->priv->lock);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) /* times may start again */
     reset_sender (self->priv);
-  }
   if (GST_EVENT_TYPE (event) != GST_EVENT_CAPS)
     return gst_pad_event_default (pad, parent, event);
   GstCaps *caps = nullptr;
@@ -540,50 +441,26 @@ gst_rtp_neighbour_code_guard_change_state (GstElement *element, GstStateChange t
                                           ->change_state (element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     gst_caps_replace (&self->priv->caps, nullptr);
-    std::lock_guard guard (self->priv->lock);
     reset_sender (self->priv);
-    self->priv->warned_of_version = self->priv->warned_of_invalid = false;
-    self->priv->counters = {};
+    std::lock_guard guard (self->priv->lock);
+    self->priv->passed = self->priv->foreign = self->priv->senders = 0;
   }
   return result;
-}
-
-static PropertyTable<Settings> &
-guard_properties ()
-{
-  using P = PropertyTable<Settings>;
-  static P table = {
-      P::number<&Settings::timeout> ("timeout", "Timeout",
-          "Silence of the current sender in nanoseconds after which another sender is accepted "
-          "(G_MAXUINT64 = never)",
-          0, G_MAXUINT64, kMutablePlaying),
-  };
-  return table;
-}
-
-static void
-gst_rtp_neighbour_code_guard_set_property (
-    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  GstRtpNeighbourCodeGuardPrivate *priv = GST_RTP_NEIGHBOUR_CODE_GUARD (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (!guard_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static void
 gst_rtp_neighbour_code_guard_get_property (
     GObject *object, guint id, GValue *value, GParamSpec *pspec)
 {
+  if (id != PROP_STATS) {
+    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+    return;
+  }
   GstRtpNeighbourCodeGuardPrivate *priv = GST_RTP_NEIGHBOUR_CODE_GUARD (object)->priv;
   std::lock_guard guard (priv->lock);
-  if (id == PROP_STATS)
-    g_value_take_boxed (value,
-        gst_structure_new ("application/x-rtpneighbourcodeguard-stats", "passed", G_TYPE_UINT64,
-            priv->counters.passed, "foreign", G_TYPE_UINT64, priv->counters.foreign, "senders",
-            G_TYPE_UINT64, priv->counters.senders, nullptr));
-  else if (!guard_properties ().get (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  g_value_take_boxed (value, gst_structure_new ("application/x-rtpneighbourcodeguard-stats",
+                                 "passed", G_TYPE_UINT64, priv->passed, "foreign", G_TYPE_UINT64,
+                                 priv->foreign, "senders", G_TYPE_UINT64, priv->senders, nullptr));
 }
 
 static void
@@ -619,11 +496,9 @@ gst_rtp_neighbour_code_guard_class_init (GstRtpNeighbourCodeGuardClass *klass)
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
 
-  object_class->set_property = gst_rtp_neighbour_code_guard_set_property;
   object_class->get_property = gst_rtp_neighbour_code_guard_get_property;
   object_class->finalize = gst_rtp_neighbour_code_guard_finalize;
 
-  guard_properties ().install (object_class, PROP_SETTINGS);
   install_stats (object_class, PROP_STATS,
       "Counters since the element was started: passed and foreign packets, and senders");
 

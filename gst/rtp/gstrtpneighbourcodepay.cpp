@@ -47,9 +47,6 @@ namespace {
 
 constexpr guint kMinPayloadType = 96;
 
-/* The minimum of neighbourcodeenc's max-slice-size. */
-constexpr gsize kMinSliceLimit = 256;
-
 struct Settings {
   int config_interval = 1; /* s; 0: only a changed rig, -1: with every frame set */
 };
@@ -121,8 +118,8 @@ gst_rtp_neighbour_code_pay_set_caps (GstRTPBasePayload *base, GstCaps *caps)
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
     return FALSE;
   if (const guint pt = GST_RTP_BASE_PAYLOAD_PT (base); pt < kMinPayloadType) {
-    GST_ELEMENT_ERROR (base, LIBRARY, SETTINGS,
-        ("pt=%u: expected a dynamic payload type, 96 to 127", pt), (nullptr));
+    GST_ELEMENT_ERROR (
+        base, LIBRARY, SETTINGS, ("pt=%u: set a dynamic payload type, 96 to 127", pt), (nullptr));
     return FALSE;
   }
   const std::vector<guint8> before = std::exchange (priv->rig_units, {});
@@ -289,27 +286,17 @@ set_marker (GstBufferList *packets)
   GST_BUFFER_FLAG_SET (last, GST_BUFFER_FLAG_MARKER);
 }
 
-/* Settings with which the unit would fit. */
-static std::string
-advice (const UnitHeader &unit, gsize room, gsize mtu_needed)
-{
-  const std::string larger_mtu = "mtu=" + std::to_string (mtu_needed) + " at least";
-  if (unit.type == guint8 (UnitType::kRigView))
-    return larger_mtu + ", or config-interval=0 where receivers have the rig from caps or SDP";
-  if (unit.type == guint8 (UnitType::kSlice) && room >= kMinSliceLimit)
-    return "max-slice-size=" + std::to_string (room) + " of neighbourcodeenc at most, or " +
-           larger_mtu;
-  return larger_mtu;
-}
-
 static GstFlowReturn
 refuse_long_unit (GstRTPBasePayload *base, const UnitHeader &unit, guint mtu, gsize room)
 {
-  const char *name = unit.type == guint8 (UnitType::kSlice) ? "slice" : "rig view";
-  const gsize mtu_needed = unit.size + GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->header_size;
+  const bool is_slice = unit.type == guint8 (UnitType::kSlice);
+  const std::string other =
+      is_slice ? "max-slice-size=" + std::to_string (room) + " or less on neighbourcodeenc"
+               : "config-interval=0, where receivers have the rig from caps or SDP";
   GST_ELEMENT_ERROR (base, LIBRARY, SETTINGS,
-      ("A %s of %d bytes does not fit into RTP packets of mtu=%u; expected %s", name,
-          int (unit.size), mtu, advice (unit, room, mtu_needed).c_str ()),
+      ("A %s of %u bytes does not fit into RTP packets of mtu=%u; set mtu=%zu or more, or %s",
+          is_slice ? "slice" : "rig view", guint (unit.size), mtu,
+          unit.size + GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->header_size, other.c_str ()),
       (nullptr));
   return GST_FLOW_ERROR;
 }

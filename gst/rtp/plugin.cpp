@@ -2,11 +2,10 @@
 /**
  * plugin-rtpneighbourcode:
  *
- * Neighbour code over RTP: payloader, depayloader, source guard and RTCP reports.
+ * Neighbour code over RTP: payloader, depayloader and source guard.
  */
 #include <gst/gst.h>
 
-GST_ELEMENT_REGISTER_DECLARE (rtcpreports)
 GST_ELEMENT_REGISTER_DECLARE (rtpneighbourcodedepay)
 GST_ELEMENT_REGISTER_DECLARE (rtpneighbourcodeguard)
 GST_ELEMENT_REGISTER_DECLARE (rtpneighbourcodepay)
@@ -15,7 +14,6 @@ static gboolean
 plugin_init (GstPlugin *plugin)
 {
   gboolean registered = FALSE;
-  registered |= GST_ELEMENT_REGISTER (rtcpreports, plugin);
   registered |= GST_ELEMENT_REGISTER (rtpneighbourcodedepay, plugin);
   registered |= GST_ELEMENT_REGISTER (rtpneighbourcodeguard, plugin);
   registered |= GST_ELEMENT_REGISTER (rtpneighbourcodepay, plugin);
@@ -23,5 +21,5 @@ plugin_init (GstPlugin *plugin)
 }
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, rtpneighbourcode,
-    "Neighbour code over RTP: payloader, depayloader, source guard and RTCP reports", plugin_init,
+    "Neighbour code over RTP: payloader, depayloader and source guard", plugin_init,
     PACKAGE_VERSION, "LGPL", "gst-rangecast", PACKAGE_ORIGIN)

@@ -129,45 +129,6 @@ def rtp_seeds(access_units: list[list[bytes]]) -> list[bytes]:
     return seeds
 
 
-def rtcp_packet(kind: int, count: int, *words: int, text: bytes = b"", padded: bool = False) -> bytes:
-    body = struct.pack(f">{len(words)}I", *words) + text
-    return struct.pack(">BBH", 0x80 | padded << 5 | count, kind, len(body) // 4) + body
-
-
-def rtcp_reports_seeds() -> list[bytes]:
-    """What receivers of stream 1 say, whole and with lies about it: flags, size, packet."""
-    sr, rr, sdes, bye, app, rtpfb, psfb, xr = range(200, 208)
-    block = (1, 0x40000005, 1000, 900, 0, 0)
-    report = rtcp_packet(rr, 1, 7, *block)
-    name = rtcp_packet(sdes, 1, 7, text=b"\1\1x\0")
-    good = [
-        report + name,
-        rtcp_packet(sr, 2, 7, 0, 0, 0, 0, 0, *block, 9, *block[1:]) + name + rtcp_packet(bye, 1, 7),
-        rtcp_packet(rr, 0, 7) + rtcp_packet(psfb, 1, 7, 1),  # PLI
-        rtcp_packet(psfb, 4, 7, 0, 1, 0x5000000),  # FIR
-        rtcp_packet(rtpfb, 1, 7, 1, 0x10003),  # NACK
-        report + rtcp_packet(sdes, 2, 7, text=b"\1\1x\0" + bytes((0, 0, 0, 7)) + b"\1\4xyzz\0\0"),
-        report + rtcp_packet(sdes, 1, 7, text=b"\1\2xy"),  # the zero at the end is not there
-        report + rtcp_packet(bye, 1, 7, 4, padded=True),
-        rtcp_packet(rr, 0, 7) + rtcp_packet(app, 0, 7, 0x72636E63) + rtcp_packet(xr, 0, 7) + rtcp_packet(210, 0),
-    ]
-    lies = [
-        rtcp_packet(rr, 0, 1) + rtcp_packet(sdes, 1),
-        rtcp_packet(rr, 1, 7),
-        rtcp_packet(sr, 0, 7),
-        report + rtcp_packet(sdes, 2, 7, 0),
-        report + rtcp_packet(sdes, 1, 7, text=b"\1\3x\0"),
-        report + rtcp_packet(bye, 2, 7),
-        report + rtcp_packet(psfb, 1, 7),
-        report + rtcp_packet(app, 0, 7, 12, padded=True),
-        report + b"\x80",
-    ]
-    singles = [bytes((8 | i % 8,)) + struct.pack("<H", len(packet)) + packet for i, packet in enumerate(good + lies)]
-    many = [rtcp_packet(rr, 1, 100 + i, *block) for i in range(20)]
-    flood = b"".join(bytes((i % 7 | 8 * (i == 15),)) + struct.pack("<H", len(packet)) + packet for i, packet in enumerate(many))
-    return [*singles, b"".join(singles[: len(good)]), flood]
-
-
 VIEW = {
     "id": "0",
     "name": "\"front\"",
@@ -299,7 +260,7 @@ def main() -> None:
     to = parser.parse_args().folder
     seeds: dict[str, list[bytes]] = {"slice": too_large_numbers(), "access_unit": [], "rtp_depay": [], "byte_stream": [], "rig": []}
     seeds |= {"rig_file": rig_file_seeds(), "background": background_seeds(), "range_meta": range_meta_seeds(), "parse": []}
-    seeds |= {"camera_texts": camera_texts_seeds(), "gltf": gltf_seeds(), "rtcp_reports": rtcp_reports_seeds()}
+    seeds |= {"camera_texts": camera_texts_seeds(), "gltf": gltf_seeds()}
     for path in STREAMS:
         data = path.read_bytes()
         if path.stem == "damaged" or path.stem.startswith("rules-"):  # some of their sizes are lies

@@ -295,9 +295,9 @@ test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
   "${camera[@]}" --encoder profile=entropy >camera.txt
   "${camera[@]}" --encoder "profile=entropy adaptive-bitrate=true" >adaptive.txt 2>said.txt
   [ ! -s said.txt ] || fail "it said: $(cat said.txt)"
-  grep -q 'rtcpreports' parent.txt || fail "no launch string: $(cat parent.txt)"
-  ! grep -q 'transport-wide[^!]*! rtcpreports' parent.txt camera.txt || fail "for nothing: $(cat parent.txt camera.txt)"
-  grep -q 'transport-wide[^!]*! rtcpreports' adaptive.txt || fail "not where it is of use: $(cat adaptive.txt)"
+  grep -q 'session.send_rtp_sink' parent.txt || fail "no launch string: $(cat parent.txt)"
+  ! grep -q 'transport-wide[^!]*! session.send_rtp_sink' parent.txt camera.txt || fail "for nothing: $(cat parent.txt camera.txt)"
+  grep -q 'transport-wide[^!]*! session.send_rtp_sink' adaptive.txt || fail "not where it is of use: $(cat adaptive.txt)"
 }
 
 test_hosts_that_cannot_adapt_say_so () {
@@ -306,6 +306,7 @@ test_hosts_that_cannot_adapt_say_so () {
   export RANGECAST_LAUNCH=echo
   "${camera[@]}" --encoder "adaptive-bitrate=true" 2>adaptive.txt | grep -q 'adaptive-bitrate=true' || fail "it does not begin"
   [ "$(grep -c -- '--feedback' adaptive.txt)" = 1 ] || fail "it said: $(cat adaptive.txt)"
+  "${camera[@]},127.0.0.1:6001" --feedback 5100 --encoder "adaptive-bitrate=true" 2>&1 >/dev/null | grep -q 'one receiver' || fail "two receivers"
   "${camera[@]}" --encoder "adaptive-bitrate=false" 2>fixed.txt
   [ ! -s fixed.txt ] || fail "it said: $(cat fixed.txt)"
 }

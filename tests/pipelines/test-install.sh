@@ -74,7 +74,7 @@ rangemux rangemux rangedemux capturesync
 rangerender cylinderfilter striprender rangerender
 rangetestsrc avatartestsrc
 rangewebcam stereowebcamprovider
-rtpneighbourcode rtpneighbourcodepay rtpneighbourcodedepay rtpneighbourcodeguard rtcpreports
+rtpneighbourcode rtpneighbourcodepay rtpneighbourcodedepay rtpneighbourcodeguard
 END
 }
 

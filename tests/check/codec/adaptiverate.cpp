@@ -134,14 +134,6 @@ usual_rate ()
   return 8 * 30 * double (session.sizes.back ());
 }
 
-static GstEvent *
-receiver_report (double lost, guint ssrc = 1)
-{
-  return gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM,
-      gst_structure_new ("RangecastReceiverReport", "ssrc", G_TYPE_UINT, ssrc, "fraction-lost",
-          G_TYPE_DOUBLE, lost, "packets", G_TYPE_UINT, 500u, nullptr));
-}
-
 GST_START_TEST (test_without_trouble_thresholds_are_as_configured)
 {
   Session plain (""), adaptive ("adaptive-bitrate=true");
@@ -211,18 +203,6 @@ GST_START_TEST (test_without_adaptive_bitrate_events_change_nothing)
   other.play (60, false);
   fail_unless_cmp (session.sizes, ==, other.sizes);
   fail_unless_equals_uint64 (session.stat ("receiver-reports"), 60);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_receiver_reports_lower_the_rate)
-{
-  Session session ("adaptive-bitrate=true");
-  session.play (10, false);
-  for (int i = 0; i < 2; i++)
-    fail_unless (gst_harness_push_upstream_event (session.h, receiver_report (0.3)));
-  session.play (10, false);
-  ck_assert_uint_gt (session.estimate (), 0);
-  fail_unless_cmp (double (session.estimate ()), <, 0.7 * usual_rate ());
 }
 GST_END_TEST;
 
@@ -315,11 +295,7 @@ GST_START_TEST (test_events_that_hold_nonsense_are_borne)
   Session session ("adaptive-bitrate=true");
   session.play (5);
   const char *const nonsense[] = {"RTPTWCCPackets", "RTPTWCCPackets, packets=(int)3",
-      "RTPTWCCPackets, packets=(string)x", "RangecastReceiverReport",
-      "RangecastReceiverReport, fraction-lost=(string)much",
-      "RangecastReceiverReport, fraction-lost=(double)-7, jitter=(guint64)18446744073709551615, "
-      "round-trip-time=(guint64)18446744073709551615, packets=(uint)4294967295",
-      "RangecastReceiverReport, fraction-lost=(double)1e300"};
+      "RTPTWCCPackets, packets=(string)x"};
   for (const char *text : nonsense) {
     GstStructure *structure = gst_structure_from_string (text, nullptr);
     fail_unless (structure != nullptr, "%s", text);
@@ -370,7 +346,6 @@ adaptiverate_suite ()
   tcase_add_test (tc, test_lost_packets_lower_the_rate);
   tcase_add_test (tc, test_target_bitrate_is_the_most_and_min_bitrate_the_least);
   tcase_add_test (tc, test_without_adaptive_bitrate_events_change_nothing);
-  tcase_add_test (tc, test_receiver_reports_lower_the_rate);
   tcase_add_test (tc, test_below_the_worst_thresholds_whole_frame_sets_are_left_out_evenly);
   tcase_add_test (tc, test_min_framerate_is_kept);
   tcase_add_test (tc, test_what_refers_to_earlier_frame_sets_decodes_where_some_are_left_out);

@@ -20,7 +20,6 @@ struct Received {
   int frames = 0;
   int in_order = 0;        /* later than the one before */
   double right_pixels = 0; /* share of those that were sent, of the frame sets that came */
-  guint64 points = 0, missing = 0, bad = 0;
 };
 
 static double
@@ -92,35 +91,22 @@ pull_everything (GstElement *pipeline, const Rig &rig)
   return received;
 }
 
-static void
-read_stats (GstElement *pipeline, Received &received)
-{
-  GstElement *decoder = gst_bin_get_by_name (GST_BIN (pipeline), "dec");
-  GstStructure *stats;
-  g_object_get (decoder, "stats", &stats, nullptr);
-  gst_structure_get (stats, "points", G_TYPE_UINT64, &received.points, "missing-pixels",
-      G_TYPE_UINT64, &received.missing, "bad-slices", G_TYPE_UINT64, &received.bad, nullptr);
-  gst_structure_free (stats);
-  gst_object_unref (decoder);
-}
-
 /* Sends kFrames frame sets, all alike but for their times, through netsim; an error fails. */
 static Received
-send (const Rig &rig, const char *network, const char *decoder = "", const char *coded = "")
+send (const Rig &rig, const char *network, const char *coded = "")
 {
   const std::string launch =
       std::string ("appsrc name=in format=time is-live=true ! neighbourcodeenc profile=plain "
                    "depth-bits=16 depth-threshold=0 colour-threshold=0 ! ") +
       coded + " rtpneighbourcodepay config-interval=-1 ! netsim " + network +
-      " ! rtpjitterbuffer latency=150 ! rtpneighbourcodedepay ! neighbourcodedec name=dec " +
-      decoder + " ! appsink name=out sync=false async=false";
+      " ! rtpjitterbuffer latency=150 ! rtpneighbourcodedepay ! neighbourcodedec ! appsink "
+      "name=out sync=false async=false";
   GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
   fail_unless (pipeline != nullptr);
   GstBus *bus = gst_element_get_bus (pipeline);
   gst_element_set_state (pipeline, GST_STATE_PLAYING);
   push_in_real_time (pipeline, rig);
-  Received received = pull_everything (pipeline, rig);
-  read_stats (pipeline, received);
+  const Received received = pull_everything (pipeline, rig);
   GstMessage *error = gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR);
   fail_unless (error == nullptr);
   gst_element_set_state (pipeline, GST_STATE_NULL);
@@ -143,43 +129,6 @@ GST_START_TEST (test_good_network_loses_nothing)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_share_of_right_pixels_is_that_of_packets_that_come)
-{
-  NEED_NETSIM;
-  for (const double loss : {0.05, 0.3}) {
-    const std::string network = "drop-probability=" + std::to_string (loss);
-    const Received received = send (ring_rig (2, 160, 120), network.c_str ());
-    fail_unless (received.frames > kFrames - 5, "%d frames", received.frames);
-    fail_unless_equals_int (received.in_order, received.frames);
-    fail_unless (std::abs (received.right_pixels - (1 - loss)) < 0.05, "%g right at loss %g",
-        received.right_pixels, loss);
-    fail_unless_equals_uint64 (received.bad, 0);
-  }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_conceal_last_fills_what_is_lost)
-{
-  NEED_NETSIM;
-  const Received received = send (ring_rig (2, 160, 120), "drop-probability=0.1", "conceal=last");
-  fail_unless (received.frames > kFrames - 5, "%d frames", received.frames);
-  ck_assert_uint_gt (received.missing, 0);
-  /* Only what was lost from the first frame set on stays away until it comes once. */
-  fail_unless (received.right_pixels > 0.99, "%g right", received.right_pixels);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_repeated_packets_change_nothing)
-{
-  NEED_NETSIM;
-  const Rig rig = ring_rig (2, 160, 120);
-  const Received once = send (rig, ""), twice = send (rig, "duplicate-probability=0.5");
-  fail_unless_equals_int (twice.frames, kFrames);
-  fail_unless_cmp (twice.right_pixels, ==, 1);
-  fail_unless_equals_uint64 (twice.points, once.points);
-}
-GST_END_TEST;
-
 /* Before it knows their rate, rtpjitterbuffer starts over if 120 packets are out of order. */
 GST_START_TEST (test_packets_out_of_order_change_nothing)
 {
@@ -198,7 +147,7 @@ GST_START_TEST (test_slices_sent_one_by_one_come_through_loss_and_disorder)
   const Received received = send (ring_rig (2, 160, 120),
       "drop-probability=0.1 duplicate-probability=0.1 delay-probability=0.2 min-delay=1 "
       "max-delay=30",
-      "", "video/x-neighbour-code,alignment=slice !");
+      "video/x-neighbour-code,alignment=slice !");
   fail_unless (received.frames > kFrames - 5, "%d frames", received.frames);
   fail_unless_equals_int (received.in_order, received.frames);
   fail_unless (std::abs (received.right_pixels - 0.9) < 0.06, "%g right", received.right_pixels);
@@ -339,19 +288,6 @@ lose_at_random (Losses &losses, unsigned seed, std::size_t first = 0, std::size_
       losses[i][j] = random () % 20 == 0;
 }
 
-/* As many packets of every frame set as 5 % are, rounded down. */
-static void
-lose_one_in_twenty_of_each (Losses &losses, unsigned seed)
-{
-  std::mt19937 random (seed);
-  for (auto &lost : losses)
-    for (std::size_t left = lost.size () / 20; left > 0;) {
-      const std::size_t j = random () % lost.size ();
-      left -= !lost[j];
-      lost[j] = true;
-    }
-}
-
 GST_START_TEST (test_at_5_percent_loss_exactly_the_pixels_of_packets_that_came_are_there_and_right)
 {
   for (const char *profile : kProfiles) {
@@ -372,37 +308,6 @@ GST_START_TEST (test_at_5_percent_loss_exactly_the_pixels_of_packets_that_came_a
       }
     }
     ck_assert_int_gt (lossy_sets, 8);
-  }
-}
-GST_END_TEST;
-
-/* Of frame sets that lose 5 % of their packets 95 % of the pixels are right on average. Packets
- * have about as many bytes, not as many pixels: one of the built-in figure holds up to 2.3 (plain)
- * or 1.6 times (packed, entropy) the average here, so the pixels of single frame sets may be less
- * than 94 %. Where each packet is lost with 5 % by chance, frame sets also lose other numbers of
- * them: of 25 packets 2 or more in one of three frame sets, and nothing in another one. What holds
- * for each frame set then is the test above. */
-GST_START_TEST (
-    test_where_each_frame_set_loses_5_percent_of_its_packets_94_percent_of_pixels_are_right)
-{
-  for (const char *profile : kProfiles) {
-    const Packets packets (std::string ("profile=") + profile, 6);
-    const auto whole = receive (packets, no_losses (packets));
-    for (const unsigned seed : {1, 2, 3, 4}) {
-      Losses losses = no_losses (packets);
-      lose_one_in_twenty_of_each (losses, seed);
-      const auto lossy = receive (packets, losses);
-      double sum = 0;
-      for (std::size_t i = 0; i < whole.size (); i++) {
-        ck_assert_uint_ge (packets.frame_sets[i].size (), 20);
-        const double right = compare (whole[i], lossy[i]).right_share ();
-        fail_unless (
-            right >= 0.93 && right < 1, "%s, seed %u, frame set %zu: %g", profile, seed, i, right);
-        sum += right;
-      }
-      fail_unless (sum >= 0.94 * double (whole.size ()), "%s, seed %u: %g", profile, seed,
-          sum / double (whole.size ()));
-    }
   }
 }
 GST_END_TEST;
@@ -489,15 +394,10 @@ rtploss_suite ()
   tcase_set_timeout (tc, 120);
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_good_network_loses_nothing);
-  tcase_add_test (tc, test_share_of_right_pixels_is_that_of_packets_that_come);
-  tcase_add_test (tc, test_conceal_last_fills_what_is_lost);
-  tcase_add_test (tc, test_repeated_packets_change_nothing);
   tcase_add_test (tc, test_packets_out_of_order_change_nothing);
   tcase_add_test (tc, test_slices_sent_one_by_one_come_through_loss_and_disorder);
   tcase_add_test (
       tc, test_at_5_percent_loss_exactly_the_pixels_of_packets_that_came_are_there_and_right);
-  tcase_add_test (
-      tc, test_where_each_frame_set_loses_5_percent_of_its_packets_94_percent_of_pixels_are_right);
   tcase_add_test (
       tc, test_temporal_pixels_are_right_or_invalid_and_all_right_after_the_refresh_period);
   tcase_add_test (

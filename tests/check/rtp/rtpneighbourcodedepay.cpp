@@ -106,45 +106,6 @@ GST_START_TEST (test_access_units_come_back_byte_for_byte)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_every_packet_fits_the_mtu_and_holds_whole_units)
-{
-  const Sent sent (ring_rig (2));
-  ck_assert_uint_gt (sent.packets.size (), 20);
-  for (GstBuffer *packet : sent.packets) {
-    ck_assert_uint_le (gst_buffer_get_size (packet), 1400);
-    const auto payload = payload_of (packet);
-    UnitReader reader (payload);
-    UnitHeader header;
-    int units = 0;
-    while (reader.next (header))
-      units++;
-    fail_unless_ok (reader.status ());
-    ck_assert_int_gt (units, 0);
-  }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_marker_is_on_the_last_packet_of_each_access_unit)
-{
-  const Sent sent (ring_rig (1), 4);
-  int markers = 0;
-  for (std::size_t i = 0; i < sent.packets.size (); i++) {
-    GstRTPBuffer rtp = GST_RTP_BUFFER_INIT, next = GST_RTP_BUFFER_INIT;
-    gst_rtp_buffer_map (sent.packets[i], GST_MAP_READ, &rtp);
-    const bool marker = gst_rtp_buffer_get_marker (&rtp);
-    markers += marker;
-    if (i + 1 < sent.packets.size ()) {
-      gst_rtp_buffer_map (sent.packets[i + 1], GST_MAP_READ, &next);
-      fail_unless_equals_int (
-          marker, gst_rtp_buffer_get_timestamp (&rtp) != gst_rtp_buffer_get_timestamp (&next));
-      gst_rtp_buffer_unmap (&next);
-    }
-    gst_rtp_buffer_unmap (&rtp);
-  }
-  fail_unless_equals_int (markers, 4);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_any_one_lost_packet_costs_only_its_own_units)
 {
   const Sent sent (ring_rig (1), 3);
@@ -286,22 +247,6 @@ GST_START_TEST (test_damaged_packets_are_counted_and_never_fatal)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_slice_too_long_for_the_mtu_is_one_error_that_says_what_to_set)
-{
-  GstHarness *h = gst_harness_new_parse (
-      "neighbourcodeenc profile=plain max-slice-size=4000 ! rtpneighbourcodepay mtu=1400");
-  GstBus *bus = gst_bus_new ();
-  gst_element_set_bus (h->element, bus);
-  const Rig rig = ring_rig (1);
-  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 25, 1)));
-  fail_unless_equals_int (gst_harness_push (h, make_frame_set (rig)), GST_FLOW_ERROR);
-  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "max-slice-size");
-  gst_element_set_bus (h->element, nullptr);
-  gst_object_unref (bus);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_bad_rig_in_the_caps_is_one_error)
 {
   GstHarness *h = gst_harness_new ("rtpneighbourcodedepay");
@@ -423,8 +368,6 @@ rtpneighbourcodedepay_suite ()
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_access_units_come_back_byte_for_byte);
   tcase_add_test (tc, test_access_units_keep_their_bytes_while_others_follow);
-  tcase_add_test (tc, test_every_packet_fits_the_mtu_and_holds_whole_units);
-  tcase_add_test (tc, test_marker_is_on_the_last_packet_of_each_access_unit);
   tcase_add_test (tc, test_any_one_lost_packet_costs_only_its_own_units);
   tcase_add_test (tc, test_an_access_unit_that_lacks_slices_is_no_key_unit_and_others_are);
   tcase_add_test (tc, test_rig_of_64_views_comes_in_band);
@@ -433,7 +376,6 @@ rtpneighbourcodedepay_suite ()
   tcase_add_test (tc, test_nothing_comes_out_before_the_rig_is_known);
   tcase_add_test (tc, test_slices_of_views_that_the_rig_has_not_are_damaged_units);
   tcase_add_test (tc, test_damaged_packets_are_counted_and_never_fatal);
-  tcase_add_test (tc, test_slice_too_long_for_the_mtu_is_one_error_that_says_what_to_set);
   tcase_add_test (tc, test_bad_rig_in_the_caps_is_one_error);
   tcase_add_test (tc, test_works_again_after_null);
   return suite;

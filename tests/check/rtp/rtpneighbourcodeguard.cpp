@@ -6,15 +6,12 @@
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <vector>
 
-#include "../failing-memory.hpp"
 #include "../rangecast-check.hpp"
 
 using namespace rangecast;
 using namespace rangecast::testing;
 
-static const std::string kNextVersion = "version " + std::to_string (kBitstreamVersion + 1);
-
-/* Somebody who sends: what stands in the RTP header of his packets, and where they come from. */
+/* A sender: the RTP header of its packets, and its address. */
 struct Sender {
   guint32 ssrc = 1;
   guint16 sequence = 100;
@@ -149,8 +146,7 @@ GST_START_TEST (test_random_bytes_and_other_codecs_never_pass)
 }
 GST_END_TEST;
 
-/* What a jitter buffer would be lost with: right SSRC, right numbers, before the right packets. */
-GST_START_TEST (test_copies_of_the_good_stream_from_another_address_or_port_do_not_pass)
+GST_START_TEST (test_copies_of_the_stream_from_another_address_or_port_do_not_pass)
 {
   Guard guard;
   Sender good;
@@ -164,50 +160,89 @@ GST_START_TEST (test_copies_of_the_good_stream_from_another_address_or_port_do_n
 }
 GST_END_TEST;
 
-GST_START_TEST (test_damaged_packets_of_the_sender_do_not_pass_but_other_payload_types_do)
+GST_START_TEST (test_fec_and_retransmissions_of_the_sender_pass)
 {
   Guard guard;
   Sender good;
   guard.send_many (good, 10);
-  std::vector<guint8> damaged = slice_unit ();
-  damaged[0] ^= 0x40;
-  fail_unless_equals_int (guard.send (good, damaged), 0);
-  damaged = slice_unit ();
-  damaged.resize (20);
-  fail_unless_equals_int (guard.send (good, damaged), 0);
-  good.payload_type = 122; /* forward error correction */
-  fail_unless_equals_int (guard.send (good, damaged), 1);
+  good.payload_type = 122;
+  fail_unless_equals_int (guard.send (good, {1, 2, 3}), 1);
+  Sender again = {.ssrc = 77, .payload_type = 97}, other = again;
+  other.address = "10.0.0.2";
+  fail_unless_equals_int (guard.send (again, {0, 101, 1, 2}), 1);
+  fail_unless_equals_int (guard.send (other, {0, 101, 1, 2}), 0);
 }
 GST_END_TEST;
 
-GST_START_TEST (test_a_second_sender_is_told_once_and_waits_until_the_first_is_silent)
+/* Its packets are never three units in a row. */
+GST_START_TEST (test_a_sender_of_single_packets_with_fec_passes)
+{
+  Guard guard;
+  Sender sender;
+  for (int i = 0; i < 10; i++) {
+    sender.payload_type = 96;
+    guard.send (sender);
+    sender.payload_type = 122;
+    guard.send (sender, {1, 2, 3});
+  }
+  fail_unless_equals_int (gst_harness_buffers_received (guard.h), 20);
+}
+GST_END_TEST;
+
+/* SRTP's senders change it when their sequence numbers wrap. */
+GST_START_TEST (test_the_next_ssrc_of_a_sender_passes_immediately)
+{
+  Guard guard;
+  Sender sender = {.ssrc = G_MAXUINT32}, other = {.ssrc = 0, .address = "10.0.0.2"};
+  guard.send_many (sender, 10);
+  fail_unless_equals_int (guard.send_many (other, 5), 0);
+  sender.ssrc++;
+  fail_unless_equals_int (guard.send_many (sender, 10), 10);
+  fail_unless_equals_uint64 (guard.stat ("passed"), 20);
+  fail_unless_equals_uint64 (guard.stat ("foreign"), 5);
+  GstCaps *caps = gst_pad_get_current_caps (guard.h->sinkpad);
+  guint ssrc = 1;
+  fail_unless (gst_structure_get_uint (gst_caps_get_structure (caps, 0), "ssrc", &ssrc));
+  gst_caps_unref (caps);
+  fail_unless_equals_int (int (ssrc), 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_of_two_senders_the_second_waits_until_the_first_is_silent_and_is_reported_once)
 {
   Guard guard;
   Sender earlier, later = {.ssrc = 2, .address = "10.0.0.2"};
   guard.send_many (earlier, 10);
-  for (int i = 0; i < 300; i++) {
-    fail_unless_equals_int (guard.send (later), 0);
+  for (int i = 0; i < 50; i++, guard.time += 50 * GST_MSECOND) {
+    fail_unless_equals_int (guard.send_many (later, 3), 0);
     fail_unless_equals_int (guard.send (earlier), 1);
+    if (i == 30)
+      fail_unless_equals_int (guard.warnings ("Two senders"), 0);
   }
-  fail_unless_equals_int (guard.send_many (later, 300), 0);
-  fail_unless_equals_int (guard.warnings ("Two senders"), 1);
-  guard.time += GST_SECOND;
+  fail_unless_equals_int (guard.warnings ("00000002 from 10.0.0.2:5000, accepting those of SSRC "
+                                          "00000001 from 10.0.0.1:5000"),
+      1);
+  guard.time += 500 * GST_MSECOND;
   fail_unless_equals_int (guard.send_many (later, 10), 10);
   fail_unless_equals_int (guard.send_many (earlier, 10), 0);
   fail_unless_equals_uint64 (guard.stat ("senders"), 2);
 }
 GST_END_TEST;
 
-GST_START_TEST (test_a_sender_that_begins_again_from_its_port_passes_sooner_than_another)
+GST_START_TEST (test_a_restarted_sender_passes_after_half_a_second_and_is_no_second_one)
 {
   Guard guard;
-  Sender sender, other = {.ssrc = 5, .address = "10.0.0.2"};
+  Sender sender;
   guard.send_many (sender, 10);
-  guard.time += 300 * GST_MSECOND;
-  fail_unless_equals_int (guard.send_many (other, 10), 0);
   sender.ssrc = 77;
   sender.sequence = 60000;
+  sender.port++;
+  fail_unless_equals_int (guard.send_many (sender, 9), 0);
+  guard.time += 500 * GST_MSECOND;
   fail_unless_equals_int (guard.send_many (sender, 10), 10);
+  guard.time += 3 * GST_SECOND;
+  fail_unless_equals_int (guard.send_many (sender, 10), 10);
+  fail_unless_equals_int (guard.warnings ("Two senders"), 0);
 }
 GST_END_TEST;
 
@@ -215,63 +250,27 @@ GST_END_TEST;
 GST_START_TEST (test_two_streams_from_one_port_do_not_take_turns)
 {
   Guard guard;
-  Sender one, two = {.ssrc = 2};
+  Sender one, two = {.ssrc = 20};
   guard.send_many (one, 10);
   for (int i = 0; i < 50; i++) {
     fail_unless_equals_int (guard.send_many (two, 10), 0);
     fail_unless_equals_int (guard.send_many (one, 10), 10);
   }
-  fail_unless_equals_int (guard.warnings ("Two senders"), 1);
 }
 GST_END_TEST;
 
-GST_START_TEST (test_without_a_timeout_nobody_takes_over)
+GST_START_TEST (test_packets_out_of_order_are_no_sender)
 {
   Guard guard;
-  g_object_set (guard.h->element, "timeout", G_MAXUINT64, nullptr);
-  Sender one, two = {.ssrc = 2, .address = "10.0.0.2"};
-  guard.send_many (one, 10);
-  guard.time += 3600 * GST_SECOND;
-  fail_unless_equals_int (guard.send_many (two, 10), 0);
-}
-GST_END_TEST;
-
-/* A flood of pieces of a good stream, from before the stream begins. */
-GST_START_TEST (test_sound_packets_out_of_order_are_no_sender)
-{
-  Guard guard;
-  std::minstd_rand random (2);
-  Sender flood = {.address = "10.0.0.9"}, good;
-  for (int i = 0; i < 2000; i++) {
-    flood.sequence = guint16 (random () % 256);
-    fail_unless_equals_int (guard.send (flood), 0);
+  Sender sender;
+  for (int i = 0; i < 100; i++) {
+    sender.sequence = guint16 (sender.sequence + i % 2);
+    fail_unless_equals_int (guard.send (sender), 0);
   }
-  int passed = 0;
-  for (int i = 0; i < 10; i++) {
-    flood.sequence = guint16 (random () % 256);
-    fail_unless_equals_int (guard.send (flood), 0);
-    passed += guard.send (good);
-  }
-  fail_unless_equals_int (passed, 10);
 }
 GST_END_TEST;
 
-GST_START_TEST (test_another_version_is_told_once_and_does_not_pass)
-{
-  Guard guard;
-  Sender newer = {.ssrc = 9, .address = "10.0.0.3"}, good;
-  std::vector<guint8> unit = slice_unit ();
-  unit[0] = guint8 ((kBitstreamVersion + 1) << 4 | (unit[0] & 15));
-  for (int i = 0; i < 100; i++)
-    fail_unless_equals_int (guard.send (newer, unit), 0);
-  fail_unless_equals_int (guard.send_many (good, 10), 10);
-  for (int i = 0; i < 100; i++)
-    fail_unless_equals_int (guard.send (newer, unit), 0);
-  fail_unless_equals_int (guard.warnings (kNextVersion.c_str ()), 1);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_packets_that_do_not_say_where_they_come_from_are_told_apart_by_ssrc)
+GST_START_TEST (test_packets_without_an_address_are_distinguished_by_ssrc)
 {
   Guard guard;
   Sender good = {.address = nullptr}, other = {.ssrc = 2, .address = nullptr};
@@ -299,55 +298,7 @@ GST_START_TEST (test_plays_twice_and_forgets_its_sender)
 }
 GST_END_TEST;
 
-/* As a rig of one picture in half a second, of whose packets the kernel lets a sample through. */
-GST_START_TEST (test_a_second_sender_of_few_packets_is_told_after_two_seconds)
-{
-  Guard guard;
-  Sender good, other = {.ssrc = 2, .address = "10.0.0.2"};
-  guard.send_many (good, 10);
-  for (int i = 0; i < 4; i++) {
-    fail_unless_equals_int (guard.warnings ("Two senders"), 0);
-    other.sequence = guint16 (other.sequence + 8);
-    fail_unless_equals_int (guard.send (other), 0);
-    guard.time += 240 * GST_MSECOND;
-    for (int k = 0; k < 3; k++, guard.time += 240 * GST_MSECOND)
-      fail_unless_equals_int (guard.send (good), 1);
-  }
-  fail_unless_equals_int (guard.send (other), 0);
-  fail_unless_equals_int (guard.warnings ("00000002 from 10.0.0.2:5000, accepting those of "
-                                          "00000001 from 10.0.0.1:5000"),
-      1);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_another_version_beside_a_sender_is_told_though_most_of_it_is_kept_out)
-{
-  Guard guard;
-  Sender good, newer = {.ssrc = 9, .address = "10.0.0.3"}, copy = {.address = "10.0.0.4"};
-  std::vector<guint8> unit = slice_unit ();
-  unit[0] = guint8 ((kBitstreamVersion + 1) << 4 | (unit[0] & 15));
-  guard.send_many (good, 10);
-  const auto play = [&] (Sender &sender) {
-    for (int i = 0; i < 60; i++, guard.time += 50 * GST_MSECOND) {
-      fail_unless_equals_int (guard.send (good), 1);
-      sender.sequence = guint16 (sender.sequence + 5);
-      fail_unless_equals_int (guard.send (sender, unit), 0);
-    }
-  };
-  play (copy); /* damaged copies of the good stream are no version, ... */
-  Sender other = {.ssrc = 77, .address = "10.0.0.5"};
-  for (int i = 0; i < 60; i++, guard.time += 50 * GST_MSECOND) { /* ... nor are those of another */
-    fail_unless_equals_int (guard.send (good), 1);
-    fail_unless_equals_int (guard.send (other, i % 2 ? unit : slice_unit ()), 0);
-  }
-  fail_unless_equals_int (guard.warnings (kNextVersion.c_str ()), 0);
-  guard.time += 10 * GST_SECOND;
-  play (newer);
-  fail_unless_equals_int (guard.warnings (kNextVersion.c_str ()), 1);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_packets_that_are_not_sound_are_told_once_with_how_many)
+GST_START_TEST (test_invalid_packets_without_a_sender_are_reported_once)
 {
   Guard guard;
   std::minstd_rand random (3);
@@ -368,7 +319,7 @@ GST_START_TEST (test_packets_that_are_not_sound_are_told_once_with_how_many)
   send (500);
   fail_unless_equals_int (guard.warnings ("--key"), 0);
   guard.send_many (good, 10);
-  for (int i = 0; i < 200; i++) { /* beside a good stream they are no matter */
+  for (int i = 0; i < 200; i++) { /* with a sender they do not matter */
     send (1);
     fail_unless_equals_int (guard.send (good), 1);
   }
@@ -376,8 +327,7 @@ GST_START_TEST (test_packets_that_are_not_sound_are_told_once_with_how_many)
 }
 GST_END_TEST;
 
-/* What is no RTP has no SSRC: it is not that of a sender whose SSRC is 0. */
-GST_START_TEST (test_bytes_that_are_no_rtp_do_not_pass_as_those_of_ssrc_0)
+GST_START_TEST (test_bytes_that_are_not_rtp_do_not_pass_as_ssrc_0)
 {
   Guard guard;
   Sender good = {.ssrc = 0, .address = nullptr};
@@ -387,22 +337,7 @@ GST_START_TEST (test_bytes_that_are_no_rtp_do_not_pass_as_those_of_ssrc_0)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_a_stream_begins_in_a_flood_of_sound_packets_of_ever_new_senders)
-{
-  Guard guard;
-  Sender flood = {.ssrc = 1000, .address = "10.0.0.9"}, good;
-  int passed = 0;
-  for (int i = 0; i < 10; i++) {
-    for (int k = 0; k < 500; k++, flood.ssrc++)
-      fail_unless_equals_int (guard.send (flood), 0);
-    passed += guard.send (good);
-  }
-  fail_unless_equals_int (passed, 10);
-}
-GST_END_TEST;
-
-/* As from an application's source: it came now, and not when the system's clock says, which is
- * hours ahead of the sender. */
+/* As from an application's source: they arrive now on the pipeline's clock, not the system's. */
 GST_START_TEST (test_packets_without_a_time_do_not_take_over)
 {
   Guard guard;
@@ -418,33 +353,6 @@ GST_START_TEST (test_packets_without_a_time_do_not_take_over)
 }
 GST_END_TEST;
 
-/* Else std::bad_alloc would cross the chain function. Payloads are made before. */
-GST_START_TEST (test_without_memory_the_sender_passes_and_strangers_do_not)
-{
-  if (!memory_can_end ())
-    RANGECAST_SKIP ("operator new is somebody else's");
-  Guard guard;
-  Sender good, other = {.ssrc = 2, .address = "10.0.0.2"}, foreign = {.ssrc = 3};
-  const std::vector<guint8> sound = slice_unit (), unsound (20, 0x80);
-  std::vector<guint8> damaged = slice_unit (), newer = slice_unit ();
-  damaged[6] = 255; /* depth bits */
-  newer[0] = 0x30 | (newer[0] & 15);
-  const std::vector<guint8> *payloads[] = {&sound, &unsound, &damaged, &newer};
-  int passed = 0;
-  allocations_left = 0;
-  for (int i = 0; i < 200; i++) {
-    passed += guard.send (good, sound);
-    for (const std::vector<guint8> *payload : payloads) {
-      guard.send (other, *payload);
-      guard.send (foreign, *payload);
-    }
-  }
-  allocations_left = INT_MAX;
-  fail_unless_equals_int (passed, 200);
-  fail_unless_equals_int (guard.warnings ("Two senders"), 1);
-}
-GST_END_TEST;
-
 static Suite *
 rtpneighbourcodeguard_suite ()
 {
@@ -453,23 +361,20 @@ rtpneighbourcodeguard_suite ()
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_a_sender_passes_whole_from_its_first_packet_on);
   tcase_add_test (tc, test_random_bytes_and_other_codecs_never_pass);
-  tcase_add_test (tc, test_copies_of_the_good_stream_from_another_address_or_port_do_not_pass);
-  tcase_add_test (tc, test_damaged_packets_of_the_sender_do_not_pass_but_other_payload_types_do);
-  tcase_add_test (tc, test_a_second_sender_is_told_once_and_waits_until_the_first_is_silent);
-  tcase_add_test (tc, test_a_sender_that_begins_again_from_its_port_passes_sooner_than_another);
+  tcase_add_test (tc, test_copies_of_the_stream_from_another_address_or_port_do_not_pass);
+  tcase_add_test (tc, test_fec_and_retransmissions_of_the_sender_pass);
+  tcase_add_test (tc, test_a_sender_of_single_packets_with_fec_passes);
+  tcase_add_test (tc, test_the_next_ssrc_of_a_sender_passes_immediately);
+  tcase_add_test (
+      tc, test_of_two_senders_the_second_waits_until_the_first_is_silent_and_is_reported_once);
+  tcase_add_test (tc, test_a_restarted_sender_passes_after_half_a_second_and_is_no_second_one);
   tcase_add_test (tc, test_two_streams_from_one_port_do_not_take_turns);
-  tcase_add_test (tc, test_without_a_timeout_nobody_takes_over);
-  tcase_add_test (tc, test_sound_packets_out_of_order_are_no_sender);
-  tcase_add_test (tc, test_another_version_is_told_once_and_does_not_pass);
-  tcase_add_test (tc, test_packets_that_do_not_say_where_they_come_from_are_told_apart_by_ssrc);
+  tcase_add_test (tc, test_packets_out_of_order_are_no_sender);
+  tcase_add_test (tc, test_packets_without_an_address_are_distinguished_by_ssrc);
   tcase_add_test (tc, test_plays_twice_and_forgets_its_sender);
-  tcase_add_test (tc, test_a_second_sender_of_few_packets_is_told_after_two_seconds);
-  tcase_add_test (tc, test_another_version_beside_a_sender_is_told_though_most_of_it_is_kept_out);
-  tcase_add_test (tc, test_packets_that_are_not_sound_are_told_once_with_how_many);
-  tcase_add_test (tc, test_bytes_that_are_no_rtp_do_not_pass_as_those_of_ssrc_0);
-  tcase_add_test (tc, test_a_stream_begins_in_a_flood_of_sound_packets_of_ever_new_senders);
+  tcase_add_test (tc, test_invalid_packets_without_a_sender_are_reported_once);
+  tcase_add_test (tc, test_bytes_that_are_not_rtp_do_not_pass_as_ssrc_0);
   tcase_add_test (tc, test_packets_without_a_time_do_not_take_over);
-  tcase_add_test (tc, test_without_memory_the_sender_passes_and_strangers_do_not);
   return suite;
 }
 

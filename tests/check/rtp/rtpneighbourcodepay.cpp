@@ -147,20 +147,6 @@ GST_START_TEST (test_every_packet_decodes_alone)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_mtu_may_change_while_playing)
-{
-  const Rig rig = ring_rig (1);
-  GstHarness *h = payloader (rig, "mtu=1400");
-  for (const guint mtu : {9000u, 1400u, 3000u}) {
-    g_object_set (h->element, "mtu", mtu, nullptr);
-    gst_harness_push (h, access_unit (rig));
-    for (const Packet &packet : pull_packets (h))
-      ck_assert_uint_le (packet.size, mtu);
-  }
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_slice_or_rig_longer_than_the_mtu_is_one_error)
 {
   const Rig rig = ring_rig (1);
@@ -177,27 +163,6 @@ GST_START_TEST (test_slice_or_rig_longer_than_the_mtu_is_one_error)
 }
 GST_END_TEST;
 
-/* What the payloader says of an access unit that it refuses. */
-static std::string
-refusal (const Rig &rig, const char *properties, GstBuffer *buffer)
-{
-  GstHarness *h = payloader (rig, properties);
-  std::string text;
-  {
-    ErrorCounter errors (h);
-    fail_unless_equals_int (gst_harness_push (h, buffer), GST_FLOW_ERROR);
-    text = next_message_text (errors.bus, GST_MESSAGE_ERROR);
-  }
-  gst_harness_teardown (h);
-  return text;
-}
-
-static bool
-says (const std::string &text, const std::string &part)
-{
-  return text.find (part) != std::string::npos;
-}
-
 GST_START_TEST (test_error_for_a_long_slice_names_the_max_slice_size_and_mtu_that_fit)
 {
   const Rig rig = ring_rig (1);
@@ -206,33 +171,16 @@ GST_START_TEST (test_error_for_a_long_slice_names_the_max_slice_size_and_mtu_tha
   for (const auto &slice : slices)
     if (first_long == 0 && slice.size () > 1000 - 12)
       first_long = slice.size ();
-  const std::string text = refusal (rig, "mtu=1000", buffer_of (slices));
-  fail_unless (says (text, "A slice of " + std::to_string (first_long)), "%s", text.c_str ());
-  fail_unless (says (text, "max-slice-size=988"), "%s", text.c_str ());
-  fail_unless (says (text, "mtu=" + std::to_string (first_long + 12)), "%s", text.c_str ());
-}
-GST_END_TEST;
-
-GST_START_TEST (test_error_for_a_long_slice_names_no_max_slice_size_that_cannot_be_set)
-{
-  const Rig rig = ring_rig (1);
-  const std::string text = refusal (rig, "mtu=200 config-interval=0", access_unit (rig));
-  fail_unless (says (text, "A slice of "), "%s", text.c_str ());
-  fail_if (says (text, "max-slice-size"), "%s", text.c_str ());
-}
-GST_END_TEST;
-
-GST_START_TEST (test_error_for_a_long_rig_view_names_mtu_and_config_interval)
-{
-  const Rig rig = ring_rig (1);
-  std::vector<guint8> rig_units;
-  write_rig_units ({rig, 30, 1}, rig_units); /* one: the rig has one view */
-  const std::string text = refusal (rig, "mtu=60", access_unit (rig));
-  fail_unless (
-      says (text, "A rig view of " + std::to_string (rig_units.size ())), "%s", text.c_str ());
-  fail_unless (says (text, "mtu=" + std::to_string (rig_units.size () + 12)), "%s", text.c_str ());
-  fail_unless (says (text, "config-interval=0"), "%s", text.c_str ());
-  fail_if (says (text, "max-slice-size"), "%s", text.c_str ());
+  GstHarness *h = payloader (rig, "mtu=1000");
+  {
+    ErrorCounter errors (h);
+    fail_unless_equals_int (gst_harness_push (h, buffer_of (slices)), GST_FLOW_ERROR);
+    const std::string text = next_message_text (errors.bus, GST_MESSAGE_ERROR);
+    fail_unless_contains (text, "A slice of " + std::to_string (first_long));
+    fail_unless_contains (text, "max-slice-size=988");
+    fail_unless_contains (text, "mtu=" + std::to_string (first_long + 12));
+  }
+  gst_harness_teardown (h);
 }
 GST_END_TEST;
 
@@ -363,8 +311,8 @@ GST_START_TEST (test_static_payload_type_is_an_error_that_names_the_range)
   {
     ErrorCounter errors (h);
     gst_harness_set_src_caps (h, coded_caps (ring_rig (1)));
-    fail_unless_contains (next_message_text (errors.bus, GST_MESSAGE_ERROR),
-        "pt=50: expected a dynamic payload type");
+    fail_unless_contains (
+        next_message_text (errors.bus, GST_MESSAGE_ERROR), "pt=50: set a dynamic payload type");
   }
   gst_harness_teardown (h);
 }
@@ -384,15 +332,6 @@ GST_START_TEST (test_config_interval_may_change_while_playing)
   fail_unless_equals_int (rigs[0], 0);
   fail_unless_equals_int (rigs[1], 10);
   fail_unless (rigs[2] == 2 || rigs[2] == 3);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_latency_is_that_of_upstream)
-{
-  GstHarness *h = payloader (ring_rig (1));
-  gst_harness_set_upstream_latency (h, 40 * GST_MSECOND);
-  fail_unless_equals_uint64 (gst_harness_query_latency (h), 40 * GST_MSECOND);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -489,11 +428,8 @@ rtpneighbourcodepay_suite ()
   tcase_add_test (tc, test_no_packet_is_longer_than_the_mtu);
   tcase_add_test (tc, test_no_packet_is_longer_than_the_mtu_with_header_extensions);
   tcase_add_test (tc, test_every_packet_decodes_alone);
-  tcase_add_test (tc, test_mtu_may_change_while_playing);
   tcase_add_test (tc, test_slice_or_rig_longer_than_the_mtu_is_one_error);
   tcase_add_test (tc, test_error_for_a_long_slice_names_the_max_slice_size_and_mtu_that_fit);
-  tcase_add_test (tc, test_error_for_a_long_slice_names_no_max_slice_size_that_cannot_be_set);
-  tcase_add_test (tc, test_error_for_a_long_rig_view_names_mtu_and_config_interval);
   tcase_add_test (tc, test_caps_without_a_rig_are_an_error);
   tcase_add_test (tc, test_states_change_twice);
   tcase_add_test (tc, test_eos_and_gap_go_by);
@@ -503,7 +439,6 @@ rtpneighbourcodepay_suite ()
   tcase_add_test (tc, test_units_that_belong_to_files_are_not_sent);
   tcase_add_test (tc, test_static_payload_type_is_an_error_that_names_the_range);
   tcase_add_test (tc, test_config_interval_may_change_while_playing);
-  tcase_add_test (tc, test_latency_is_that_of_upstream);
   tcase_add_test (tc, test_empty_rois_are_one_packet_with_a_marker);
   tcase_add_test (tc, test_damaged_and_empty_access_units_are_no_error);
   tcase_add_test (tc, test_slices_leave_as_they_come_and_the_last_has_the_marker);

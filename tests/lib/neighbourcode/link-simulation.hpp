@@ -38,11 +38,9 @@ struct SimulatedStream {
   double fps = 15, max_bits_per_s = 20e6, start_s = 0;
   double jitter_share = 0.1;                   /* of the size of frame sets */
   double clock_s = 1000;                       /* the receiver's less the sender's */
-  bool reports_only = false;                   /* RTCP receiver reports every second */
   double paused_from_s = -1, paused_to_s = -1; /* its receiver says nothing */
   StreamResult second;                         /* since it was last taken */
   std::uint16_t sequence = 0;
-  double report_packets = 0, report_lost = 0, last_report_s = 0, sent_since_report = 0;
 };
 
 class LinkSimulation {
@@ -137,16 +135,11 @@ private:
       s.second.lost += arrival < 0;
       s.second.sent_bytes += size;
       s.second.arrived_bytes += arrival < 0 ? 0 : size;
-      s.sent_since_report += size;
-      s.report_packets++;
-      s.report_lost += arrival < 0;
     }
     if (std::ranges::any_of (reports, &PacketReport::lost)) /* as GStreamer 1.22 reports them */
       for (std::size_t k = 0; k < reports.size (); k++)
         reports[k].arrival_ns -= reports[k].lost ? 0 : 3'000'000 * k;
-    if (s.reports_only)
-      report (i, last_arrival);
-    else if (!is_paused (s))
+    if (!is_paused (s))
       at (last_arrival + link.delay_s,
           [this, i, reports] { streams[i].control.packets (reports, ns (now_s)); });
   }
@@ -154,20 +147,6 @@ private:
   bool is_paused (const SimulatedStream &s) const
   {
     return now_s >= s.paused_from_s && now_s < s.paused_to_s;
-  }
-
-  void report (std::size_t i, double last_arrival_s)
-  {
-    SimulatedStream &s = streams[i];
-    if (now_s - s.last_report_s < 1)
-      return;
-    const ReceiverReport report = {7, s.report_lost / s.report_packets, s.report_packets, 0,
-        last_arrival_s - now_s + link.delay_s};
-    const double sent = 8 * s.sent_since_report / (now_s - s.last_report_s);
-    at (last_arrival_s + link.delay_s,
-        [this, i, report, sent] { streams[i].control.receiver_report (report, sent, ns (now_s)); });
-    s.report_packets = s.report_lost = s.sent_since_report = 0;
-    s.last_report_s = now_s;
   }
 
   std::priority_queue<Event> events_;

@@ -3,7 +3,6 @@
  * means over many seconds, from when the stream has found its rate. */
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cstdio>
 
 #include "link-simulation.hpp"
@@ -139,17 +138,6 @@ TEST (CongestionControl, stream_that_comes_later_finds_room)
     EXPECT_GT (rate_of (stream.second, 60), 0.15 * 5e6);
 }
 
-TEST (CongestionControl, receiver_reports_alone_keep_it_from_breaking_up)
-{
-  LinkSimulation sim;
-  sim.streams[0].reports_only = true;
-  sim.run (15);
-  const StreamResult result = sim.measure (60);
-  EXPECT_LT (result.loss (), 0.05);
-  EXPECT_GT (rate_of (result, 60), 0.7 * 5e6);
-  EXPECT_LT (rate_of (result, 60), 1.0 * 5e6);
-}
-
 TEST (CongestionControl, silence_lowers_the_rate_and_its_end_brings_back_half)
 {
   LinkSimulation sim;
@@ -194,10 +182,6 @@ TEST (CongestionControl, limits_hold_whatever_is_reported)
           random () % 3 == 0});
     now += random () % 1'000'000'000;
     control.packets (packets, now);
-    control.receiver_report (
-        {std::uint32_t (random ()) % 100, double (random () % 300) / 100 - 1,
-            double (random () % 9), double (random () % 9), double (random () % 9)},
-        double (random () % 9'000'000), now);
     control.tick (double (random () % 9'000'000), now);
     ASSERT_GE (control.bits_per_s (), 300e3);
     ASSERT_LE (control.bits_per_s (), 2e6);
@@ -213,103 +197,6 @@ TEST (CongestionControl, new_limits_count_at_once)
   EXPECT_LE (control.bits_per_s (), 1e6);
   control.configure ({6e6, 9e6});
   EXPECT_GE (control.bits_per_s (), 6e6);
-}
-
-TEST (CongestionControl, worst_of_several_receivers_counts)
-{
-  CongestionControl control;
-  control.configure ({100e3, 5e6});
-  std::uint64_t now = 1'000'000'000;
-  for (int i = 0; i < 4; i++, now += 1'000'000'000) {
-    control.receiver_report ({1, 0, 500, 0, 0}, 5e6, now);
-    control.receiver_report ({2, 0.3, 500, 0, 0}, 5e6, now + 10'000'000);
-  }
-  EXPECT_LT (control.bits_per_s (), 4e6);
-}
-
-/* With early feedback (AVPF) a report comes at once when a packet was lost, and is of few. */
-TEST (CongestionControl, loss_of_1_percent_in_reports_of_3_packets_hardly_lowers_the_rate)
-{
-  CongestionControl control;
-  control.configure ({100e3, 5e6});
-  std::mt19937 random (2);
-  std::uint64_t now = 1'000'000'000;
-  double lowest = 5e6;
-  for (int i = 0; i < 3000; i++) {
-    int lost = 0;
-    for (int k = 0; k < 3; k++)
-      lost += random () % 100 == 0;
-    control.receiver_report ({1, lost / 3.0, 3, 0, 0}, 5e6, now += 10'000'000);
-    lowest = std::min (lowest, control.bits_per_s ());
-  }
-  EXPECT_GT (lowest, 0.75 * 5e6);
-}
-
-TEST (CongestionControl, queue_of_one_of_50_receivers_is_seen)
-{
-  CongestionControl control;
-  control.configure ({100e3, 5e6});
-  std::uint64_t now = 1'000'000'000;
-  for (int second = 0; second < 6; second++)
-    for (std::uint32_t receiver = 0; receiver < 50; receiver++)
-      control.receiver_report (
-          {receiver, 0, 100, 0, receiver == 30 && second > 2 ? 0.4 : 0.05}, 5e6, now += 20'000'000);
-  EXPECT_LT (control.bits_per_s (), 5e6);
-}
-
-/* Each receiver reports of five seconds, so that after a decrease all others' reports are of
- * before. */
-TEST (CongestionControl, congestion_that_eight_slow_receivers_report_does_not_become_usual_loss)
-{
-  constexpr double kCapacity = 5e6, kMax = 20e6, kStep_s = 0.05;
-  CongestionControl control;
-  control.configure ({100e3, kMax});
-  std::array<double, 8> sent = {}, lost = {};
-  std::array<double, 10> rates; /* what the encoder sends follows half a second later */
-  rates.fill (kMax);
-  double all_sent = 0, all_lost = 0;
-  for (std::size_t step = 1; step <= 4000; step++) {
-    const double limit = control.bits_per_s (), rate = rates[step % rates.size ()],
-                 excess = std::max (rate - kCapacity, 0.0);
-    rates[step % rates.size ()] = limit > 0 ? limit : kMax;
-    for (std::size_t i = 0; i < sent.size (); i++) {
-      sent[i] += rate * kStep_s / 9600, lost[i] += excess * kStep_s / 9600;
-      if ((step + 12 * i) % 100)
-        continue;
-      control.receiver_report (
-          {std::uint32_t (i), lost[i] / sent[i], std::uint32_t (sent[i]), 0, 0}, rate,
-          step * 50'000'000);
-      sent[i] = lost[i] = 0;
-    }
-    if (step > 1333)
-      all_sent += rate, all_lost += excess;
-  }
-  std::printf ("%g %g\n", all_lost / all_sent, all_sent / 2667);
-  EXPECT_LT (all_lost, 0.02 * all_sent);
-  EXPECT_GT (all_sent - all_lost, 0.7 * kCapacity * 2667);
-}
-
-TEST (CongestionControl, jitter_that_rises_keeps_receiver_reports_from_raising_the_rate)
-{
-  for (const double jitter : {0.001, 0.1}) {
-    CongestionControl control;
-    control.configure ({100e3, 5e6});
-    std::uint64_t now = 1'000'000'000;
-    const auto report = [&] (double lost, double jitter_s) {
-      control.receiver_report (
-          {1, lost, 500, jitter_s, 0}, control.bits_per_s (), now += 1'000'000'000);
-    };
-    report (0, 0.001);
-    report (0.3, 0.001);
-    report (0, 0.001);
-    const double before = control.bits_per_s ();
-    for (int i = 0; i < 4; i++)
-      report (0, jitter);
-    if (jitter < 0.01)
-      EXPECT_GT (control.bits_per_s (), before);
-    else
-      EXPECT_EQ (control.bits_per_s (), before);
-  }
 }
 
 /* The table of tests/bench/results/reliability.md: --gtest_also_run_disabled_tests
@@ -338,10 +225,8 @@ TEST (CongestionControl, DISABLED_table)
     sim.link.loss = loss;
     row (name, sim);
   }
-  LinkSimulation jitter, reports, four (4);
+  LinkSimulation jitter, four (4);
   jitter.link.jitter_s = 0.05;
   row ("jitter 50 ms", jitter);
   row ("4 streams", four);
-  reports.streams[0].reports_only = true;
-  row ("reports", reports);
 }

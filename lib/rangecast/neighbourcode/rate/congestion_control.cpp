@@ -35,17 +35,8 @@ constexpr double kHeadroom = 1.5, kMore = 50'000;
 constexpr std::uint64_t kLossIntervalNs = 500 * kMs;
 constexpr double kMinPackets = 20, kManyPackets = 150;
 
-constexpr std::uint64_t kSilencePacketsNs = 3'000 * kMs, kSilenceReportsNs = 15'000 * kMs;
+constexpr std::uint64_t kSilenceNs = 3'000 * kMs, kMaxLossSpanNs = 2'000 * kMs;
 constexpr int kMaxHalvings = 10;
-
-/* Receiver reports. Seconds by which a round trip above the minimum is a queue, and by which jitter
- * above the minimum stops the increase. Reports older than kFreshNs do not count. */
-constexpr double kRoundTripQueue = 0.1, kJitter = 0.03;
-constexpr std::uint64_t kFreshNs = 15'000 * kMs, kReportIntervalNs = 400 * kMs;
-constexpr std::uint64_t kMaxLossSpanNs = 2'000 * kMs;
-constexpr double kMaxElapsed = 6;
-/* Loss beyond the usual that stops the increase. */
-constexpr double kReportedLoss = 0.02;
 
 double
 seconds (std::uint64_t ns)
@@ -88,7 +79,7 @@ CongestionControl::bits_per_s () const
 }
 
 void
-CongestionControl::record_report (Source source, std::uint64_t now_ns)
+CongestionControl::record_report (std::uint64_t now_ns)
 {
   if (halvings_ > 0 && rate_ > 0) {
     rate_ = limited (std::max (rate_, before_silence_ / 2));
@@ -97,7 +88,7 @@ CongestionControl::record_report (Source source, std::uint64_t now_ns)
     delays_.reset ();
   }
   halvings_ = 0;
-  source_ = source;
+  has_feedback_ = true;
   report_ns_ = silent_since_ns_ = now_ns;
 }
 
@@ -113,7 +104,6 @@ CongestionControl::decrease (double delivered, std::uint64_t now_ns)
   calm_s_ = 0;
   before_loss_ = 0;
   decreased_ = true;
-  decrease_ns_ = now_ns;
   valid_sent_ns_ = last_sent_ns_ + kReactionNs;
   counted_ = counted_lost_ = 0;
   loss_.record_decrease ();
@@ -190,10 +180,9 @@ CongestionControl::packets (std::span<const PacketReport> packets, std::uint64_t
 {
   if (packets.empty ())
     return;
-  const bool first = source_ != Source::kPackets;
   const double elapsed =
-      first ? 0 : std::min (seconds (now_ns - report_ns_), 0.5); /* a gap in reports is not calm */
-  record_report (Source::kPackets, now_ns);
+      !has_feedback_ ? 0 : std::min (seconds (now_ns - report_ns_), 0.5); /* a gap in reports is not calm */
+  record_report (now_ns);
   if (static_cast<std::int64_t> (packets.front ().sent_ns - last_sent_ns_) < -1'000'000'000)
     valid_sent_ns_ = 0, counted_ = counted_lost_ = 0; /* the sender's clock was reset */
   const bool was_decreased = decreased_;
@@ -218,105 +207,10 @@ CongestionControl::packets (std::span<const PacketReport> packets, std::uint64_t
     increase (arrivals_.delivered_bits_per_s (), elapsed);
 }
 
-CongestionControl::Receiver &
-CongestionControl::find_receiver (std::uint32_t id, std::uint64_t now_ns)
-{
-  Receiver *oldest = receivers_.data ();
-  for (Receiver &receiver : receivers_) {
-    if (receiver.time_ns > 0 && receiver.id == id)
-      return receiver;
-    if (receiver.time_ns < oldest->time_ns)
-      oldest = &receiver;
-  }
-  *oldest = Receiver ();
-  oldest->id = id;
-  oldest->time_ns = oldest->since_ns = now_ns;
-  return *oldest;
-}
-
-void
-CongestionControl::receiver_report (
-    const ReceiverReport &report, double sent_bits_per_s, std::uint64_t now_ns)
-{
-  if (source_ == Source::kPackets && now_ns - report_ns_ < kSilencePacketsNs)
-    return;
-  Receiver &receiver = find_receiver (report.receiver, now_ns);
-  const double packets = report.packets > 0 ? report.packets : kMinPackets;
-  receiver.time_ns = std::max<std::uint64_t> (now_ns, 1);
-  receiver.has_report = true;
-  receiver.packets += packets;
-  receiver.lost += packets * std::clamp (report.lost, 0.0, 1.0);
-  if (report.round_trip_s > 0)
-    receiver.queue_s = report.round_trip_s - receiver.round_trip.add (now_ns, report.round_trip_s);
-  receiver.jitters = report.jitter_s - receiver.jitter.add (now_ns, report.jitter_s) > kJitter;
-  if (source_ != Source::kReports)
-    evaluated_ns_ = 0;
-  record_report (Source::kReports, now_ns);
-  if (evaluated_ns_ == 0 || now_ns - evaluated_ns_ >= kReportIntervalNs)
-    evaluate_receivers (sent_bits_per_s, now_ns);
-}
-
-/* The loss of a receiver that has not reported since the last evaluation may still be the worst,
- * but causes no further decrease. Packets from before a decrease took effect are dropped: they do
- * not show whether it helped, and would make loss by congestion appear usual. */
-CongestionControl::Worst
-CongestionControl::find_worst (std::uint64_t now_ns)
-{
-  Worst worst;
-  for (Receiver &receiver : receivers_) {
-    if (receiver.time_ns == 0 || now_ns - receiver.time_ns > kFreshNs)
-      continue;
-    const bool is_old = decrease_ns_ > 0 && receiver.since_ns < decrease_ns_ + kReactionNs;
-    if (is_old && receiver.has_report) { /* count from this report on */
-      receiver.packets = receiver.lost = 0;
-      receiver.since_ns = now_ns;
-    }
-    const bool is_evaluated =
-        !is_old && is_enough (receiver.packets, receiver.lost, now_ns - receiver.since_ns);
-    if (is_evaluated) {
-      receiver.share = receiver.lost / receiver.packets;
-      receiver.of = receiver.packets;
-      receiver.packets = receiver.lost = 0;
-      receiver.since_ns = now_ns;
-    }
-    if (receiver.share > worst.lost || (is_evaluated && receiver.share == worst.lost))
-      worst = {
-          receiver.share, receiver.of, worst.queue_s, is_evaluated, worst.jitters, worst.queues};
-    if (receiver.has_report)
-      worst.queue_s = std::max (worst.queue_s, receiver.queue_s);
-    worst.jitters = worst.jitters || receiver.jitters;
-    worst.queues = worst.queues || receiver.queue_s > kRoundTripQueue;
-    receiver.has_report = false;
-  }
-  return worst;
-}
-
-void
-CongestionControl::evaluate_receivers (double sent_bits_per_s, std::uint64_t now_ns)
-{
-  const double elapsed =
-      evaluated_ns_ == 0 ? 0 : std::min (seconds (now_ns - evaluated_ns_), kMaxElapsed);
-  const Worst worst = find_worst (now_ns);
-  queue_s_ = worst.queue_s;
-  evaluated_ns_ = now_ns;
-  const bool loses = worst.is_new && loss_.evaluate (worst.lost, worst.packets, elapsed);
-  const bool is_bad = worst.lost - loss_.usual () > kReportedLoss;
-  /* A report soon after a decrease still covers the time before it. */
-  const bool waits = decrease_ns_ > 0 && now_ns - decrease_ns_ < 2 * kReactionNs;
-  if (waits || sent_bits_per_s <= 0)
-    return;
-  if (loses || queue_s_ > kRoundTripQueue)
-    decrease (sent_bits_per_s * (1 - worst.lost), now_ns);
-  else if (!worst.jitters && !worst.queues && !is_bad)
-    increase (sent_bits_per_s, elapsed);
-}
-
 void
 CongestionControl::tick (double sent_bits_per_s, std::uint64_t now_ns)
 {
-  const std::uint64_t patience =
-      source_ == Source::kPackets ? kSilencePacketsNs : kSilenceReportsNs;
-  if (source_ == Source::kNone || now_ns - silent_since_ns_ < patience || sent_bits_per_s <= 0 ||
+  if (!has_feedback_ || now_ns - silent_since_ns_ < kSilenceNs || sent_bits_per_s <= 0 ||
       halvings_ == kMaxHalvings)
     return;
   const double before = rate_ > 0 ? rate_ : sent_bits_per_s;

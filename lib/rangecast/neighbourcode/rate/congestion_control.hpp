@@ -1,22 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 
 #include "congestion_signals.hpp"
 
 namespace rangecast {
-
-/** The fields of an RTCP receiver report (RFC 3550, 6.4.1) that congestion control uses. */
-struct ReceiverReport {
-  std::uint32_t receiver = 0; ///< SSRC of the receiver
-  double lost = 0;            ///< share of packets lost since the last report, 0 to 1
-  double packets = 0;         ///< packets since the last report; 0: not known
-  double jitter_s = 0;        ///< interarrival jitter
-  double round_trip_s = 0;    ///< 0: not known
-};
 
 struct CongestionSettings {
   double min_bits_per_s = 200'000; ///< never below, unless max_bits_per_s is
@@ -25,7 +15,7 @@ struct CongestionSettings {
   friend bool operator== (const CongestionSettings &, const CongestionSettings &) = default;
 };
 
-/** Finds the bit rate that a network sustains, from receivers' reports.
+/** Finds the bit rate that a network sustains, from a receiver's transport-wide feedback.
  *
  *  Additive increase and multiplicative decrease on signs of queues and of loss, as in Google
  *  Congestion Control (draft-ietf-rmcat-gcc-02, sections 5.5 and 6), with three changes for streams
@@ -43,65 +33,39 @@ public:
   void reset () { *this = CongestionControl (); }
   void configure (const CongestionSettings &settings);
 
-  /** Transport-wide feedback of one receiver; while it arrives, receiver reports are ignored. Times
-   *  in a report with lost packets are ignored: GStreamer 1.22 assigns its deltas to the wrong
-   * packets then, which makes them wrong by some frame intervals.
+  /** Transport-wide feedback of one receiver. Times in a report with lost packets are ignored:
+   *  GStreamer 1.22 assigns its deltas to the wrong packets then, which makes them wrong by some
+   *  frame intervals.
    *  @param now_ns  of any steady clock, the same for all calls */
   void packets (std::span<const PacketReport> packets, std::uint64_t now_ns);
-  /** RTCP receiver report. The worst of up to 64 receivers counts. Loss is evaluated over at least
-   * 20 packets or two seconds, because with early feedback reports cover few packets and are sent
-   *  because one was lost.
-   *  @param sent_bits_per_s  the recent rate of sending */
-  void receiver_report (const ReceiverReport &report, double sent_bits_per_s, std::uint64_t now_ns);
-  /** To be called before each frame set. While reports are missing the rate is halved every 3 s
-   *  (packets) or 15 s (receiver reports); the first report restores it to half of its old value.
+  /** To be called before each frame set. While reports are missing the rate is halved every 3 s;
+   *  the first report restores it to half of its old value.
    *  @param sent_bits_per_s  the recent rate of sending */
   void tick (double sent_bits_per_s, std::uint64_t now_ns);
 
   /** The rate to send at; 0: no limit. */
   [[nodiscard]] double bits_per_s () const;
   /** Reports have arrived, the last one not too long ago. */
-  [[nodiscard]] bool has_reports () const { return source_ != Source::kNone && halvings_ == 0; }
-  /** Share of packets lost in the latest half second or report, 0 to 1. */
+  [[nodiscard]] bool has_reports () const { return has_feedback_ && halvings_ == 0; }
+  /** Share of packets lost in the latest half second, 0 to 1. */
   [[nodiscard]] double lost () const { return loss_.share (); }
-  /** Queueing delay, seconds; from the round trip if there are receiver reports only. */
+  /** Queueing delay, seconds. */
   [[nodiscard]] double queue_s () const { return queue_s_; }
 
 private:
-  enum class Source : std::uint8_t { kNone, kPackets, kReports };
-  struct Receiver {
-    std::uint32_t id = 0;
-    std::uint64_t time_ns = 0;    /* of its last report; 0: free */
-    double packets = 0, lost = 0; /* since its loss was evaluated */
-    std::uint64_t since_ns = 0;   /* when that was */
-    double share = 0, of = 0;     /* of packets lost, the last that was evaluated */
-    bool has_report = false;      /* since the last evaluation */
-    double queue_s = 0;
-    bool jitters = false;
-    SlidingMinimum round_trip, jitter;
-  };
-
   [[nodiscard]] double limited (double bits_per_s) const;
-  void record_report (Source source, std::uint64_t now_ns);
+  void record_report (std::uint64_t now_ns);
   void decrease (double delivered, std::uint64_t now_ns);
   void increase (double delivered, double elapsed_s);
   void evaluate_queue (std::uint64_t sent_ns, std::uint64_t now_ns);
   void evaluate_loss (std::uint64_t now_ns);
-  struct Worst {
-    double lost = 0, packets = 0, queue_s = 0;
-    bool is_new = false, jitters = false;
-    bool queues = false; /* also of a receiver that has not reported since */
-  };
-  Receiver &find_receiver (std::uint32_t id, std::uint64_t now_ns);
-  Worst find_worst (std::uint64_t now_ns);
-  void evaluate_receivers (double sent_bits_per_s, std::uint64_t now_ns);
 
   CongestionSettings settings_;
   double rate_ = 0;        /* 0: no limit known */
   double capacity_ = 0;    /* of the link where it was full last; 0: not known */
   double before_loss_ = 0; /* the rate before it was lowered, if for loss alone; else 0 */
   double calm_s_ = 0;      /* beyond capacity_ without congestion */
-  Source source_ = Source::kNone;
+  bool has_feedback_ = false;
   std::uint64_t report_ns_ = 0; /* of the last one */
   std::uint64_t silent_since_ns_ = 0;
   int halvings_ = 0;
@@ -112,15 +76,11 @@ private:
   LossEvaluator loss_;
   double queue_s_ = 0;
   bool drains_ = false; /* the queue that caused the last decrease is not yet gone */
-  std::uint64_t decrease_ns_ = 0;
   bool decreased_ = false;
   /* Packets that were sent before this were sent at another rate. */
   std::uint64_t valid_sent_ns_ = 0, last_sent_ns_ = 0;
   std::uint64_t losses_since_ns_ = 0; /* sent time of the first packet that is counted */
   double counted_ = 0, counted_lost_ = 0;
-
-  std::array<Receiver, 64> receivers_{}; /* the latest */
-  std::uint64_t evaluated_ns_ = 0;       /* when receivers were evaluated last */
 };
 
 } // namespace rangecast
