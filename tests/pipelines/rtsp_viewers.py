@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Many cheap RTSP viewers in one process: they count what comes and decode nothing.
 
-usage: rtsp_viewers.py rtsp://HOST:PORT/PATH [--tcp] [--viewers N] [--frame-sets N] [--stall SECONDS] [--silent] [--describe]
+usage: rtsp_viewers.py rtsp://HOST:PORT/PATH [--tcp] [--viewers N] [--frame-sets N] [--stall SECONDS] [--describe]
 Prints a line for each viewer: frame sets (packets with the marker), packets, bytes, lost (gaps in the sequence
-numbers). --stall: each reads nothing for so long after its first frame set. --silent: no sign of life while playing. --describe
-prints the SDP and ends.
+numbers). --stall: each reads nothing for so long after its first frame set. --describe prints the SDP and ends.
 """
 import argparse
 import re
@@ -72,6 +71,7 @@ class Viewer:
         self.session = fields["Session"].split(";")[0]
         self.ask("PLAY", self.url, "Range: npt=0-")
         self.control.setblocking(False)
+        return fields
 
     @staticmethod
     def open_ports():
@@ -149,7 +149,7 @@ class Viewer:
             one.close()
 
 
-def watch(viewers, wanted, stall, silent):
+def watch(viewers, wanted, stall):
     selector = selectors.DefaultSelector()
     for viewer in viewers:
         selector.register(viewer.control if viewer.tcp else viewer.media[0], selectors.EVENT_READ, viewer)
@@ -166,7 +166,7 @@ def watch(viewers, wanted, stall, silent):
                 if len(stalled) == len(viewers):
                     time.sleep(stall)
                     last = time.monotonic()
-        if time.monotonic() - signed > 3 and not silent and not stall:
+        if time.monotonic() - signed > 3 and not stall:
             signed = time.monotonic()
             for viewer in viewers:
                 viewer.sign_of_life()
@@ -181,7 +181,6 @@ def main():
     parser.add_argument("--viewers", type=int, default=1)
     parser.add_argument("--frame-sets", type=int, default=20)
     parser.add_argument("--stall", type=float, default=0)
-    parser.add_argument("--silent", action="store_true")
     parser.add_argument("--describe", action="store_true")
     options = parser.parse_args()
     viewers = [Viewer(options.url, options.tcp) for _ in range(options.viewers)]
@@ -191,7 +190,7 @@ def main():
     for viewer in viewers:
         viewer.play()
     print("playing", flush=True)
-    watch(viewers, options.frame_sets, options.stall, options.silent)
+    watch(viewers, options.frame_sets, options.stall)
     for viewer in viewers:
         print(f"frame-sets={viewer.frame_sets} packets={viewer.packets} bytes={viewer.bytes} lost={viewer.lost}")
         viewer.leave()

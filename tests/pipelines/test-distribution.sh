@@ -144,24 +144,21 @@ expect_repair () {
   ! grep -q 'Two senders' ./*.log || fail "$(grep 'Two senders' ./*.log)"
 }
 
-test_fec_makes_frame_sets_whole_between_hosts () {
-  local host
+# usage: repair "OPTIONS of the parent" OPTIONS of the first viewer, with PARENT for the parent's address...
+repair () {
+  local host sent=$1
+  shift
   start_network one two
-  start_hosts --to "$(list one two)" --fec 100
+  # shellcheck disable=SC2086 # several options
+  start_hosts --to "$(list one two)" $sent
   for host in one two; do net_faults $host --loss 0.2 --seed 2; done
-  start_viewer one --fec --jitter 300
+  start_viewer one "${@//PARENT/$(net_address parent)}" --jitter 300
   start_viewer two --jitter 300
   expect_repair
 }
-
+test_fec_makes_frame_sets_whole_between_hosts () { repair "--fec 100" --fec; }
 test_retransmission_makes_frame_sets_whole_between_hosts () {
-  local host
-  start_network one two
-  start_hosts --to "$(list one two)" --rtx --feedback 5200
-  for host in one two; do net_faults $host --loss 0.2 --seed 2; done
-  start_viewer one --rtx --feedback "$(net_address parent):5200" --jitter 300
-  start_viewer two --jitter 300
-  expect_repair
+  repair "--rtx --feedback 5200" --rtx --feedback PARENT:5200
 }
 
 # Capture times of the frame sets of a file that lack nothing.
