@@ -9,7 +9,7 @@ build=${RANGECAST_BUILD:-build}
 elements=("$@")
 if [ ${#elements[@]} = 0 ]; then
   for program in "$build"/tests/check/check_*; do
-    [ -x "$program" ] && [ -f "$program" ] && [[ "$program" != *_strip* && "$program" != *_rangewebsinkrtc && "$program" != *_rangerender ]] && elements+=("${program##*check_}")
+    [ -x "$program" ] && [ -f "$program" ] && [[ "$program" != *_strip* && "$program" != *_rangerender ]] && elements+=("${program##*check_}")
   done
 fi
 export GST_PLUGIN_PATH=$PWD/$build/gst GST_REGISTRY=$PWD/$build/test-registry.bin RANGECAST_SOURCE=$PWD
