@@ -60,7 +60,7 @@ const picture = async (page) => {
   return assert.fail ('the picture does not come to rest');
 };
 
-// In the page: mean difference in levels, and SSIM of grey (mean of 8x8 windows, step 4), of two pictures.
+// In the page: of two pictures, the mean difference of their grey in levels, and the share of pixels that are not background.
 const compare = (page, ours, theirs) => page.evaluate (async (a, b) => {
   const grey = async (url) => {
     const image = new Image ();
@@ -69,27 +69,10 @@ const compare = (page, ours, theirs) => page.evaluate (async (a, b) => {
     const canvas = new OffscreenCanvas (image.width, image.height), context = canvas.getContext ('2d');
     context.drawImage (image, 0, 0);
     const { data } = context.getImageData (0, 0, image.width, image.height);
-    return { width: image.width, height: image.height, at: Float64Array.from ({ length: data.length / 4 }, (_, i) =>
-      0.299 * data[4 * i] + 0.587 * data[4 * i + 1] + 0.114 * data[4 * i + 2]) };
+    return Float64Array.from ({ length: data.length / 4 }, (_, i) => 0.299 * data[4 * i] + 0.587 * data[4 * i + 1] + 0.114 * data[4 * i + 2]);
   };
-  const [x, y] = [await grey (a), await grey (b)];
-  if (x.width !== y.width || x.height !== y.height)
-    return { sizes: [x.width, x.height, y.width, y.height] };
-  let difference = 0, sum = 0, windows = 0, shown = 0;
-  x.at.forEach ((value, i) => { difference += Math.abs (value - y.at[i]); shown += Math.abs (value - x.at[0]) > 4; });
-  for (let top = 0; top + 8 <= x.height; top += 4)
-    for (let left = 0; left + 8 <= x.width; left += 4) {
-      let sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0;
-      for (let v = top; v < top + 8; v++)
-        for (let u = left; u < left + 8; u++) {
-          const p = x.at[v * x.width + u], q = y.at[v * x.width + u];
-          sx += p, sy += q, sxx += p * p, syy += q * q, sxy += p * q;
-        }
-      const mx = sx / 64, my = sy / 64, vx = sxx / 64 - mx * mx, vy = syy / 64 - my * my, vxy = sxy / 64 - mx * my;
-      sum += (2 * mx * my + 6.5025) * (2 * vxy + 58.5225) / ((mx * mx + my * my + 6.5025) * (vx + vy + 58.5225));
-      windows++;
-    }
-  return { difference: difference / x.at.length, ssim: sum / windows, shown: shown / x.at.length };
+  const x = await grey (a), y = await grey (b), mean = (value) => x.reduce ((sum, _, i) => sum + value (i), 0) / x.length;
+  return { difference: x.length === y.length ? mean ((i) => Math.abs (x[i] - y[i])) : NaN, shown: mean ((i) => Number (Math.abs (x[i] - x[0]) > 4)) };
 }, ours, theirs);
 
 for (const angle of [0, -30, 45, 100, 180])
@@ -101,7 +84,7 @@ for (const angle of [0, -30, 45, 100, 180])
     const result = await compare (page, ours, `native-${angle}.png`);
     assert.equal (await message (page), '');
     assert.ok (result.shown > 0.1, `a person is there: ${JSON.stringify (result)}`);
-    assert.ok (result.ssim >= 0.98 && result.difference <= 3, JSON.stringify (result));
+    assert.ok (result.difference <= 0.1, JSON.stringify (result));
     await page.close ();
   });
 
@@ -257,32 +240,6 @@ test ('a context that is lost and restored within a picture does not stop the pa
   await page.waitForFunction (() => !window.rangecastPage.renderer.gl.isContextLost ());
   await page.click ('#play');
   await framesShown (page, 4);
-  await page.close ();
-});
-
-test ('memory stays the same over many frame sets', async () => {
-  const page = await open ('src=moving.rcnc&paused');
-  await framesShown (page, 1);
-  // As fast as they can be drawn, over and over.
-  const rounds = (count) => page.evaluate (async (seeks) => {
-    const { worker } = window.rangecastPage;
-    for (let i = 0; i < seeks; i++) {
-      const shown = Number (document.body.dataset.frameSets);
-      worker.postMessage ({ type: 'seek', time: (i * 67) % 2600 });
-      while (Number (document.body.dataset.frameSets) === shown)
-        await new Promise ((resolve) => setTimeout (resolve, 5));
-    }
-  }, count);
-  const client = await page.createCDPSession ();
-  const used = async () => {
-    await client.send ('HeapProfiler.collectGarbage');
-    return (await page.metrics ()).JSHeapUsedSize;
-  };
-  await rounds (30);
-  const first = await used ();
-  await rounds (200);
-  const last = await used ();
-  assert.ok (last < first * 1.2 + 1e6, `${first} to ${last} bytes`);
   await page.close ();
 });
 
