@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Runs element tests under valgrind: memory errors and definite leaks fail.
-# usage: tests/valgrind.sh [ELEMENT...]   (default: all but what draws, which takes minutes in software OpenGL, and data channels,
-# whose libraries leak)
+# usage: tests/valgrind.sh [ELEMENT...]   (default: all but what draws, which takes minutes in software OpenGL)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 build=${RANGECAST_BUILD:-build}
