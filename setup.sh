@@ -27,14 +27,14 @@ esac
 packages=(
   # build
   gcc g++ meson ninja-build pkg-config git ca-certificates python3
-  libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libgstreamer-plugins-bad1.0-dev libopencv-dev libassimp-dev libyaml-dev zlib1g-dev libcairo2-dev
+  libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libopencv-dev libassimp-dev libyaml-dev zlib1g-dev libcairo2-dev
   # run: launch strings, RTP, image and video files, software OpenGL without a display
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-base-apps gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
   gstreamer1.0-libav glib-networking gstreamer1.0-gl libgl1-mesa-dri libegl1 libegl-mesa0 libgles2 libgl1
 )
 [ "${1:-}" = --demo ] || packages+=(
   # rangewebsink, and its page: rangecast.wasm
-  libsoup-3.0-dev libjson-glib-dev gstreamer1.0-nice
+  libsoup-3.0-dev libjson-glib-dev
   clang-19 lld-19 wasi-libc libc++-19-dev-wasm32 libc++abi-19-dev-wasm32 libclang-rt-19-dev-wasm32
 )
 [ "${targets[0]}" = demo ] || packages+=(

@@ -18,14 +18,11 @@ usage: web-server.sh [options]                        a built-in scene
                   Other users of this machine see it in the list of processes; they don't see a random one
   --token-file FILE  lines "name token", one for each user
   --anonymous     no token: whoever can connect sees the stream
-  --certificate PEM, --private-key PEM  https; web-certificate.sh makes them
+  --certificate PEM, --private-key PEM  https; docs/guide/web.md says how to make them
   --title TEXT    title of the page
   --stats PORT    UDP port for statistics of all hosts, for the dashboard: run them with RANGECAST_STATS=udp://THIS-MACHINE:PORT
   --origins LIST  origins of other servers' pages that may connect, e.g. "https://example.org"
   --window N      frame sets on the way to a client (default 3); raise it where a round trip takes more than 3 frame periods
-  --webrtc        also offer data channels (WebRTC), which the link then asks for; opens UDP ports on all interfaces. The WebSocket
-                  works better on most links: see docs/guide/web.md
-  --stun HOST:PORT, --turn USER:PASSWORD@HOST:PORT  with --webrtc: servers for clients behind NAT, who learn the password
   --jitter MS     with --listen: jitter buffer (default 30)
   --audio PORT    with --listen: speech to hear beside the picture, as viewer-host.sh receives it
   --clock CLOCK   with --audio: HOST:PORT where the parent publishes the camera hosts' clock (default system: they run on this machine)
@@ -34,7 +31,7 @@ END
   rtp_usage_receiver
 }
 
-listen= file= audio_port= clock= jitter= group= port=8080 address=127.0.0.1 token= token_file= anonymous= certificate= private_key= title= stats= origins= loop= window= webrtc= stun= turn= string=()
+listen= file= audio_port= clock= jitter= group= port=8080 address=127.0.0.1 token= token_file= anonymous= certificate= private_key= title= stats= origins= loop= window= string=()
 while [ $# -gt 0 ]; do
   option=$1
   [ $# = 1 ] || [ -n "$2" ] || die "option $1: expected a value, got ''"
@@ -48,9 +45,6 @@ while [ $# -gt 0 ]; do
     --file) file=${2:-}; shift ;;
     --loop) loop=yes ;;
     --window) window=${2:-}; shift ;;
-    --webrtc) webrtc=yes ;;
-    --stun) stun=${2:-}; shift ;;
-    --turn) turn=${2:-}; shift ;;
     --address) address=${2:-}; shift ;;
     --port) port=${2:-}; shift ;;
     --token) token=${2:-}; shift ;;
@@ -88,8 +82,11 @@ for needed in "$certificate" "$private_key" "$token_file" "$file"; do
   [ -z "$needed" ] || [ -f "$needed" ] || die "no file '$needed'"
 done
 [ -z "$loop" ] || [ -n "$file" ] || die "--loop: expected with --file"
-[ -z "$stun$turn" ] || [ -n "$webrtc" ] || die "--stun and --turn: expected with --webrtc"
 [ -z "$private_key" ] || [ -n "$certificate" ] || die "--private-key: expected with --certificate"
+# GLib does not compare them, and browsers would only say that they cannot connect.
+[ -z "$certificate" ] || ! command -v openssl >/dev/null ||
+  cmp -s <(openssl x509 -in "$certificate" -noout -pubkey 2>&1) <(openssl pkey -in "${private_key:-$certificate}" -pubout 2>&1) ||
+  die "--private-key: '${private_key:-$certificate}' is not the key of --certificate '$certificate' (both must be PEM files)"
 command -v rangecast-run >/dev/null || die "rangecast-run is missing, which prints the link; run $root/setup.sh"
 gst-inspect-1.0 --exists --atleast-version=0.0.0 rangewebsink || die "rangewebsink is missing: it needs libsoup-3.0 and json-glib; run $root/setup.sh"
 
@@ -102,9 +99,6 @@ settings=("port=$port" "address=$address")
 [ -z "$title" ] || settings+=("title=\"$(sed 's/["\\]/\\&/g' <<<"$title")\"") # as launch strings quote
 [ -z "$origins" ] || settings+=("origins=$origins")
 [ -z "$window" ] || settings+=("window=$window")
-[ -z "$webrtc" ] || settings+=(webrtc=true)
-[ -z "$stun" ] || settings+=("stun-server=stun://$stun")
-[ -z "$turn" ] || settings+=("turn-server=turn://$turn")
 [ -z "$loop" ] || export RANGECAST_LAUNCH="${RANGECAST_LAUNCH:-rangecast-run} --loop"
 if [ -n "$stats" ]; then
   stats_address=0.0.0.0
@@ -165,7 +159,7 @@ print_links () {
   esac
   for one in $hosts; do
     [[ "$one" != *:*:* || "$one" == \[* ]] || one="[$one]"
-    printed+=("$scheme://$one:$link_port/${webrtc:+?transport=webrtc}${token:+#token=$token}")
+    printed+=("$scheme://$one:$link_port/${token:+#token=$token}")
   done
   printf '%s\n' "${printed[@]}" # at once
   [ -z "$token_file" ] || [ -n "$private" ] || echo "(each user's link ends with #token= and their token)"

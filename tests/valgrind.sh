@@ -1,15 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Runs element tests under valgrind: memory errors and definite leaks fail.
-# usage: tests/valgrind.sh [ELEMENT...]   (default: all but what draws, which takes minutes in software OpenGL, and data channels,
-# whose libraries leak)
+# usage: tests/valgrind.sh [ELEMENT...]   (default: all but what draws, which takes minutes in software OpenGL)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 build=${RANGECAST_BUILD:-build}
 elements=("$@")
 if [ ${#elements[@]} = 0 ]; then
   for program in "$build"/tests/check/check_*; do
-    [ -x "$program" ] && [ -f "$program" ] && [[ "$program" != *_strip* && "$program" != *_rangewebsinkrtc && "$program" != *_rangerender ]] && elements+=("${program##*check_}")
+    [ -x "$program" ] && [ -f "$program" ] && [[ "$program" != *_strip* && "$program" != *_rangerender ]] && elements+=("${program##*check_}")
   done
 fi
 export GST_PLUGIN_PATH=$PWD/$build/gst GST_REGISTRY=$PWD/$build/test-registry.bin RANGECAST_SOURCE=$PWD

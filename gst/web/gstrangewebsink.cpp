@@ -4,9 +4,8 @@
  * @title: rangewebsink
  *
  * Serves coded frame sets to browsers: a page that shows the person in 3D, a dashboard of the rig
- * (/rig), and the stream over WebSockets and WebRTC data channels, as docs/formats/web-protocol.md
- * specifies. Clients that cannot keep up are sent fewer frame sets; they never delay the pipeline
- * or other clients.
+ * (/rig), and the stream over WebSockets, as docs/formats/web-protocol.md specifies. Clients that
+ * cannot keep up are sent fewer frame sets; they never delay the pipeline or other clients.
  *
  * By default only this machine can connect. An @address that others can reach needs a @token, a
  * @token-file, or @anonymous=true; use @certificate there, too.
@@ -38,7 +37,6 @@
 #include <utility>
 #include <vector>
 
-#include "category.hpp"
 #include "common/capserrors.hpp"
 #include "common/capturetime.hpp"
 #include "common/elementproperties.hpp"
@@ -56,9 +54,6 @@ struct GstRangeWebSinkPrivate {
   std::shared_ptr<web::Server> server; /* from PAUSED on */
   StatsReporter reporter;
   std::atomic<bool> requesting_key = false;
-
-  /* state changes only: servers of before, whose clients have not closed their connections yet */
-  std::vector<std::shared_ptr<web::Server>> stopped;
 
   GstSegment audio_segment{}; /* streaming thread of the audio pad only */
 
@@ -104,7 +99,7 @@ gst_range_web_sink_set_caps (GstBaseSink *base, GstCaps *caps)
   priv->reporter.set_views (info.rig);
   std::vector<guint8> rig;
   rangecast::write_rig_units ({info.rig, info.fps_n, info.fps_d}, rig);
-  current_server (priv)->stream ().set_rig (std::string (rig.begin (), rig.end ()));
+  current_server (priv)->set_rig (std::string (rig.begin (), rig.end ()));
   return TRUE;
 }
 
@@ -144,7 +139,7 @@ gst_range_web_sink_render (GstBaseSink *base, GstBuffer *buffer)
   gst_buffer_extract_dup (buffer, 0, gst_buffer_get_size (buffer), &units, &size);
   GST_LOG_OBJECT (base, "%" G_GSIZE_FORMAT " bytes of %" GST_TIME_FORMAT, size,
       GST_TIME_ARGS (GST_BUFFER_PTS (buffer)));
-  current_server (priv)->stream ().push (web::BytesPtr (g_bytes_new_take (units, size)),
+  current_server (priv)->push (web::BytesPtr (g_bytes_new_take (units, size)),
       !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT), is_discontinuity (priv, buffer),
       monotonic_us (GST_ELEMENT (base), capture_time_of (buffer)));
   priv->reporter.passed (GST_ELEMENT (base), buffer);
@@ -159,14 +154,14 @@ gst_range_web_sink_event (GstBaseSink *base, GstEvent *event)
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
     priv->last_pts = GST_CLOCK_TIME_NONE;
     if (const auto server = current_server (priv))
-      server->stream ().flush ();
+      server->flush ();
   }
   /* waits until the last frame set was rendered */
   const gboolean handled =
       GST_BASE_SINK_CLASS (gst_range_web_sink_parent_class)->event (base, event);
   if (ended && handled) {
     if (const auto server = current_server (priv))
-      server->stream ().end ();
+      server->end ();
     priv->reporter.finish ();
   }
   return handled;
@@ -201,7 +196,7 @@ gst_range_web_sink_audio_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
   if (!server)
     return GST_FLOW_FLUSHING;
   if (captured_us >= 0)
-    server->stream ().push_audio (std::move (packet), captured_us);
+    server->push_audio (std::move (packet), captured_us);
   else
     GST_DEBUG_OBJECT (parent, "dropping a packet of speech: it is not known when it was captured");
   return GST_FLOW_OK;
@@ -233,7 +228,7 @@ gst_range_web_sink_request_pad (
   gst_pad_set_active (pad, GST_STATE (element) > GST_STATE_READY);
   gst_element_add_pad (element, pad);
   if (const auto server = current_server (priv))
-    server->stream ().set_audio (true);
+    server->set_audio (true);
   return pad;
 }
 
@@ -243,7 +238,7 @@ gst_range_web_sink_release_pad (GstElement *element, GstPad *pad)
   gst_pad_set_active (pad, FALSE);
   gst_element_remove_pad (element, pad);
   if (const auto server = current_server (GST_RANGE_WEB_SINK (element)->priv))
-    server->stream ().set_audio (false);
+    server->set_audio (false);
 }
 
 /* On the server's thread, which does not wait for what upstream does with the event. */
@@ -295,13 +290,12 @@ gst_range_web_sink_start (GstElement *element)
     settings.root = default_root (element);
   priv->caps_errors.reset ();
   priv->last_pts = GST_CLOCK_TIME_NONE;
-  std::erase_if (priv->stopped, [] (const auto &server) { return server->has_stopped (); });
   auto server = std::make_shared<web::Server> (GST_OBJECT (element), settings, request_key);
   if (const Status status = server->start ();
       gst_range_flow_return (element, status) != GST_FLOW_OK)
     return false;
   if (GstPad *audio = gst_element_get_static_pad (element, "audio")) {
-    server->stream ().set_audio (true);
+    server->set_audio (true);
     gst_object_unref (audio);
   }
   {
@@ -316,27 +310,22 @@ gst_range_web_sink_start (GstElement *element)
   return true;
 }
 
-/* The server's thread says goodbye to its clients after that. */
 static void
 gst_range_web_sink_stop (GstRangeWebSinkPrivate *priv)
 {
-  std::shared_ptr<web::Server> server;
-  {
-    std::lock_guard guard (priv->lock);
-    server.swap (priv->server);
-    priv->settings.url.clear ();
-  }
-  if (!server)
-    return;
-  server->stop ();
-  priv->stopped.push_back (std::move (server));
+  std::shared_ptr<web::Server> server; /* ends without the lock */
+  std::lock_guard guard (priv->lock);
+  server.swap (priv->server);
+  priv->settings.url.clear ();
 }
 
 static std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
   const auto server = current_server (GST_RANGE_WEB_SINK (element)->priv);
-  const auto counters = server ? server->counters () : web::Server::Counters{};
+  if (!server)
+    return {{}};
+  const auto &counters = server->counters ();
   return {{.counters = {.frames = counters.frame_sets, .bytes = counters.bytes}}};
 }
 
@@ -365,17 +354,13 @@ gst_range_web_sink_change_state (GstElement *element, GstStateChange transition)
 static GstStructure *
 make_stats (GstRangeWebSinkPrivate *priv)
 {
-  const auto counters = priv->server ? priv->server->counters () : web::Server::Counters{};
-  GstStructure *stats = gst_structure_new ("server-stats", "clients", G_TYPE_UINT, counters.clients,
-      "connections", G_TYPE_UINT64, counters.connections, "refused", G_TYPE_UINT64,
-      counters.refused, "frame-sets", G_TYPE_UINT64, counters.frame_sets, "key-requests",
-      G_TYPE_UINT64, counters.key_requests, "bytes", G_TYPE_UINT64, counters.bytes, nullptr);
-  GValue list = G_VALUE_INIT;
-  g_value_init (&list, GST_TYPE_ARRAY);
-  if (priv->server)
-    priv->server->take_client_stats (&list);
-  gst_structure_take_value (stats, "client", &list);
-  return stats;
+  static const web::Server::Counters kNone;
+  const auto &counters = priv->server ? priv->server->counters () : kNone;
+  return gst_structure_new ("server-stats", "clients", G_TYPE_UINT, counters.clients.load (),
+      "connections", G_TYPE_UINT64, counters.connections.load (), "refused", G_TYPE_UINT64,
+      counters.refused.load (), "frame-sets", G_TYPE_UINT64, counters.frame_sets.load (),
+      "key-requests", G_TYPE_UINT64, counters.key_requests.load (), "bytes", G_TYPE_UINT64,
+      counters.bytes.load (), nullptr);
 }
 
 static PropertyTable<Settings> &
@@ -416,38 +401,11 @@ web_properties ()
       P::number<&Settings::window> ("window", "Window",
           "Maximum number of frame sets in flight to a client, not acknowledged yet", 1, 1000,
           kMutableReady),
-      P::number<&Settings::max_queued_bytes> ("max-queued-bytes", "Max queued bytes",
-          "Maximum number of bytes in flight to a client, unless one frame set has more", 1,
-          G_MAXINT64, kMutableReady),
-      P::number<&Settings::hello_timeout_ms> ("hello-timeout", "Hello timeout",
-          "Milliseconds within which a client must send hello", 100, 600000, kMutableReady),
-      P::number<&Settings::key_unit_interval_ms> ("key-unit-interval", "Key unit interval",
-          "Minimum time in milliseconds between two requests for a key frame set, of all clients "
-          "together",
-          0, 600000, kMutableReady),
-      P::boolean<&Settings::webrtc> ("webrtc", "WebRTC",
-          "Offer data channels without retransmission, where webrtcbin and its plugins are "
-          "installed",
-          kMutableReady),
-      P::text<&Settings::stun_server> ("stun-server", "STUN server",
-          "stun://HOST:PORT, for this element and its clients; null: none", kMutableReady),
-      P::text<&Settings::turn_server> ("turn-server", "TURN server",
-          "turn://USER:PASSWORD@HOST:PORT, for this element and its clients, who learn the "
-          "password; null: none",
-          kMutableReady),
       P::text<&Settings::stats_address> ("stats-address", "Stats address",
           "udp://ADDRESS:PORT where hosts send their statistics for the dashboard; null: none",
           kMutableReady),
   };
   return table;
-}
-
-/* Waits until all connections are closed: the servers use the element in their log. */
-static void
-gst_range_web_sink_dispose (GObject *object)
-{
-  GST_RANGE_WEB_SINK (object)->priv->stopped.clear ();
-  G_OBJECT_CLASS (gst_range_web_sink_parent_class)->dispose (object);
 }
 
 static void
@@ -470,7 +428,6 @@ gst_range_web_sink_class_init (GstRangeWebSinkClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto base_class = GST_BASE_SINK_CLASS (klass);
 
-  object_class->dispose = GST_DEBUG_FUNCPTR (gst_range_web_sink_dispose);
   object_class->finalize = GST_DEBUG_FUNCPTR (gst_range_web_sink_finalize);
   /* As install_properties() does; but the base class has a property `stats`. */
   object_class->set_property = properties::set_property<GstRangeWebSink, web_properties>;
@@ -478,9 +435,7 @@ gst_range_web_sink_class_init (GstRangeWebSinkClass *klass)
       properties::get_property<GstRangeWebSink, web_properties, make_stats>;
   g_object_class_install_property (object_class, properties::kStatsId,
       g_param_spec_boxed ("server-stats", "Server statistics",
-          "clients (uint), connections, refused, frame-sets, key-requests, bytes (guint64), client "
-          "(array of structures: address, user, transport (string), frame-sets, dropped, bytes "
-          "(guint64), unacknowledged (uint); at most a second old)",
+          "clients (uint), connections, refused, frame-sets, key-requests, bytes (guint64)",
           GST_TYPE_STRUCTURE, kReadOnly));
   StatsReporter::install (object_class, properties::kStatsIntervalId);
   web_properties ().install (object_class, properties::kFirstSettingId);

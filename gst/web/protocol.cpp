@@ -121,14 +121,11 @@ MessageHeader::write (guint8 *to) const
 {
   to[0] = 1;
   to[1] = static_cast<guint8> ((key ? 1 : 0) | (discontinuity ? 2 : 0));
-  GST_WRITE_UINT16_LE (to + 2, count);
+  GST_WRITE_UINT16_LE (to + 2, 0);
   GST_WRITE_UINT32_LE (to + 4, frame_set);
-  GST_WRITE_UINT16_LE (to + 8, index);
-  GST_WRITE_UINT16_LE (to + 10, 0);
-  GST_WRITE_UINT32_LE (to + 12, message);
-  GST_WRITE_UINT32_LE (to + 16, dropped);
-  GST_WRITE_UINT32_LE (to + 20, delay_us);
-  GST_WRITE_UINT64_LE (to + 24, sent_us);
+  GST_WRITE_UINT32_LE (to + 8, dropped);
+  GST_WRITE_UINT32_LE (to + 12, delay_us);
+  GST_WRITE_UINT64_LE (to + 16, sent_us);
 }
 
 void

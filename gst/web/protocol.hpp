@@ -68,12 +68,11 @@ std::optional<Hello> parse_hello (const JsonMessage &message, std::string &error
 
 /** Header of a frame set's message. */
 struct MessageHeader {
-  static constexpr gsize kSize = 32;
+  static constexpr gsize kSize = 24;
   static constexpr guint32 kUnknownDelay = 0xffffffff;
 
   bool key = false, discontinuity = false;
-  guint16 count = 1, index = 0;
-  guint32 frame_set = 0, message = 0, dropped = 0;
+  guint32 frame_set = 0, dropped = 0;
   guint32 delay_us = kUnknownDelay;
   guint64 sent_us = 0;
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// A WebSocket to rangewebsink that is made anew when it is lost. It runs in a page or a worker. A data channel, which only pages have, is
-// the owner's: signal () and transmit () connect it to this.
-import { FrameAssembler, MAX_FRAME_SET, readSpeech, ServerClock, VERSION } from './protocol.js';
+// A WebSocket to rangewebsink that is made anew when it is lost. It runs in a page or a worker.
+import { readFrameSet, readSpeech, ServerClock, VERSION } from './protocol.js';
 
 const SILENCE = 3000, CLOCK_INTERVAL = 2000, FIRST_WAIT = 500, LONGEST_WAIT = 10000;
 
@@ -17,18 +16,17 @@ const CLOSED = {
 
 export class Connection {
   // want: ['stream', 'audio', 'stats']; on: functions for events, each may be missing:
-  //   frameSet (frameSet): see FrameAssembler; it must acknowledge (frameSet) it
+  //   frameSet (frameSet): see readFrameSet (), with captured in ms of this clock; it must acknowledge (frameSet) it
   //   speech (packet): see readSpeech (), with captured in ms of this clock
   //   say (text, kind): a sentence about the connection; '' removes it
   //   state (name): connecting, waiting (for frame sets), receiving, ended, closed, token
   //   audio (available): speech may be heard, or no longer
-  //   welcome (message), stats (rows), signal (message): from the server
+  //   stats (reports): of hosts
   constructor ({ url, token, want = ['stream'], on }) {
     Object.assign (this, { url, token, want, on });
     this.closed = false;
     this.wait = FIRST_WAIT;
     this.timers = new Set ();
-    this.assemblers = {};
     this.open ();
   }
 
@@ -63,10 +61,7 @@ export class Connection {
     this.clearTimers ();
     this.clock = new ServerClock ();
     this.welcomed = false;
-    this.transport = 'WebSocket';
-    for (const name of ['WebSocket', 'WebRTC'])
-      this.assemblers[name] = new FrameAssembler ((frameSet) => this.deliver (frameSet, name));
-    this.newest = null;
+    this.any = false;
     this.counted = { received: 0, dropped: 0, slow: '' };
     this.setState ('connecting');
     this.schedule (() => this.welcomed || this.say ('Connecting to the server ...'), 1000);
@@ -79,7 +74,7 @@ export class Connection {
     }
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => this.send ({ type: 'hello', version: VERSION, token: this.token ?? undefined, want: this.want });
-    socket.onmessage = ({ data }) => typeof data === 'string' ? this.receiveText (data) : this.receive (data, 'WebSocket');
+    socket.onmessage = ({ data }) => typeof data === 'string' ? this.receiveText (data) : this.receive (data);
     socket.onclose = (event) => socket === this.socket && this.handleClose (event);
     this.socket = socket;
   }
@@ -109,10 +104,8 @@ export class Connection {
       this.emit ('audio', message.available === true);
     else if (type === 'end')
       this.end ();
-    else if (type === 'stats' && Array.isArray (message.rows))
-      this.emit ('stats', message.rows);
-    else if (['offer', 'answer', 'candidate'].includes (type))
-      this.emit ('signal', message);
+    else if (type === 'stats' && Array.isArray (message.reports))
+      this.emit ('stats', message.reports);
   }
 
   enter (message) {
@@ -123,7 +116,6 @@ export class Connection {
     this.setState ('waiting');
     this.said = null; // hides whatever was said before
     this.say ('');
-    this.emit ('welcome', message);
     this.emit ('audio', message.audio === true);
     this.measureClock ();
     this.watchSilence ();
@@ -145,7 +137,7 @@ export class Connection {
       this.silence = this.schedule (() => {
         if (this.stateName === 'ended')
           return;
-        this.say (this.newest === null ? 'The server has no stream yet. Waiting for it.' : 'No frame sets have arrived for some seconds.');
+        this.say (!this.any ? 'The server has no stream yet. Waiting for it.' : 'No frame sets have arrived for some seconds.');
         this.setState ('waiting');
       }, SILENCE);
   }
@@ -192,35 +184,27 @@ export class Connection {
 
   // ---- frame sets ----
 
-  // transport: that the message came by
-  receive (buffer, transport) {
+  receive (buffer) {
     if (!this.welcomed)
       return this.giveUp ("The server sent a frame set before 'welcome'.");
-    const speech = readSpeech (buffer);
-    if (speech)
-      return this.hear (speech);
-    if (!this.assemblers[transport].add (buffer))
-      this.giveUp (buffer.byteLength > MAX_FRAME_SET ? `The server sent ${buffer.byteLength} bytes in one message, more than a frame set may have.`
-        : 'The server sent a message that is not a frame set.');
+    const speech = readSpeech (buffer), frameSet = speech ? null : readFrameSet (buffer);
+    if (speech) {
+      const captured = this.clock.toLocal (speech.captured);
+      if (captured !== undefined)
+        this.emit ('speech', { ...speech, captured });
+    } else if (frameSet)
+      this.deliver (frameSet);
+    else
+      this.giveUp ('The server sent a message that is not a frame set.');
   }
 
-  hear (speech) {
-    const captured = this.clock.toLocal (speech.captured);
-    if (captured !== undefined)
-      this.emit ('speech', { ...speech, captured });
-  }
-
-  deliver (frameSet, transport) {
-    if (this.newest !== null && ((frameSet.frameSet - this.newest) | 0) <= 0)
-      return; // by the other transport already
-    this.newest = frameSet.frameSet;
-    this.transport = transport;
+  deliver (frameSet) {
     const local = this.clock.toLocal (frameSet.sent);
+    this.any = true;
     this.setState ('receiving');
     this.checkDropped (frameSet);
     this.watchSilence ();
-    this.emit ('frameSet', { ...frameSet, captured: local === undefined ? this.now () : local - frameSet.delay,
-      transport, lost: this.assemblers[transport].lost });
+    this.emit ('frameSet', { ...frameSet, captured: local === undefined ? this.now () : local - frameSet.delay });
   }
 
   // After each hundred frame sets of the stream: did the server drop most of them for this client?

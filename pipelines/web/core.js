@@ -4,7 +4,7 @@
 const FIELDS = {
   rc_frame: ['views', 'pts', 'captureTime', 'bytes', 'slices', 'badSlices', 'missingPixels', 'unknownPixels', 'points'],
   rc_view: ['id', 'x', 'y', 'width', 'height', 'depth', 'colour'],
-  rc_layer: ['id', 'vertices', 'size', 'width', 'height', 'depth', 'colour', 'depthStride', 'colourStride'],
+  rc_layer: ['id', 'vertices', 'size'],
   rc_recording: ['duration', 'frameDuration', 'read'],
   rc_orbit: ['azimuth', 'elevation', 'distance', 'fieldOfView', 'panX', 'panY', 'panZ', 'homeRequests'],
   rc_ply: ['address', 'size'],
@@ -13,7 +13,6 @@ const FIELDS = {
 const RIG_FIELDS = ['id', 'width', 'height', 'fx', 'fy', 'cx', 'cy'];
 
 export const DONE = 0, NOTHING = 1, END = 2, FAILED = 3;
-export const BLEND = 0, STRIPS = 1;
 
 // What an instance threw: a trap or a refused allocation. The instance was made anew and knows nothing of the stream.
 export class CoreFailure extends Error {}

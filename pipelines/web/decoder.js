@@ -2,7 +2,7 @@
 // The worker: decodes what a source delivers and makes vertices of the newest frame set, when the page has drawn the one before.
 //
 // A source is a class with start (paused, ms), close () and, where it can, toggle () and seek (ms). It gets this stage: core to decode
-// with, decode () round each call of it, decoded (due) after each frame set, network for what it knows of that, position (...), say (...).
+// with, decode () round each call of it, decoded (due) after each frame set, post (...) and say (...).
 import { Core, DONE } from './core.js';
 import { LiveSource } from './live-source.js';
 import { RecordingSource } from './recording-source.js';
@@ -16,12 +16,11 @@ class Stage {
     this.waiting = null; // of the newest frame set, not shown yet: due, held (it does not follow the one before in the stream's time)
     this.skipped = 0;
     this.decodeTime = 0;
-    this.network = null; // of a live source: transport, dropped (by the server), lost (messages, by the network)
+    this.dropped = null; // frame sets, by the server of a live source
   }
 
   post (message) { postMessage (message); }
   say (text, kind = 'error') { this.post ({ type: 'say', text, kind }); }
-  position (time, duration, playing, due) { this.post ({ type: 'position', time, duration, playing, due }); }
 
   // decode (): an Outcome. Measures it; a failure of the core is said, and FAILED returned.
   decode (decode) {
@@ -49,27 +48,21 @@ class Stage {
     const { core } = this, layers = [], transfer = [];
     for (let i = 0; i < core.call ('rc_layers'); i++) {
       const layer = core.record ('rc_layer', i);
-      const copied = { id: layer.id, vertices: core.bytes (layer.vertices, layer.size).slice () };
-      transfer.push (copied.vertices.buffer);
-      if (this.view.mode === 1) {
-        Object.assign (copied, { width: layer.width, height: layer.height,
-          depth: new Uint16Array (core.memory.buffer, layer.depth, layer.depthStride * layer.height).slice (),
-          colour: core.bytes (layer.colour, 4 * layer.colourStride * layer.height).slice () });
-        transfer.push (copied.depth.buffer, copied.colour.buffer);
-      }
-      layers.push (copied);
+      const vertices = core.bytes (layer.vertices, layer.size).slice ();
+      transfer.push (vertices.buffer);
+      layers.push ({ id: layer.id, vertices });
     }
     const state = this.state ();
     this.drawing = true;
-    postMessage ({ type: 'frame', mode: this.view.mode, layers, state, ...core.frame (), ...waiting, skipped: this.skipped,
-      network: this.network, decodeTime: this.decodeTime, buildTime: performance.now () - begin }, [...transfer, state]);
+    postMessage ({ type: 'frame', layers, state, ...core.frame (), ...waiting, skipped: this.skipped,
+      dropped: this.dropped, decodeTime: this.decodeTime, buildTime: performance.now () - begin }, [...transfer, state]);
     this.skipped = this.decodeTime = 0;
   }
 
   build () {
     const v = this.view;
     try {
-      return this.core.call ('rc_build', v.mode, v.fit ? 1 : 0, v.aspect, v.azimuth, v.elevation, v.distance, v.fieldOfView, v.panX, v.panY, v.panZ,
+      return this.core.call ('rc_build', v.fit ? 1 : 0, v.aspect, v.azimuth, v.elevation, v.distance, v.fieldOfView, v.panX, v.panY, v.panZ,
         v.homeRequests) === DONE;
     } catch (error) {
       this.say (error.message);
@@ -98,7 +91,7 @@ class Stage {
     this.show ();
   }
   // What is shown goes on until a recording has been found good.
-  async open ({ number, recording, live, paused, time }) {
+  async open ({ recording, live, paused, time }) {
     const source = live ? new LiveSource (this, live) : new RecordingSource (this, recording), before = this.wanted;
     this.wanted = source;
     const failure = recording ? await source.load () : '';
@@ -110,9 +103,9 @@ class Stage {
       return;
     }
     this.source?.close ();
-    this.network = null;
+    this.dropped = null;
     this.source = source;
-    this.post ({ type: 'opened', number });
+    this.post ({ type: 'opened' });
     source.start (paused, time);
   }
   points () {
@@ -135,8 +128,6 @@ onmessage = ({ data }) => {
     seek: () => stage.source?.seek?.(data.time),
     points: () => stage.points (),
     hold: () => stage.source?.hold?.(data),
-    signal: () => stage.source?.signal?.(data),
-    transmit: () => stage.source?.transmit?.(data),
   };
   actions[data.type] ();
 };

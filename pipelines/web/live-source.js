@@ -9,7 +9,7 @@ export class LiveSource {
     this.stage = stage;
     this.live = live;
     this.wait = 0; // ms that frame sets wait before they are decoded
-    this.generation = 0; // of connections
+    this.waiting = new Set (); // their timers
     this.due = 0; // of the last one, performance.now ()
   }
 
@@ -21,34 +21,38 @@ export class LiveSource {
       say: (text, kind) => stage.say (text, kind),
       state: (name) => this.handleState (name),
       audio: (available) => stage.post ({ type: 'audio', available }),
-      welcome: (message) => stage.post ({ type: 'welcome', rtc: message.rtc === true, iceServers: message.iceServers }),
-      signal: (message) => stage.post ({ type: 'signal', message }),
     } });
   }
   close () {
-    this.closed = true;
+    this.forget ();
     this.connection.close ();
+  }
+  forget () {
+    this.waiting.forEach (clearTimeout);
+    this.waiting.clear ();
   }
 
   hold ({ wait }) { this.wait = wait; }
+  // What waits is acknowledged before: it must not use up the server's window.
   receive (frameSet) {
-    if (this.wait > 0) // else when it is decoded; waiting must not use up the server's window
-      this.connection.acknowledge (frameSet);
-    const now = performance.now (), acknowledged = this.wait > 0;
+    const now = performance.now ();
     this.due = Math.max (this.due, now + this.wait); // in their order
-    if (this.due <= now)
-      this.decode (frameSet, acknowledged);
-    else {
-      const { generation } = this;
-      setTimeout (() => this.closed || generation !== this.generation || this.decode (frameSet, acknowledged), this.due - now);
-    }
+    if (this.due > now) {
+      this.connection.acknowledge (frameSet);
+      const timer = setTimeout (() => {
+        this.waiting.delete (timer);
+        this.decode (frameSet, true);
+      }, this.due - now);
+      this.waiting.add (timer);
+    } else
+      this.decode (frameSet, false);
   }
 
   handleState (name) {
-    if (name === 'connecting')
-      this.generation++; // what waits is of the connection before
-    if (name === 'connecting')
+    if (name === 'connecting') {
+      this.forget (); // they are of the connection before
       this.stage.core.call ('rc_forget_stream');
+    }
     this.stage.post ({ type: 'live', state: name });
   }
 
@@ -59,8 +63,7 @@ export class LiveSource {
       outcome = this.stage.decode (() => {
         if (frameSet.discontinuity)
           core.call ('rc_forget_references');
-        for (const units of frameSet.units)
-          core.addUnits (units);
+        core.addUnits (frameSet.units);
         return core.decode ();
       });
     } catch (error) { // a new instance of the core has no rig
@@ -78,16 +81,7 @@ export class LiveSource {
       return;
     if (core.frame ().unknownPixels > 0)
       this.connection.requestKey ();
-    const { transport, dropped, lost, count, units } = frameSet;
-    this.stage.network = { transport, dropped, lost, absent: count - units.length }; // messages
+    this.stage.dropped = frameSet.dropped;
     this.stage.decoded (frameSet.captured);
-  }
-
-  // ---- the page's data channel ----
-
-  signal ({ message }) { this.connection.send (message); }
-  transmit ({ data }) {
-    if (this.connection.welcomed) // else it is of the connection before
-      this.connection.receive (data, 'WebRTC');
   }
 }

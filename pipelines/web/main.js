@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The page's main thread: it owns the picture and the camera; decoder.js, a worker, owns stream, decoder and geometry. Parameters of the
-// address: src=URL of a recording; server=URL of a stream (default: this page's server, if that has one); mode=blend or strips;
-// transport=webrtc: frame sets over a data channel; stats; fit=0: the first camera's view; azimuth, elevation (degrees); time (ms) and paused.
+// address: src=URL of a recording; server=URL of a stream (default: this page's server, if that has one); stats; fit=0: the first camera's view; azimuth, elevation (degrees); time (ms) and paused.
 // A token comes in the fragment (#token=...), which stays in this browser.
-import { BLEND, Core, STRIPS } from './core.js';
-import { DataChannel } from './data-channel.js';
+import { Core } from './core.js';
 import { followPointers } from './pointers.js';
-import { RecordedSound } from './recorded-sound.js';
-import { Renderer } from './renderer.js';
-import { Resolution } from './resolution.js';
+import { HEAD, LAYER, Renderer } from './renderer.js';
 import { findServer, storeToken, readToken } from './server.js';
 import { Speech } from './speech.js';
 import { Stats } from './stats.js';
@@ -17,7 +13,6 @@ import { Headset } from './xr.js';
 const element = (id) => document.getElementById (id);
 const canvas = element ('picture');
 const parameters = new URLSearchParams (location.search);
-const settings = { mode: parameters.get ('mode') === 'strips' ? STRIPS : BLEND, fit: parameters.get ('fit') !== '0' };
 
 // ---- what the page says ----
 
@@ -42,8 +37,9 @@ const timeText = (ms) => {
   return `${Math.floor (seconds / 60)}:${(seconds % 60).toFixed (1).padStart (4, '0')}`;
 };
 
-const CHANNEL_WAIT = 10000; // ms until another data channel is tried
-const REST = 500; // ms without a new picture, at least, until the last one is drawn at full resolution
+const REST = 500; // ms without a new picture until the last one is drawn with all pixels
+// Where the GPU takes longer than SLOW ms for a picture, pictures that move have fewer pixels, until it takes less than FAST.
+const MIN_SCALE = 0.4, SLOW = 80, FAST = 30; // the scale is that of width and height
 
 class Page {
   // worker: of decoder.js
@@ -54,16 +50,13 @@ class Page {
     this.camera = new Core (module);
     this.renderer = new Renderer (canvas, (number) => this.camera.text (this.camera.call ('rc_shader', number)));
     this.speech = new Speech (say, (wait) => this.worker.postMessage ({ type: 'hold', wait }));
-    this.recordedSound = new RecordedSound (say, () => this.audio ({ available: this.recordedSound.isOpen }));
     this.stats = new Stats (element ('stats'), parameters.has ('stats'), (latency) => this.speech.follow (latency));
-    this.asked = new Map (); // recordings that were opened, by number
     this.pending = null; // the newest frame set, not uploaded yet
-    this.resolution = new Resolution ();
+    this.scale = 1; // of the resolution of moving pictures
     this.wanted = this.painting = false; // another picture; one is under way
     this.resting = false; // the next one is to have all pixels
     this.server = null; // { url, token }
     this.headset = new Headset (this, element ('headset'), say);
-    this.channel = null;
     if (parameters.has ('azimuth') || parameters.has ('elevation'))
       this.camera.call ('rc_set_orbit', Number (parameters.get ('azimuth') ?? 0), Number (parameters.get ('elevation') ?? 0), 0, 0, 0, 0, 0);
     this.watch ();
@@ -76,19 +69,10 @@ class Page {
     if (this.pending)
       this.stats.skip ();
     this.pending = frame;
-    if (!frame.held)
-      this.resolution.follow (frame);
     this.draw ();
   }
-  // The camera's default position, or what surrounds the scene, has changed.
-  scene ({ state }) {
-    this.setScene (state);
-    this.draw ();
-  }
-  position ({ time, duration, playing, due }) {
-    this.recordedSound.follow (time, playing, due, this.speech.seen);
+  position ({ time, duration, playing }) {
     const seek = element ('seek');
-    this.closeChannel (); // of a stream before
     element ('token').hidden = true;
     this.showBar (false);
     seek.max = Math.max (duration, 1);
@@ -108,32 +92,12 @@ class Page {
       element ('token-text').focus ();
     if (state === 'receiving')
       this.showBar (true);
-    if (state === 'connecting')
-      this.closeChannel ();
   }
   hear ({ packet }) { this.speech.add (packet); }
   audio ({ available }) {
     element ('sound').hidden = !available;
-    this.sayMuted ();
+    element ('sound').textContent = this.speech.isOn ? 'Mute' : 'Sound';
   }
-  get sound () { return this.recordedSound.isOpen ? this.recordedSound : this.speech; }
-  sayMuted () { element ('sound').textContent = this.sound.isOn ? 'Mute' : 'Sound'; }
-  welcome ({ rtc, iceServers }) {
-    if (rtc && parameters.get ('transport') === 'webrtc')
-      this.openChannel (iceServers, 3);
-  }
-  // tries: the server allows four in a connection
-  openChannel (iceServers, tries) {
-    this.channel = new DataChannel (iceServers, {
-      send: (message) => this.worker.postMessage ({ type: 'signal', message }),
-      receive: (data) => this.worker.postMessage ({ type: 'transmit', data }, [data]),
-      failed: () => {
-        if (tries > 1)
-          this.channelTimer = setTimeout (() => this.openChannel (iceServers, tries - 1), CHANNEL_WAIT);
-      },
-    });
-  }
-  signal ({ message }) { this.channel?.signal (message); }
   points ({ file }) {
     if (file)
       save (new Blob ([file], { type: 'model/ply' }), 'rangecast.ply');
@@ -144,21 +108,12 @@ class Page {
     element ('bar').classList.toggle ('live', live);
     element ('welcome').hidden = true;
   }
-  closeChannel () {
-    clearTimeout (this.channelTimer);
-    this.channel?.close ();
-    this.channel = null;
-  }
 
-  // What was asked for with this number is shown from now on.
-  opened ({ number }) {
-    const { recording, files } = this.asked.get (number);
-    this.recordedSound.close ();
+  // What was asked for last is shown from now on.
+  opened () {
     if (this.speech.isOn)
       this.speech.stop ();
     this.audio ({ available: false }); // until there is some
-    if (recording)
-      this.recordedSound.open (recording, files);
   }
 
   // ---- drawing ----
@@ -178,27 +133,27 @@ class Page {
   // The next picture has to wait until the GPU has drawn this one, so that it is of the newest frame set.
   async drawNext () {
     clearTimeout (this.rest);
-    const whole = this.resting, scale = whole ? 1 : this.resolution.scaleOf (canvas.clientWidth * canvas.clientHeight * (window.devicePixelRatio || 1) ** 2);
+    const whole = this.resting, scale = whole ? 1 : this.scale;
     this.wanted = this.resting = false;
     try {
       const begin = performance.now ();
       this.setSize (scale);
       const frame = this.paint ();
       await this.renderer.finished ();
+      const time = performance.now () - begin, factor = time > SLOW ? 0.8 : time < FAST ? 1.1 : 1;
       if (!whole)
-        this.resolution.record (performance.now () - begin);
+        this.scale = Math.max (MIN_SCALE, Math.min (1, this.scale * factor));
       this.shown (frame, begin, scale);
     } finally {
       this.painting = false;
     }
     if (this.wanted)
       this.draw ();
-    else if (scale < 1) // and not just before the next frame set
-      this.rest = setTimeout (() => this.drawWhole (), Math.max (REST, 2 * this.resolution.period));
-  }
-  drawWhole () {
-    this.resting = true;
-    this.draw ();
+    else if (scale < 1)
+      this.rest = setTimeout (() => {
+        this.resting = true;
+        this.draw ();
+      }, REST);
   }
 
   // show: draws one picture, or one for each eye. Returns the frame set that is new in it, if any.
@@ -208,7 +163,7 @@ class Page {
     try {
       if (frame) {
         this.setScene (frame.state);
-        this.renderer.upload (frame.mode, frame.layers);
+        this.renderer.upload (frame.layers);
       }
       show ();
     } catch (error) {
@@ -230,12 +185,13 @@ class Page {
     const at = this.camera.call (name, ...args);
     if (!at)
       throw new Error ('The viewport does not fit its framebuffer.');
-    return this.camera.floats (at, 21 + 48 * this.renderer.layers.length);
+    return this.camera.floats (at, HEAD + LAYER * this.renderer.layers.length);
   }
 
   // The camera decides which views are reduced, and the shape of the picture what fits.
   postView () {
-    const view = { ...this.camera.record ('rc_orbit'), aspect: (canvas.clientWidth || 1) / (canvas.clientHeight || 1), ...settings };
+    const view = { ...this.camera.record ('rc_orbit'), aspect: (canvas.clientWidth || 1) / (canvas.clientHeight || 1),
+      fit: parameters.get ('fit') !== '0' };
     const text = JSON.stringify (view);
     if (text !== this.postedView)
       this.worker.postMessage ({ type: 'view', view });
@@ -246,21 +202,11 @@ class Page {
 
   openLive (url, token) {
     this.server = { url, token };
-    this.ask ({}, { live: this.server });
+    this.worker.postMessage ({ type: 'open', live: this.server });
   }
-  ask (what, message) {
-    this.asked.set (this.asked.size, what);
-    this.worker.postMessage ({ type: 'open', number: this.asked.size - 1, ...message });
-  }
-  // recording: a File or an address; files: that and what was chosen with it
-  open (recording, files) {
-    this.ask ({ recording, files }, { recording, paused: parameters.has ('paused'), time: Number (parameters.get ('time') ?? 0) });
-  }
-
-  // A recording, and its speech where that was chosen, too.
-  openFiles ([...files]) {
-    if (files.length > 0)
-      this.open (files.find (({ name }) => !/\.opus~?$/.test (name)) ?? files[0], files);
+  // recording: a File or an address
+  open (recording) {
+    this.worker.postMessage ({ type: 'open', recording, paused: parameters.has ('paused'), time: Number (parameters.get ('time') ?? 0) });
   }
 
   // scale: of the resolution of the screen
@@ -277,18 +223,13 @@ class Page {
     this.camera.call (name, ...args);
     this.draw ();
   }
-  toggleMode () {
-    settings.mode = settings.mode === BLEND ? STRIPS : BLEND;
-    element ('mode').textContent = settings.mode === BLEND ? 'Blend' : 'Strips';
-    this.draw ();
-  }
   key (event) {
     const actions = {
       ArrowLeft: () => this.move ('rc_step', -1, 0), ArrowRight: () => this.move ('rc_step', 1, 0),
       ArrowUp: () => this.move ('rc_step', 0, 1), ArrowDown: () => this.move ('rc_step', 0, -1),
       '+': () => this.move ('rc_step_nearer', 1), '=': () => this.move ('rc_step_nearer', 1), '-': () => this.move ('rc_step_nearer', 0),
       Escape: () => say (''),
-      Home: () => this.move ('rc_go_home'), r: () => this.move ('rc_go_home'), m: () => this.toggleMode (),
+      Home: () => this.move ('rc_go_home'), r: () => this.move ('rc_go_home'),
       ' ': () => this.worker.postMessage ({ type: 'toggle' }),
     };
     if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches ('input, button') || !actions[event.key])
@@ -315,11 +256,9 @@ class Page {
     element ('play').onclick = () => this.worker.postMessage ({ type: 'toggle' });
     element ('seek').oninput = () => this.worker.postMessage ({ type: 'seek', time: Number (element ('seek').value) });
     element ('home').onclick = () => this.move ('rc_go_home');
-    element ('mode').textContent = settings.mode === BLEND ? 'Blend' : 'Strips';
-    element ('mode').onclick = () => this.toggleMode ();
     element ('sound').onclick = () => {
-      this.sound.toggle ();
-      this.sayMuted ();
+      this.speech.toggle ();
+      this.audio ({ available: true });
     };
     element ('save-picture').onclick = () => {
       this.setSize (1);
@@ -335,7 +274,8 @@ class Page {
       this.openLive (this.server.url, element ('token-text').value);
     };
     element ('file').onchange = ({ target }) => {
-      this.openFiles (target.files);
+      if (target.files.length > 0)
+        this.open (target.files[0]);
       target.value = ''; // so that the same file can be chosen again
     };
     addEventListener ('dragover', (event) => {
@@ -346,7 +286,8 @@ class Page {
     addEventListener ('drop', (event) => {
       event.preventDefault ();
       document.body.classList.remove ('dropping');
-      this.openFiles (event.dataTransfer.files);
+      if (event.dataTransfer.files.length > 0)
+        this.open (event.dataTransfer.files[0]);
     });
   }
 }

@@ -109,7 +109,7 @@ export class RecordingSource {
 
   reportPosition () {
     const duration = this.stage.core.record ('rc_recording')?.duration ?? -1;
-    this.stage.position (this.time, duration, this.playing, this.dueOf (this.time));
+    this.stage.post ({ type: 'position', time: this.time, duration, playing: this.playing });
   }
 
   play () {
@@ -154,9 +154,8 @@ export class RecordingSource {
     const wasPlaying = this.playing;
     clearTimeout (this.timer);
     this.playing = false;
-    if (core.call ('rc_recording_seek', time) === NOTHING) {
+    if (core.call ('rc_recording_seek', time) === NOTHING)
       this.open ();
-    }
     this.last = { pts: 0, shift: 0 };
     this.atEnd = false;
     while (this.next () && this.time + period / 2 < time)

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Draws frame sets with WebGL2, as striprender does: its shaders, and numbers from the same code (rc_camera_picture). Knows nothing
 // of streams.
-import { BLEND, STRIPS } from './core.js';
 
 // rangecast::Shader
-const COVERING = 0, COLOUR = 1, STRIP = 3, BLEND_VERTEX = 6, BLEND_FRAGMENT = 7, FILL = 10, SUM = 11;
+const COVERING = 0, BLEND_VERTEX = 6, BLEND_FRAGMENT = 7, FILL = 10, SUM = 11;
 // Floats of rc_camera_picture: those of the picture, and of each layer.
-const HEAD = 21, LAYER = 48;
+export const HEAD = 18, LAYER = 29;
+const VERTEX = 12; // bytes of rangecast::BlendVertex
 
 class Program {
   constructor (gl, vertex, fragment) {
@@ -59,7 +59,6 @@ export class Renderer {
     this.blend = this.program (BLEND_VERTEX, BLEND_FRAGMENT);
     this.finish = this.program (COVERING, FILL);
     this.sums = []; // by number of cells - 1
-    this.strips = this.program (STRIP, COLOUR);
     this.nothing = gl.createVertexArray ();
     this.objects = new Map (); // by view-id
     this.layers = [];
@@ -70,37 +69,29 @@ export class Renderer {
 
   program (vertex, fragment) { return new Program (this.gl, this.shader (vertex), this.shader (fragment)); }
 
-  // Takes the layers of a frame set: { id, vertices: Uint8Array, width, height, depth, colour } (planes in mode strips only).
-  upload (mode, layers) {
-    this.mode = mode;
-    this.layers = layers.map ((layer) => {
-      const objects = this.objectsOf (layer.id, mode);
-      this.uploadVertices (objects, layer.vertices);
-      if (mode === STRIPS)
-        this.uploadPlanes (objects, layer);
-      return { objects, count: layer.vertices.length / (mode === STRIPS ? 4 : 12) };
+  // Takes the layers of a frame set: { id, vertices: Uint8Array }.
+  upload (layers) {
+    this.layers = layers.map (({ id, vertices }) => {
+      const objects = this.objectsOf (id);
+      this.uploadVertices (objects, vertices);
+      return { objects, count: vertices.length / VERTEX };
     });
   }
 
-  objectsOf (id, mode) {
-    const gl = this.gl, key = `${id} ${mode}`;
-    if (!this.objects.has (key)) {
-      const objects = { array: gl.createVertexArray (), buffer: gl.createBuffer (), capacity: 0, width: 0, height: 0 };
+  objectsOf (id) {
+    const gl = this.gl;
+    if (!this.objects.has (id)) {
+      const objects = { array: gl.createVertexArray (), buffer: gl.createBuffer (), capacity: 0 };
       gl.bindVertexArray (objects.array);
       gl.bindBuffer (gl.ARRAY_BUFFER, objects.buffer);
-      gl.enableVertexAttribArray (0);
-      if (mode === STRIPS) {
-        gl.vertexAttribIPointer (0, 1, gl.UNSIGNED_INT, 4, 0);
-      } else {
-        gl.enableVertexAttribArray (1);
-        gl.enableVertexAttribArray (2);
-        gl.vertexAttribPointer (0, 2, gl.SHORT, false, 12, 0);
-        gl.vertexAttribPointer (1, 1, gl.UNSIGNED_SHORT, false, 12, 4);
-        gl.vertexAttribPointer (2, 4, gl.UNSIGNED_BYTE, true, 12, 8);
-      }
-      this.objects.set (key, objects);
+      for (const place of [0, 1, 2])
+        gl.enableVertexAttribArray (place);
+      gl.vertexAttribPointer (0, 2, gl.SHORT, false, VERTEX, 0);
+      gl.vertexAttribPointer (1, 1, gl.UNSIGNED_SHORT, false, VERTEX, 4);
+      gl.vertexAttribPointer (2, 4, gl.UNSIGNED_BYTE, true, VERTEX, 8);
+      this.objects.set (id, objects);
     }
-    return this.objects.get (key);
+    return this.objects.get (id);
   }
 
   uploadVertices (objects, vertices) {
@@ -111,30 +102,6 @@ export class Renderer {
       gl.bufferData (gl.ARRAY_BUFFER, objects.capacity, gl.DYNAMIC_DRAW);
     }
     gl.bufferSubData (gl.ARRAY_BUFFER, 0, vertices);
-  }
-
-  // Textures grow in steps, so that a ROI that follows a person does not need new ones in each picture.
-  uploadPlanes (objects, { width, height, depth, colour }) {
-    const gl = this.gl, step = 64;
-    const define = (texture, internal, format, type) => {
-      gl.bindTexture (gl.TEXTURE_2D, texture);
-      gl.texImage2D (gl.TEXTURE_2D, 0, internal, objects.width, objects.height, 0, format, type, null);
-      this.setNearest ();
-    };
-    gl.activeTexture (gl.TEXTURE0);
-    if (width > objects.width || height > objects.height) {
-      objects.width = Math.min (Math.max (objects.width, Math.ceil (width / step) * step), this.largest);
-      objects.height = Math.min (Math.max (objects.height, Math.ceil (height / step) * step), this.largest);
-      objects.depth ??= gl.createTexture ();
-      objects.colour ??= gl.createTexture ();
-      define (objects.depth, gl.R16UI, gl.RED_INTEGER, gl.UNSIGNED_SHORT);
-      define (objects.colour, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE);
-    }
-    gl.pixelStorei (gl.UNPACK_ALIGNMENT, 1);
-    gl.bindTexture (gl.TEXTURE_2D, objects.depth);
-    gl.texSubImage2D (gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RED_INTEGER, gl.UNSIGNED_SHORT, depth);
-    gl.bindTexture (gl.TEXTURE_2D, objects.colour);
-    gl.texSubImage2D (gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, colour);
   }
 
   setNearest () {
@@ -155,12 +122,8 @@ export class Renderer {
     }
     gl.clearColor (picture[0], picture[1], picture[2], 1);
     gl.clear (gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    if (this.layers.length > 0 && picture[20] === this.layers.length) {
-      if (this.mode === BLEND)
-        this.drawBlended (picture, framebuffer, width, height);
-      else
-        this.drawStrips (picture);
-    }
+    if (this.layers.length > 0 && picture[17] === this.layers.length)
+      this.drawBlended (picture, framebuffer, width, height);
     gl.disable (gl.SCISSOR_TEST);
   }
   // Resolves when the GPU has executed the commands issued so far, or its context was lost.
@@ -191,12 +154,6 @@ export class Renderer {
       this.gl.drawArrays (this.gl.TRIANGLE_STRIP, 0, count);
     });
     this.gl.bindVertexArray (null);
-  }
-
-  // place: 0 or 1 of the layer's two
-  setPlace (program, layer, place) {
-    this.gl.uniformMatrix4fv (program.at ('u_clip_from_pixel'), false, layer.subarray (18 * place, 18 * place + 16));
-    this.gl.uniform2fv (program.at ('u_behind'), layer.subarray (18 * place + 16, 18 * place + 18));
   }
 
   newTarget () { return { width: 0, height: 0, framebuffer: null, colours: null, depths: null }; }
@@ -287,10 +244,11 @@ export class Renderer {
       const [, right, down] = layer.subarray (18, 21);
       gl.viewport (right, down, width, height);
       gl.scissor (x + right, y + down, coveredColumns, coveredRows);
-      this.setPlace (this.blend, layer, 0);
-      gl.uniform4fv (this.blend.at ('u_lens'), layer.subarray (36, 40));
-      gl.uniform3fv (this.blend.at ('u_viewer'), layer.subarray (40, 43));
-      gl.uniform1f (this.blend.at ('u_unit'), layer[43]);
+      gl.uniformMatrix4fv (this.blend.at ('u_clip_from_pixel'), false, layer.subarray (0, 16));
+      gl.uniform2fv (this.blend.at ('u_behind'), layer.subarray (16, 18));
+      gl.uniform4fv (this.blend.at ('u_lens'), layer.subarray (21, 25));
+      gl.uniform3fv (this.blend.at ('u_viewer'), layer.subarray (25, 28));
+      gl.uniform1f (this.blend.at ('u_unit'), layer[28]);
     });
     gl.frontFace (gl.CCW);
     return cells;
@@ -321,33 +279,5 @@ export class Renderer {
     gl.uniform3f (program.at ('u_shade'), 0, height, 0);
     this.cover ();
     this.unbindTextures ();
-  }
-
-  // As StripPainter::draw ().
-  drawStrips (picture) {
-    const gl = this.gl, program = this.strips;
-    gl.enable (gl.DEPTH_TEST);
-    gl.depthFunc (gl.LESS);
-    gl.enable (gl.CULL_FACE);
-    program.use ();
-    gl.uniform1i (program.at ('u_depth'), 0);
-    gl.uniform1i (program.at ('u_colour'), 1);
-    gl.uniform1f (program.at ('u_step'), picture[19]);
-    gl.uniform1f (program.at ('u_point_size'), 1);
-    for (const side of picture[17] ? [0, 1] : [0]) {
-      gl.cullFace (Boolean (picture[16]) !== (side === 1) ? gl.FRONT : gl.BACK);
-      this.eachLayer (picture, (layer, objects) => {
-        this.setPlace (program, layer, side);
-        gl.uniform1f (program.at ('u_unit'), layer[43]);
-        gl.uniform1f (program.at ('u_focal'), layer[44]);
-        gl.uniform2i (program.at ('u_size'), layer[45], layer[46]);
-        gl.activeTexture (gl.TEXTURE1);
-        gl.bindTexture (gl.TEXTURE_2D, objects.colour);
-        gl.activeTexture (gl.TEXTURE0);
-        gl.bindTexture (gl.TEXTURE_2D, objects.depth);
-      });
-    }
-    gl.disable (gl.CULL_FACE);
-    gl.disable (gl.DEPTH_TEST);
   }
 }

@@ -41,8 +41,8 @@ export class Stats {
       `${frame.views} views, ${frame.points} points, ${(this.bytes / this.count / 1024).toFixed (1)} KiB`,
       `missing ${frame.missingPixels}, unknown ${frame.unknownPixels} pixels; ${frame.badSlices} damaged slices`,
       `decode ${mean (this.decode)}, geometry ${mean (this.build)}, draw ${mean (this.draw)}${scale < 1 ? `, at ${Math.round (100 * scale)} % of the resolution` : ''}`,
-      `latency ${(this.latencies.at (-1) ?? 0).toFixed (0)} ms from ${frame.network ? 'capture' : 'due'} to drawn`,
-      ...frame.network ? [`${frame.network.transport}: ${frame.network.dropped} frame sets dropped by the server, ${frame.network.lost} messages lost`] : [],
+      `latency ${(this.latencies.at (-1) ?? 0).toFixed (0)} ms from ${frame.dropped === null ? 'due' : 'capture'} to drawn`,
+      ...frame.dropped === null ? [] : [`${frame.dropped} frame sets dropped by the server`],
     ].join ('\n');
     this.reset ();
   }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# pipelines/web-server.sh, web-certificate.sh and demo.sh --web: what they say, serve and leave behind, without a browser.
+# pipelines/web-server.sh and demo.sh --web: what they say, serve and leave behind, without a browser.
 side_by_side=4 # they wait for each other's processes
 
 need_server () {
@@ -34,6 +34,15 @@ stop_server () {
   wait "$server" || status=$?
   [ "$status" = 0 ] || fail "web-server.sh ended with status $status: $(cat server.log)"
   trap - EXIT
+}
+
+# usage: make_certificate NAME...: server.pem and server-key.pem for those, which clients trust as they are
+make_certificate () {
+  command -v openssl >/dev/null || skip "openssl is missing"
+  local names
+  names=$(printf ',%s' "$@")
+  openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 9 -keyout server-key.pem -out server.pem \
+    -subj "/CN=${1#*:}" -addext "subjectAltName=${names#,}" -addext "extendedKeyUsage=serverAuth" 2>openssl.log || fail "$(cat openssl.log)"
 }
 
 # usage: watch URL TOKEN FRAME-SETS [WANT [CA-FILE]]: a client that prints the server's texts, "frame sets N" and, if speech came,
@@ -73,7 +82,7 @@ while True:
         heard = struct.unpack_from("<Q", data, 8)[0]
     elif first == 0x82:
         count += 1
-        delay, sent = struct.unpack_from("<IQ", data, 20)
+        delay, sent = struct.unpack_from("<IQ", data, 12)
         seen = sent - delay
         send({"type": "ack", "frameSet": struct.unpack_from("<I", data, 4)[0]})
         if count == most:
@@ -101,11 +110,7 @@ refused_by () {
 }
 
 test_help_names_every_option () {
-  local script option
-  for script in web-server.sh web-certificate.sh; do
-    "$pipelines/$script" --help >help.txt
-    grep -q "^usage: $script" help.txt || fail "$script: $(cat help.txt)"
-  done
+  local option
   "$pipelines/web-server.sh" -h >help.txt
   for option in $(grep -oE '^    --[a-z-]+\)' "$pipelines/web-server.sh" | tr -d ' )'); do
     [ "$option" = -- ] || grep -qE -- "(^|[ ,])$option( |,|$)" help.txt || fail "$option is not in --help"
@@ -141,16 +146,12 @@ test_errors_name_the_option () {
   expect_error "--: expected a launch string" "$script" --
   expect_error "--window: expected a whole number from 1 to 1000" "$script" --window 0
   expect_error "--loop: expected with --file" "$script" --loop
-  expect_error "--stun and --turn: expected with --webrtc" "$script" --stun stun.example:3478
 }
 
 test_errors_of_the_server_name_the_property () {
   need_server
   local script=$pipelines/web-server.sh
-  echo rubbish >rubbish.pem
-  expect_error "certificate and private-key: expected PEM files" "$script" --port 0 --certificate rubbish.pem
-  expect_error "turn-server: expected turn://USER:PASSWORD@HOST:PORT" "$script" --port 0 --webrtc --turn turn.example
-  expect_error "address: expected an IP address" "$script" --port 0 --address localhost.localdomain --anonymous
+  expect_error "address: 'localhost.localdomain' is not an IP address" "$script" --port 0 --address localhost.localdomain --anonymous
   expect_error "no element \"nosuchelement\"" "$script" --port 0 -- nosuchelement
   serve
   local port=${links[0]##*:}
@@ -222,11 +223,11 @@ test_links_name_the_addresses_of_this_machine_or_those_of_the_certificate () {
     done
     stop_server
   fi
-  "$pipelines/web-certificate.sh" certs rig.example 192.0.2.7 127.0.0.1
-  serve --address 0.0.0.0 --token one --certificate certs/server.pem --private-key certs/server-key.pem
+  make_certificate DNS:rig.example IP:192.0.2.7 IP:127.0.0.1
+  serve --address 0.0.0.0 --token one --certificate server.pem --private-key server-key.pem
   [[ "${links[*]}" =~ ^https://rig.example:[0-9]+/#token=one\ https://192.0.2.7:[0-9]+/#token=one$ ]] || fail "${links[*]}"
   port=${links[0]##*:} port=${port%%/*}
-  curl -sSf -o page.html --cacert certs/authority.pem --resolve "rig.example:$port:127.0.0.1" "${links[0]}"
+  curl -sSf -o page.html --cacert server.pem --resolve "rig.example:$port:127.0.0.1" "${links[0]}"
   stop_server
 }
 
@@ -270,25 +271,6 @@ test_recording_is_shown_again_and_again () {
   stop_server
 }
 
-test_webrtc_is_offered_where_it_is_asked_for () {
-  need_server
-  local offered
-  serve
-  [[ "${links[0]}" != *transport* ]] || fail "${links[0]}"
-  offered=$(watch "${links[0]}" "" 1)
-  grep -qF '"rtc":false' <<<"$offered" || fail "$offered"
-  stop_server
-  for element in webrtcbin nicesink dtlssrtpenc sctpenc; do
-    gst-inspect-1.0 --exists --atleast-version=0.0.0 $element || skip "$element is missing"
-  done
-  serve --webrtc --window 9 --stun 127.0.0.1:9 --turn user:secret@127.0.0.1:9
-  [[ "${links[0]}" == */\?transport=webrtc ]] || fail "${links[0]}"
-  offered=$(watch "${links[0]}" "" 1)
-  grep -qF '"window":9,"audio":false,"rtc":true,"iceServers":[{"urls":"stun:127.0.0.1:9"},{"urls":"turn:127.0.0.1:9","username":"user","credential":"secret"}]' <<<"$offered" ||
-    fail "$offered"
-  stop_server
-}
-
 test_launch_string_and_rtp_are_served () {
   need_server
   local scene=(avatartestsrc is-live=true views=2 ! "video/x-range,width=64,height=48,framerate=15/1" ! neighbourcodeenc) sender
@@ -326,8 +308,8 @@ test_statistics_reach_the_dashboard () {
   need_server
   serve --stats $((ports + 2))
   watch "${links[0]}" "" 0 stats >watched.txt || fail "$(cat watched.txt)"
-  grep -q '"type":"stats","rows":\[{' watched.txt || fail "$(cat watched.txt)"
-  grep -q '"host":"web-server"' watched.txt || fail "$(cat watched.txt)"
+  grep -q '"type":"stats","reports":\[{' watched.txt || fail "$(cat watched.txt)"
+  grep -qF '\"host\":\"web-server\"' watched.txt || fail "$(cat watched.txt)"
   stop_server
 }
 
@@ -346,79 +328,28 @@ test_server_ends_at_once_and_leaves_nothing () {
   done
 }
 
-test_certificate_is_for_its_names () {
-  command -v openssl >/dev/null || skip "openssl is missing"
-  "$pipelines/web-certificate.sh" certs rig.example 192.0.2.7 ::1 >said.txt
-  grep -qF certs/server.pem said.txt || fail "$(cat said.txt)"
-  [ "$(stat -c %a certs/server-key.pem certs/authority-key.pem | sort -u)" = 600 ] || fail "$(ls -l certs)"
-  [ "$(find certs -type f | wc -l)" = 4 ] || fail "$(ls certs)"
-  openssl verify -x509_strict -CAfile certs/authority.pem -verify_hostname rig.example certs/server.pem
-  openssl verify -CAfile certs/authority.pem -verify_ip 192.0.2.7 certs/server.pem
-  openssl verify -CAfile certs/authority.pem -verify_ip ::1 certs/server.pem
-  ! openssl verify -CAfile certs/authority.pem -verify_hostname other.example certs/server.pem || fail "it is good for other names"
-  openssl x509 -in certs/server.pem -noout -checkend $((396 * 86400))
-  ! openssl x509 -in certs/server.pem -noout -checkend $((398 * 86400)) || fail "browsers refuse more than 398 days"
-  # The authority that phones trust stays, and vouches for private addresses and its own names only.
-  cp certs/authority.pem before.pem
-  "$pipelines/web-certificate.sh" certs a.rig.example studio.local 10.1.2.3 fd00::5
-  openssl verify -x509_strict -CAfile certs/authority.pem -verify_ip 10.1.2.3 certs/server.pem
-  cp certs/server.pem server-before.pem
-  local name
-  for name in bank.example 198.51.100.9 2001:db8::9; do
-    expect_error "was made for other names than $name" "$pipelines/web-certificate.sh" certs "$name"
-  done
-  cmp server-before.pem certs/server.pem
-  openssl pkey -in certs/server-key.pem -pubout | cmp - <(openssl x509 -in certs/server.pem -pubkey -noout)
-  [ "$(find certs -type f | wc -l)" = 4 ] || fail "$(ls certs)"
-  # Also if whoever has the key writes other names into a certificate.
-  openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj "/CN=bank.example" -keyout other-key.pem -out other.csr
-  openssl x509 -req -in other.csr -CA certs/authority.pem -CAkey certs/authority-key.pem -days 9 -extfile <(echo subjectAltName=DNS:bank.example) -out other.pem
-  ! openssl verify -CAfile certs/authority.pem other.pem || fail "the authority vouches for any name"
-  "$pipelines/web-certificate.sh" certs >said.txt
-  cmp before.pem certs/authority.pem
-  openssl verify -CAfile certs/authority.pem -verify_hostname localhost certs/server.pem
-  openssl verify -CAfile certs/authority.pem -verify_hostname "$(hostname)" certs/server.pem
-  openssl verify -CAfile certs/authority.pem -verify_hostname "$(hostname -s).local" certs/server.pem
-  # Without its key there is no second authority that phones do not trust.
-  mv certs/authority-key.pem elsewhere.pem
-  expect_error "certs/authority-key.pem is missing, and devices trust certs/authority.pem" "$pipelines/web-certificate.sh" certs
-  cmp before.pem certs/authority.pem
-}
-
-test_certificate_errors () {
-  command -v openssl >/dev/null || skip "openssl is missing"
-  expect_error "expected a folder" "$pipelines/web-certificate.sh"
-  expect_error "expected a folder" "$pipelines/web-certificate.sh" --no-such-option
-  expect_error "expected names and IP addresses, got 'a b'" "$pipelines/web-certificate.sh" certs 'a b'
-  expect_error "expected names and IP addresses, got 'x,DNS:y'" "$pipelines/web-certificate.sh" certs 'x,DNS:y'
-  [ ! -e certs/server.pem ] || fail "a certificate was made"
-  touch file
-  expect_error "cannot create 'file/certs'" "$pipelines/web-certificate.sh" file/certs
-  mkdir -p damaged
-  echo rubbish | tee damaged/authority.pem >damaged/authority-key.pem
-  expect_error "openssl failed" "$pipelines/web-certificate.sh" damaged
-  [ "$(find damaged | wc -l)" = 3 ] || fail "left: $(find damaged)"
-}
-
 test_stream_is_served_with_tls () {
   need_server
-  command -v openssl >/dev/null || skip "openssl is missing"
-  "$pipelines/web-certificate.sh" certs localhost 127.0.0.1
-  serve --certificate certs/server.pem --private-key certs/server-key.pem --token right
+  make_certificate DNS:localhost IP:127.0.0.1
+  openssl genpkey -algorithm ec -pkeyopt ec_paramgen_curve:prime256v1 -out other-key.pem
+  expect_error "'other-key.pem' is not the key of --certificate 'server.pem'" "$pipelines/web-server.sh" --certificate server.pem --private-key other-key.pem
+  echo garbage >garbage.pem
+  expect_error "'garbage.pem' is not the key" "$pipelines/web-server.sh" --certificate garbage.pem
+  serve --certificate server.pem --private-key server-key.pem --token right
   local url=${links[0]%%#*}
   [[ "${links[0]}" =~ ^https://127\.0\.0\.1:[0-9]+/#token=right$ ]] || fail "${links[0]}"
-  curl -sSf --cacert certs/authority.pem -o server.json "${url}server.json"
+  curl -sSf --cacert server.pem -o server.json "${url}server.json"
   grep -qF '"token":true' server.json || fail "$(cat server.json)"
-  curl -sSf --cacert certs/authority.pem "${url/127.0.0.1/localhost}" >page.html
+  curl -sSf --cacert server.pem "${url/127.0.0.1/localhost}" >page.html
   ! curl -s "$url" >page.html || fail "curl trusts everybody"
   ! curl -s "${url/https/http}" >page.html || fail "it serves without TLS, too"
-  gets 3 watch "$url" right 3 stream certs/authority.pem
-  refused_by watch "$url" wrong 3 stream certs/authority.pem
+  gets 3 watch "$url" right 3 stream server.pem
+  refused_by watch "$url" wrong 3 stream server.pem
   stop_server
   # Certificate and key in one file.
-  cat certs/server.pem certs/server-key.pem >both.pem
+  cat server.pem server-key.pem >both.pem
   serve --certificate both.pem
-  gets 3 watch "${links[0]}" "" 3 stream certs/authority.pem
+  gets 3 watch "${links[0]}" "" 3 stream server.pem
   stop_server
 }
 

@@ -15,7 +15,7 @@ const prepareFolder = () => {
   const folder = path.join (work, 'served');
   fs.rmSync (folder, { recursive: true, force: true });
   fs.cpSync (path.join (build, 'pipelines/web'), folder, { recursive: true, filter: (from) => !/\.[od]$/.test (from) });
-  for (const name of ['scene.rcnc', 'moving.rcnc', 'talk.rcnc', 'talk.opus', ...fs.readdirSync (work).filter ((file) => /^native-.*\.png$/.test (file))])
+  for (const name of ['scene.rcnc', 'moving.rcnc', ...fs.readdirSync (work).filter ((file) => /^native-.*\.png$/.test (file))])
     fs.copyFileSync (path.join (work, name), path.join (folder, name));
   fs.writeFileSync (path.join (folder, 'foreign.rcnc'), 'this is a text, and no recording\n'.repeat (100));
   const scene = fs.readFileSync (path.join (work, 'moving.rcnc'));
@@ -44,13 +44,15 @@ after (async () => {
 });
 
 const open = (query, ...rest) => openPage (browser, `${address}/index.html?${query}`, ...rest);
-// What is on the canvas once two pictures in a row are equal: the fit comes with the second.
+// What is on the canvas once it has all pixels and two pictures in a row are equal: the fit comes with the second.
 const picture = async (page) => {
   let last = '';
   for (let i = 0; i < 50; i++) {
-    const now = await page.evaluate (() => new Promise ((resolve) => requestAnimationFrame (() => requestAnimationFrame (() =>
-      resolve (document.getElementById ('picture').toDataURL ('image/png'))))));
-    if (now === last)
+    const now = await page.evaluate (() => new Promise ((resolve) => requestAnimationFrame (() => requestAnimationFrame (() => {
+      const canvas = document.getElementById ('picture');
+      resolve (canvas.width === canvas.clientWidth ? canvas.toDataURL ('image/png') : '');
+    }))));
+    if (now !== '' && now === last)
       return now;
     last = now;
     await new Promise ((resolve) => setTimeout (resolve, 200));
@@ -58,7 +60,7 @@ const picture = async (page) => {
   return assert.fail ('the picture does not come to rest');
 };
 
-// In the page: mean difference in levels, and SSIM of grey (mean of 8x8 windows, step 4), of two pictures.
+// In the page: of two pictures, the mean difference of their grey in levels, and the share of pixels that are not background.
 const compare = (page, ours, theirs) => page.evaluate (async (a, b) => {
   const grey = async (url) => {
     const image = new Image ();
@@ -67,42 +69,24 @@ const compare = (page, ours, theirs) => page.evaluate (async (a, b) => {
     const canvas = new OffscreenCanvas (image.width, image.height), context = canvas.getContext ('2d');
     context.drawImage (image, 0, 0);
     const { data } = context.getImageData (0, 0, image.width, image.height);
-    return { width: image.width, height: image.height, at: Float64Array.from ({ length: data.length / 4 }, (_, i) =>
-      0.299 * data[4 * i] + 0.587 * data[4 * i + 1] + 0.114 * data[4 * i + 2]) };
+    return Float64Array.from ({ length: data.length / 4 }, (_, i) => 0.299 * data[4 * i] + 0.587 * data[4 * i + 1] + 0.114 * data[4 * i + 2]);
   };
-  const [x, y] = [await grey (a), await grey (b)];
-  if (x.width !== y.width || x.height !== y.height)
-    return { sizes: [x.width, x.height, y.width, y.height] };
-  let difference = 0, sum = 0, windows = 0, shown = 0;
-  x.at.forEach ((value, i) => { difference += Math.abs (value - y.at[i]); shown += Math.abs (value - x.at[0]) > 4; });
-  for (let top = 0; top + 8 <= x.height; top += 4)
-    for (let left = 0; left + 8 <= x.width; left += 4) {
-      let sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0;
-      for (let v = top; v < top + 8; v++)
-        for (let u = left; u < left + 8; u++) {
-          const p = x.at[v * x.width + u], q = y.at[v * x.width + u];
-          sx += p, sy += q, sxx += p * p, syy += q * q, sxy += p * q;
-        }
-      const mx = sx / 64, my = sy / 64, vx = sxx / 64 - mx * mx, vy = syy / 64 - my * my, vxy = sxy / 64 - mx * my;
-      sum += (2 * mx * my + 6.5025) * (2 * vxy + 58.5225) / ((mx * mx + my * my + 6.5025) * (vx + vy + 58.5225));
-      windows++;
-    }
-  return { difference: difference / x.at.length, ssim: sum / windows, shown: shown / x.at.length };
+  const x = await grey (a), y = await grey (b), mean = (value) => x.reduce ((sum, _, i) => sum + value (i), 0) / x.length;
+  return { difference: x.length === y.length ? mean ((i) => Math.abs (x[i] - y[i])) : NaN, shown: mean ((i) => Number (Math.abs (x[i] - x[0]) > 4)) };
 }, ours, theirs);
 
-for (const mode of ['blend', 'strips'])
-  for (const angle of [0, -30, 45, 100, 180])
-    test (`mode ${mode} at ${angle} degrees is striprender's picture`, async () => {
-      const page = await open (`src=scene.rcnc&paused&mode=${mode}&azimuth=${angle}`);
-      await framesShown (page, 1);
-      const ours = await picture (page);
-      fs.writeFileSync (path.join (work, `page-${mode}-${angle}.png`), Buffer.from (ours.split (',')[1], 'base64'));
-      const result = await compare (page, ours, `native-${mode}-${angle}.png`);
-      assert.equal (await message (page), '');
-      assert.ok (result.shown > 0.1, `a person is there: ${JSON.stringify (result)}`);
-      assert.ok (result.ssim >= 0.98 && result.difference <= 3, JSON.stringify (result));
-      await page.close ();
-    });
+for (const angle of [0, -30, 45, 100, 180])
+  test (`the picture at ${angle} degrees is striprender's`, async () => {
+    const page = await open (`src=scene.rcnc&paused&azimuth=${angle}`);
+    await framesShown (page, 1);
+    const ours = await picture (page);
+    fs.writeFileSync (path.join (work, `page-${angle}.png`), Buffer.from (ours.split (',')[1], 'base64'));
+    const result = await compare (page, ours, `native-${angle}.png`);
+    assert.equal (await message (page), '');
+    assert.ok (result.shown > 0.1, `a person is there: ${JSON.stringify (result)}`);
+    assert.ok (result.difference <= 0.1, JSON.stringify (result));
+    await page.close ();
+  });
 
 test ('a foreign file gives its sentence', async () => {
   const page = await open ('src=foreign.rcnc');
@@ -119,40 +103,12 @@ test ('a recording that is cut off is shown to its end, and says so', async () =
   await page.close ();
 });
 
-test ('a recording that is not there gives its sentence', async () => {
-  const page = await open ('src=nowhere.rcnc');
-  await messageMatches (page, '^The recording could not be loaded: 404 ');
-  await page.close ();
-});
-
 test ('a browser without WebGL2 gives its sentence', async () => {
   const page = await open ('src=scene.rcnc', undefined, (made) => made.evaluateOnNewDocument (() => {
     const get = HTMLCanvasElement.prototype.getContext;
     HTMLCanvasElement.prototype.getContext = function (type, ...rest) { return type === 'webgl2' ? null : get.call (this, type, ...rest); };
   }));
   await messageMatches (page, '^This browser has no WebGL2');
-  await page.close ();
-});
-
-test ('a file that is opened by hand is played', async () => {
-  const page = await open ('');
-  const input = await page.waitForSelector ('#file');
-  await input.uploadFile (path.join (work, 'moving.rcnc'));
-  await framesShown (page, 5);
-  await page.close ();
-});
-
-test ('a foreign file leaves what is shown', async () => {
-  const page = await open ('src=moving.rcnc&paused');
-  await framesShown (page, 1);
-  for (const close of [() => page.click ('#message'), () => page.keyboard.press ('Escape')]) {
-    await (await page.$ ('#file')).uploadFile (path.join (work, 'served/foreign.rcnc'));
-    await messageMatches (page, '^This is no recording');
-    await close ();
-    assert.equal (await message (page), '');
-  }
-  await page.click ('#play');
-  await framesShown (page, 3);
   await page.close ();
 });
 
@@ -176,7 +132,7 @@ test ('a file that is dropped onto the page is played, and the button and the sp
 });
 
 test ('the takes of a joined recording follow one another', async () => {
-  const page = await open ('src=joined.rcnc&mode=strips', undefined, (made) => made.evaluateOnNewDocument (() => { window.times = []; }));
+  const page = await open ('src=joined.rcnc', undefined, (made) => made.evaluateOnNewDocument (() => { window.times = []; }));
   await page.waitForFunction (() => window.rangecastPage);
   await page.evaluate (() => {
     const { rangecastPage: shown } = window, { position } = shown;
@@ -189,64 +145,6 @@ test ('the takes of a joined recording follow one another', async () => {
   const times = await page.evaluate (() => window.times);
   assert.ok (times.every ((time, i) => i === 0 || time >= times[i - 1]), `${times}`);
   assert.ok (times.at (-1) > 5000, `${times.at (-1)} ms of two takes of 2.7 s`);
-  assert.equal (await message (page), '');
-  await page.close ();
-});
-
-// Until sound is in step, or does not get there: ms that it is after the picture, at each of the last frame sets.
-const soundAfterPicture = (page) => page.evaluate (() => new Promise ((resolve) => {
-  const { rangecastPage: shown } = window, { position, stats } = shown, { seen } = stats, differences = [];
-  let origin = NaN; // ms since the epoch
-  shown.position = function (message) {
-    origin = message.due - message.time;
-    return position.call (this, message);
-  };
-  stats.seen = function (latency) {
-    const { audio } = shown.recordedSound, time = performance.timeOrigin + performance.now () - latency - origin;
-    if (!audio.paused && time > 1000 && audio.currentTime > 0)
-      differences.push (time - 1000 * audio.currentTime);
-    const last = differences.slice (-10), middle = last.toSorted ((a, b) => a - b)[last.length >> 1];
-    if ((last.length === 10 && Math.abs (middle) < 20) || differences.length === 100)
-      resolve (last);
-    return seen.call (this, latency);
-  };
-}));
-const middle = (values) => values.toSorted ((a, b) => a - b)[values.length >> 1];
-
-test ('the speech beside a recording is heard in step with the picture, after a click', async () => {
-  const page = await open ('src=talk.rcnc&mode=strips');
-  await page.waitForSelector ('#sound:not([hidden])');
-  assert.equal (await page.evaluate (() => window.rangecastPage.recordedSound.audio.paused), true);
-  await page.click ('#sound');
-  const differences = await soundAfterPicture (page);
-  console.log (`sound after picture, ms: ${differences.map ((value) => value.toFixed (0)).join (' ')}`);
-  assert.ok (Math.abs (middle (differences)) < 40, `${differences}`);
-  const isPaused = (wanted) => page.waitForFunction ((expected) => window.rangecastPage.recordedSound.audio.paused === expected, {}, wanted);
-  await page.click ('#play');
-  await isPaused (true);
-  await page.click ('#play');
-  await isPaused (false);
-  await page.evaluate (() => window.rangecastPage.worker.postMessage ({ type: 'seek', time: 6000 }));
-  await page.waitForFunction (() => window.rangecastPage.recordedSound.audio.currentTime > 5.8);
-  await page.click ('#sound'); // mute
-  await isPaused (true);
-  await (await page.$ ('#file')).uploadFile (path.join (work, 'served/scene.rcnc')); // which has no speech
-  await page.waitForSelector ('#sound', { hidden: true });
-  await page.close ();
-});
-
-test ('a recording and its speech are dropped together', async () => {
-  const page = await open ('');
-  await page.waitForSelector ('#welcome:not([hidden])');
-  await page.evaluate (async () => {
-    const dropped = new DataTransfer ();
-    for (const name of ['talk.opus', 'talk.rcnc'])
-      dropped.items.add (new File ([await (await fetch (name)).blob ()], name));
-    document.dispatchEvent (new DragEvent ('drop', { dataTransfer: dropped, bubbles: true, cancelable: true }));
-  });
-  await page.waitForSelector ('#sound:not([hidden])');
-  await page.click ('#sound');
-  await page.waitForFunction (() => window.rangecastPage.recordedSound.audio.currentTime > 0.5);
   assert.equal (await message (page), '');
   await page.close ();
 });
@@ -303,7 +201,7 @@ test ('mouse, touch and keys move the camera', async () => {
 test ('on a phone one finger orbits, and every pixel of the screen is used', async () => {
   const page = await open ('src=scene.rcnc&paused', { width: 360, height: 640, deviceScaleFactor: 3, isMobile: true, hasTouch: true });
   await framesShown (page, 1);
-  assert.deepEqual (await page.evaluate (() => [document.getElementById ('picture').width, document.getElementById ('picture').height]), [1080, 1920]);
+  await page.waitForFunction (() => document.getElementById ('picture').width === 1080 && document.getElementById ('picture').height === 1920);
   await page.touchscreen.touchStart (180, 300);
   await page.touchscreen.touchMove (90, 300);
   await page.touchscreen.touchEnd ();
@@ -345,32 +243,6 @@ test ('a context that is lost and restored within a picture does not stop the pa
   await page.close ();
 });
 
-test ('memory stays the same over many frame sets', async () => {
-  const page = await open ('src=moving.rcnc&paused');
-  await framesShown (page, 1);
-  // As fast as they can be drawn, over and over.
-  const rounds = (count) => page.evaluate (async (seeks) => {
-    const { worker } = window.rangecastPage;
-    for (let i = 0; i < seeks; i++) {
-      const shown = Number (document.body.dataset.frameSets);
-      worker.postMessage ({ type: 'seek', time: (i * 67) % 2600 });
-      while (Number (document.body.dataset.frameSets) === shown)
-        await new Promise ((resolve) => setTimeout (resolve, 5));
-    }
-  }, count);
-  const client = await page.createCDPSession ();
-  const used = async () => {
-    await client.send ('HeapProfiler.collectGarbage');
-    return (await page.metrics ()).JSHeapUsedSize;
-  };
-  await rounds (30);
-  const first = await used ();
-  await rounds (200);
-  const last = await used ();
-  assert.ok (last < first * 1.2 + 1e6, `${first} to ${last} bytes`);
-  await page.close ();
-});
-
 // No headset is here: this one stands in for it, with two eyes 64 mm apart whose pictures of 320x320 pixels see 90 degrees.
 const standInHeadset = () => {
   const projection = Float32Array.of (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1.007, -1, 0, 0, -0.2007, 0);
@@ -403,36 +275,35 @@ const standInHeadset = () => {
   Object.defineProperty (navigator, 'xr', { value: { isSessionSupported: async () => true, requestSession } });
 };
 
-for (const mode of ['blend', 'strips'])
-  test (`a headset shows both eyes of one frame set, mode ${mode}`, async () => {
-    const page = await open (`src=scene.rcnc&paused&mode=${mode}`, undefined, (made) => made.evaluateOnNewDocument (standInHeadset));
-    await framesShown (page, 1);
-    await page.waitForSelector ('#headset:not([hidden])');
-    await page.click ('#headset');
-    await page.waitForFunction (() => window.headsetPictures > 2);
-    const eyes = await page.evaluate (() => {
-      const { gl } = window.rangecastPage.renderer, pixels = new Uint8Array (4 * 640 * 320);
-      gl.bindFramebuffer (gl.FRAMEBUFFER, window.headsetLayer.framebuffer);
-      gl.readPixels (0, 0, 640, 320, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-      return [0, 320].map ((left) => {
-        let count = 0, sum = 0;
-        for (let y = 0; y < 320; y++)
-          for (let x = 0; x < 320; x++) {
-            const at = 4 * (y * 640 + left + x);
-            if (Math.abs (pixels[at] - 0x20) + Math.abs (pixels[at + 1] - 0x24) + Math.abs (pixels[at + 2] - 0x2a) > 24) {
-              count++;
-              sum += x;
-            }
+test ('a headset shows both eyes of one frame set', async () => {
+  const page = await open ('src=scene.rcnc&paused', undefined, (made) => made.evaluateOnNewDocument (standInHeadset));
+  await framesShown (page, 1);
+  await page.waitForSelector ('#headset:not([hidden])');
+  await page.click ('#headset');
+  await page.waitForFunction (() => window.headsetPictures > 2);
+  const eyes = await page.evaluate (() => {
+    const { gl } = window.rangecastPage.renderer, pixels = new Uint8Array (4 * 640 * 320);
+    gl.bindFramebuffer (gl.FRAMEBUFFER, window.headsetLayer.framebuffer);
+    gl.readPixels (0, 0, 640, 320, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    return [0, 320].map ((left) => {
+      let count = 0, sum = 0;
+      for (let y = 0; y < 320; y++)
+        for (let x = 0; x < 320; x++) {
+          const at = 4 * (y * 640 + left + x);
+          if (Math.abs (pixels[at] - 0x20) + Math.abs (pixels[at + 1] - 0x24) + Math.abs (pixels[at + 2] - 0x2a) > 24) {
+            count++;
+            sum += x;
           }
-        return { count, middle: sum / count };
-      });
+        }
+      return { count, middle: sum / count };
     });
-    assert.equal (await message (page), '');
-    const [left, right] = eyes;
-    assert.ok (left.count > 1000 && right.count > 1000, `a person is there: ${JSON.stringify (eyes)}`);
-    // 160 pixels of focal length * 0.064 m / 1.5 m
-    assert.ok (Math.abs (left.middle - right.middle - 6.8) < 2, JSON.stringify (eyes));
-    await page.click ('#headset');
-    await page.waitForFunction (() => document.getElementById ('headset').textContent === 'VR');
-    await page.close ();
   });
+  assert.equal (await message (page), '');
+  const [left, right] = eyes;
+  assert.ok (left.count > 1000 && right.count > 1000, `a person is there: ${JSON.stringify (eyes)}`);
+  // 160 pixels of focal length * 0.064 m / 1.5 m
+  assert.ok (Math.abs (left.middle - right.middle - 6.8) < 2, JSON.stringify (eyes));
+  await page.click ('#headset');
+  await page.waitForFunction (() => document.getElementById ('headset').textContent === 'VR');
+  await page.close ();
+});

@@ -54,7 +54,7 @@ const clientOf = (socket) => {
     else
       received.push (parsed);
   });
-  let number = 0;
+  let sent = 0;
   const client = {
     socket, send: (data) => socket.send (typeof data === 'string' || data instanceof Uint8Array ? data : JSON.stringify (data)),
     next: () => received.length > 0 ? Promise.resolve (received.shift ()) : new Promise ((resolve) => waiting.push (resolve)),
@@ -62,18 +62,16 @@ const clientOf = (socket) => {
       const hello = await client.next ();
       assert.equal (hello.type, 'hello');
       assert.equal (hello.version, 1);
-      client.send ({ type: 'welcome', version: 1, window: 3, rtc: false });
+      client.send ({ type: 'welcome', version: 1, window: 3, audio: false });
     },
     // Resolves when it is acknowledged.
-    frameSet: async (units, frameSet = number, { flags = 1, dropped = 0 } = {}) => {
-      const header = Buffer.alloc (32);
+    frameSet: async (units, frameSet = sent++, { flags = 1, dropped = 0 } = {}) => {
+      const header = Buffer.alloc (24);
       header.writeUInt8 (1, 0);
       header.writeUInt8 (flags, 1);
-      header.writeUInt16LE (1, 2);
       header.writeUInt32LE (frameSet >>> 0, 4);
-      header.writeUInt32LE (number++, 12);
-      header.writeUInt32LE (dropped, 16);
-      header.writeUInt32LE (0xffffffff, 20);
+      header.writeUInt32LE (dropped, 8);
+      header.writeUInt32LE (0xffffffff, 12);
       client.send (Buffer.concat ([header, units]));
       for (let answer; answer?.frameSet !== frameSet >>> 0 || answer.type !== 'ack';)
         answer = await client.next ();

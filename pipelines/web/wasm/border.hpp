@@ -77,4 +77,18 @@ struct FrameSet {
 FrameSet frame_set ();
 /** @} */
 
+/** What rc_scene_state() hands to rc_camera_scene() of another instance of the module: this, and
+ *  then its layers and points (Vec3). */
+struct SceneState {
+  std::uint32_t layers, points;
+  rangecast::SceneFrame home;
+};
+struct LayerState {
+  int id, width, height;
+  rangecast::Roi roi;
+  rangecast::Intrinsics intrinsics;
+  rangecast::Pose world_from_view;
+  double depth_unit_m;
+};
+
 } // namespace web

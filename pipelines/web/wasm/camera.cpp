@@ -18,91 +18,48 @@ using rangecast::View;
 
 namespace {
 
-/* What rc_scene_state() wrote, one number after another. */
-class StateReader {
-public:
-  explicit StateReader (std::span<const std::uint8_t> bytes) : bytes_ (bytes) {}
-
-  double number ()
-  {
-    double value = 0;
-    good_ = good_ && bytes_.size () - at_ >= sizeof value;
-    if (good_)
-      std::memcpy (&value, bytes_.data () + at_, sizeof value);
-    at_ += good_ ? sizeof value : 0;
-    return value;
-  }
-  int integer ()
-  {
-    constexpr double kMax = 1e9;
-    const double value = number ();
-    good_ = good_ && value >= -kMax && value <= kMax;
-    return good_ ? static_cast<int> (value) : 0;
-  }
-  Vec3 vector ()
-  {
-    const double x = number (), y = number (), z = number ();
-    return {x, y, z};
-  }
-  /* A number of things that follow, of so many numbers each. */
-  std::size_t count (std::size_t numbers)
-  {
-    const double value = number ();
-    const double most = double (bytes_.size () - at_) / double (numbers * sizeof (double));
-    good_ = good_ && value >= 0 && value <= most;
-    return good_ ? static_cast<std::size_t> (value) : 0;
-  }
-  [[nodiscard]] bool ended_well () const { return good_ && at_ == bytes_.size (); }
-
-private:
-  std::span<const std::uint8_t> bytes_;
-  std::size_t at_ = 0;
-  bool good_ = true;
-};
-
 struct Layer {
   View view;
   Roi roi;
 };
 
 struct Scene {
-  rangecast::StripMode mode = rangecast::StripMode::kBlend;
-  std::size_t rig_views = 1;
   SceneFrame home;
   std::vector<Layer> layers;
   std::vector<Vec3> hull;
 };
 
-constexpr std::size_t kNumbersOfLayer = 24;
-
+/* @return false if the bytes are not what rc_scene_state() gave */
 bool
-read_scene (StateReader &reader, Scene &to)
+read_scene (std::span<const std::uint8_t> bytes, Scene &to)
 {
-  to.mode = reader.integer () == 1 ? rangecast::StripMode::kStrips : rangecast::StripMode::kBlend;
-  to.rig_views = reader.count (1); /* there are more numbers than views */
-  to.layers.resize (reader.count (kNumbersOfLayer));
-  to.hull.resize (reader.count (3));
-  to.home.target = reader.vector ();
-  to.home.to_first = reader.vector ();
-  to.home.up = reader.vector ();
-  for (double *value : {&to.home.distance_m, &to.home.elevation_deg, &to.home.fov_deg,
-           &to.home.off_centre_x, &to.home.off_centre_y})
-    *value = reader.number ();
+  web::SceneState state;
+  if (bytes.size () < sizeof state)
+    return false;
+  std::memcpy (&state, bytes.data (), sizeof state);
+  bytes = bytes.subspan (sizeof state);
+  const std::uint64_t size = std::uint64_t{state.layers} * sizeof (web::LayerState) +
+                             std::uint64_t{state.points} * sizeof (Vec3);
+  if (state.layers > web::kMaxViews || size != bytes.size ())
+    return false;
+  to.home = state.home;
+  to.layers.resize (state.layers);
   for (auto &[view, roi] : to.layers) {
-    for (int *value : {&view.id, &view.width, &view.height})
-      *value = reader.integer ();
-    rangecast::Intrinsics &lens = view.intrinsics;
-    for (double *value : {&lens.fx, &lens.fy, &lens.cx, &lens.cy, &view.depth_unit_m})
-      *value = reader.number ();
-    for (double &value : view.world_from_view.rotation)
-      value = reader.number ();
-    view.world_from_view.translation = reader.vector ();
-    for (int *value : {&roi.x, &roi.y, &roi.width, &roi.height})
-      *value = reader.integer ();
+    web::LayerState layer;
+    std::memcpy (&layer, bytes.data (), sizeof layer);
+    bytes = bytes.subspan (sizeof layer);
+    view.id = layer.id;
+    view.width = layer.width;
+    view.height = layer.height;
+    view.intrinsics = layer.intrinsics;
+    view.world_from_view = layer.world_from_view;
+    view.depth_unit_m = layer.depth_unit_m;
+    roi = layer.roi;
   }
-  for (Vec3 &point : to.hull)
-    point = reader.vector ();
-  return reader.ended_well ();
+  to.hull.resize (state.points);
+  if (!bytes.empty ())
+    std::memcpy (to.hull.data (), bytes.data (), bytes.size ());
+  return true;
 }
 
 struct Camera {
@@ -129,43 +86,10 @@ write (std::vector<float> &to, std::initializer_list<double> values)
     to.push_back (static_cast<float> (value));
 }
 
-void
-write (std::vector<float> &to, const rangecast::LayerPlace &place)
-{
-  to.insert (to.end (), place.clip_from_pixel.begin (), place.clip_from_pixel.end ());
-  to.insert (to.end (), std::begin (place.behind), std::end (place.behind));
-}
-
-/* Places of a layer in mode strips: of fronts and of backs, whose depths share the depth buffer if
- * backs are drawn. */
-void
-write_strip_places (
-    std::vector<float> &to, const Layer &layer, const Mat4 &clip_from_world, bool backs)
-{
-  const Mat4 matrix = rangecast::clip_from_pixel (clip_from_world, layer.view, layer.roi);
-  const double gap_m = rangecast::strip_gap (clip_from_world, layer.view, rangecast::kViewGap_m);
-  for (const bool back : {false, true})
-    write (to, rangecast::place_layer (backs ? rangecast::in_half_of_depths (matrix, back) : matrix,
-                   clip_from_world, gap_m));
-}
-
-void
-write_angles (std::vector<float> &to, const Layer &layer, const Mat4 &clip_from_world)
-{
-  const View &view = layer.view;
-  const rangecast::LayerAngles angles = rangecast::layer_angles (clip_from_world, view, layer.roi);
-  to.insert (to.end (), std::begin (angles.lens), std::end (angles.lens));
-  to.insert (to.end (), std::begin (angles.viewer), std::end (angles.viewer));
-  write (to, {angles.unit, view.intrinsics.fx, double (layer.roi.width), double (layer.roi.height),
-                 double (view.id)});
-}
-
 /** An array of floats: background R, G, B, A; the atlas: cells, width, height, 0; the part of the
  *  framebuffer that may be covered (x, y, width, height); depth shift a, b, g; reach; whether it
- *  mirrors; whether backs are drawn; mode; depth step; number of layers. For each layer: in mode
- *  strips two places (matrix 16, behind 2); in mode blend one, number of the cell, what leads to it
- *  from a pixel of the picture (x, y), 15 zeros; then lens (4), viewer (3), unit, fx, ROI width and
- *  height, view-id
+ *  mirrors; number of layers. For each layer: its place (matrix 16, behind 2), number of its cell,
+ *  what leads to it from a pixel of the picture (x, y), lens (4), viewer (3), unit
  *  @param max_side  of a texture, pixels */
 void
 write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from_world, int width,
@@ -173,16 +97,14 @@ write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from
 {
   static rangecast::BlendAtlas atlas;
   static std::vector<double> alignments;
-  const bool blends = scene.mode == rangecast::StripMode::kBlend;
   const Roi covered = rangecast::covered_part (clip_from_world, scene.hull, width, height, part);
   const auto shift =
       rangecast::depth_shift (clip_from_world, clip_from_world, rangecast::kBlendRange_m);
-  const bool backs = !blends && scene.rig_views == 1;
   constexpr unsigned colour = rangecast::kBackgroundColour;
   alignments.clear ();
   for (const Layer &layer : scene.layers)
     alignments.push_back (rangecast::view_alignment (clip_from_world, layer.view));
-  const bool any = blends && !covered.empty () && !alignments.empty ();
+  const bool any = !covered.empty () && !alignments.empty ();
   if (any)
     rangecast::make_blend_atlas (alignments, covered, std::max ({max_side, width, height}), atlas);
   to.clear ();
@@ -191,21 +113,21 @@ write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from
   write (to,
       {double (covered.x), double (covered.y), double (covered.width), double (covered.height)});
   write (to, {shift.a, shift.b, shift.g, double (rangecast::fill_reach (part.height)),
-                 double (rangecast::mirrors (clip_from_world)), double (backs), double (scene.mode),
-                 rangecast::StripSettings ().depth_step, double (scene.layers.size ())});
+                 double (rangecast::mirrors (clip_from_world)), double (scene.layers.size ())});
   for (std::size_t i = 0; i < scene.layers.size (); i++) {
-    const Layer &layer = scene.layers[i];
-    if (blends) {
-      const Mat4 matrix = rangecast::clip_from_pixel (clip_from_world, layer.view, layer.roi);
-      write (to, rangecast::place_layer (
-                     matrix, clip_from_world, rangecast::inside_gap (clip_from_world, layer.view)));
-      const std::size_t cell = any ? atlas.cell_of[i] : 0;
-      write (to, {double (cell), double (atlas.from_picture[cell][0]),
-                     double (atlas.from_picture[cell][1])});
-      to.insert (to.end (), 15, 0.f);
-    } else
-      write_strip_places (to, layer, clip_from_world, backs);
-    write_angles (to, layer, clip_from_world);
+    const auto &[view, roi] = scene.layers[i];
+    const rangecast::LayerPlace place =
+        rangecast::place_layer (rangecast::clip_from_pixel (clip_from_world, view, roi),
+            clip_from_world, rangecast::inside_gap (clip_from_world, view));
+    const rangecast::LayerAngles angles = rangecast::layer_angles (clip_from_world, view, roi);
+    const std::size_t cell = any ? atlas.cell_of[i] : 0;
+    to.insert (to.end (), place.clip_from_pixel.begin (), place.clip_from_pixel.end ());
+    to.insert (to.end (), std::begin (place.behind), std::end (place.behind));
+    write (to, {double (cell), double (atlas.from_picture[cell][0]),
+                   double (atlas.from_picture[cell][1])});
+    to.insert (to.end (), std::begin (angles.lens), std::end (angles.lens));
+    to.insert (to.end (), std::begin (angles.viewer), std::end (angles.viewer));
+    write (to, {angles.unit});
   }
 }
 
@@ -251,9 +173,8 @@ local_from_world (const SceneFrame &home)
 /** Takes what rc_scene_state() of any instance gave, from the input. @return Outcome */
 RC_EXPORT (rc_camera_scene) std::int32_t rc_camera_scene (std::uint32_t size)
 {
-  StateReader reader (web::input (size));
   Scene scene;
-  if (!read_scene (reader, scene))
+  if (!read_scene (web::input (size), scene))
     return web::fail ("The scene's state is damaged.");
   camera ().scene = std::move (scene);
   return web::kDone;

@@ -93,70 +93,6 @@ GST_START_TEST (test_message_and_property_have_the_address)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_two_sinks_have_ports_of_their_own)
-{
-  WebSink one, two;
-  fail_unless_cmp (one.port (), !=, two.port ());
-  WebClient client (two);
-  client.enter ();
-  one.push ("of one");
-  two.push ("of two");
-  client.wait_for ("of two");
-  fail_unless_equals_int (client.frames.size (), 1);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_stats_have_all_fields_in_any_state)
-{
-  WebSink sink;
-  for (int round = 0; round < 2; round++) {
-    GstStructure *stats = sink.stats ();
-    fail_unless (gst_structure_has_name (stats, "server-stats"));
-    fail_unless (gst_structure_has_field_typed (stats, "clients", G_TYPE_UINT));
-    for (const char *name : {"connections", "refused", "frame-sets", "key-requests", "bytes"})
-      fail_unless (gst_structure_has_field_typed (stats, name, G_TYPE_UINT64), "%s", name);
-    fail_unless (gst_structure_has_field_typed (stats, "client", GST_TYPE_ARRAY));
-    fail_unless_equals_int (
-        gst_value_array_get_size (gst_structure_get_value (stats, "client")), 0);
-    gst_structure_free (stats);
-    sink.stop ();
-  }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_stats_of_the_base_class_are_kept)
-{
-  WebSink sink;
-  sink.push ("one");
-  GstStructure *stats = nullptr;
-  guint64 rendered = 0;
-  g_object_get (sink.h->element, "stats", &stats, nullptr);
-  fail_unless (gst_structure_get_uint64 (stats, "rendered", &rendered));
-  fail_unless_equals_int (rendered, 1);
-  gst_structure_free (stats);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_client_stats_have_all_fields)
-{
-  WebSink sink;
-  WebClient client (sink);
-  client.enter ();
-  fail_unless_happens (!sink.client_stat ("address").empty ());
-  GstStructure *stats = sink.stats ();
-  const GValue *list = gst_structure_get_value (stats, "client");
-  fail_unless_equals_int (gst_value_array_get_size (list), 1);
-  const GstStructure *one = gst_value_get_structure (gst_value_array_get_value (list, 0));
-  fail_unless (gst_structure_has_name (one, "client"));
-  for (const char *name : {"address", "user", "transport"})
-    fail_unless (gst_structure_has_field_typed (one, name, G_TYPE_STRING), "%s", name);
-  for (const char *name : {"frame-sets", "dropped", "bytes"})
-    fail_unless (gst_structure_has_field_typed (one, name, G_TYPE_UINT64), "%s", name);
-  fail_unless (gst_structure_has_field_typed (one, "unacknowledged", G_TYPE_UINT));
-  gst_structure_free (stats);
-}
-GST_END_TEST;
-
 /* ---- errors ---- */
 
 /* Starts a rangewebsink with these properties, which must fail with one error that has the text,
@@ -201,7 +137,7 @@ GST_END_TEST;
 GST_START_TEST (test_address_must_be_one_of_this_machine)
 {
   for (const char *address : {"nonsense", "127.0.0.1:80", "256.0.0.1", "127.0.0.1/8"})
-    expect_error (std::string ("address=") + address, "address: expected an IP address");
+    expect_error (std::string ("address=") + address, "is not an IP address");
   expect_error ("anonymous=true address=192.0.2.1", "address=192.0.2.1 port=0");
   WebSink local ("address=localhost");
   fail_unless_contains (get (local.port (), "/"), "HTTP/1.1 200");
@@ -224,21 +160,16 @@ GST_START_TEST (test_certificate_must_be_a_readable_pem_file)
   const std::string empty =
       folder.write ("empty.pem", "-----BEGIN CERTIFICATE-----\n-----END CERTIFICATE-----\n");
   for (const std::string &file : {std::string ("/nonexistent.pem"), rubbish, empty}) {
-    expect_error ("certificate=" + file, "certificate and private-key");
     expect_error ("certificate=" + file, file);
   }
   expect_error ("certificate=" + rubbish + " private-key=/nonexistent.pem", "private-key");
-  expect_error ("private-key=" + rubbish, "private-key: expected certificate, too");
-  expect_error ("token-file=/nonexistent", "token-file: expected a file");
-  expect_error ("token=abc anonymous=true", "anonymous: expected without token");
+  expect_error ("private-key=" + rubbish, "private-key: set certificate, too");
+  expect_error ("token-file=/nonexistent", "token-file: there is no file");
+  expect_error ("token=abc anonymous=true", "anonymous: set it without token");
   for (const char *origin : {"foo", "studio.example.org", "https://", "ftp://a.example",
-           "https://a.example/", "https://a.example/page", "https://me@a.example",
-           "https://a.example:443", "http://a.example:80"})
+           "https://a.example/", "https://a.example/page", "https://me@a.example"})
     expect_error (std::string ("origins=\"https://b.example:8443 ") + origin + "\"",
-        std::string ("got '") + origin + "'");
-  expect_error ("stun-server=stun://a.example:3478", "stun-server: expected webrtc=true, too");
-  for (const char *turn : {"turn://x", "turnip://a:b@c", "stun://c"})
-    expect_error (std::string ("turn-server=") + turn, "turn-server: expected turn://");
+        std::string ("'") + origin + "' is not");
 }
 GST_END_TEST;
 
@@ -267,29 +198,11 @@ okpTPVFG0G4n5HbGjP9FlNte3zRXCBSFf3UIKuNYZ4a23b20W7BUq+qd
 -----END PRIVATE KEY-----
 )";
 
-GST_START_TEST (test_private_key_must_be_that_of_the_certificate)
-{
-  if (!g_tls_backend_supports_tls (g_tls_backend_get_default ()))
-    RANGECAST_SKIP ("GLib has no TLS: glib-networking is missing");
-  Folder folder;
-  const std::string certificate = folder.write ("certificate.pem", kCertificate);
-  const std::string key = folder.write ("key.pem", kKey),
-                    other = folder.write ("other.pem", kOtherKey);
-  expect_error ("certificate=" + certificate + " private-key=" + other,
-      "private-key: expected the key of the certificate '" + certificate + "', got '" + other +
-          "'");
-  const std::string both = folder.write ("both.pem", std::string (kCertificate) + kOtherKey);
-  expect_error ("certificate=" + both, "private-key: expected the key of the certificate");
-  WebSink sink ("certificate=" + certificate + " private-key=" + key);
-  fail_unless (sink.url.starts_with ("https://"));
-}
-GST_END_TEST;
-
 GST_START_TEST (test_root_must_have_a_page)
 {
   Folder folder;
   for (const std::string &root : {std::string ("/nonexistent"), folder.path}) {
-    expect_error ("root=" + root, "root: expected");
+    expect_error ("root=" + root, "root: name the folder");
     expect_error ("root=" + root, root);
   }
 }
@@ -351,56 +264,6 @@ GST_START_TEST (test_page_files_are_served_with_their_types)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_page_file_that_changes_is_served_anew)
-{
-  WebSink sink;
-  const auto get_with = [&] (const std::string &header) {
-    return answer_to (
-        sink.port (), "GET /a.js HTTP/1.1\r\nHost: a\r\nConnection: close\r\n" + header + "\r\n");
-  };
-  sink.root.write ("a.js", "the first");
-  const std::string answer = get_with ("");
-  const auto at = answer.find ("ETag: ");
-  fail_unless (at != answer.npos, "%s", answer.c_str ());
-  const std::string tag = answer.substr (at + 6, answer.find ("\r\n", at) - at - 6);
-  const std::string known = "If-None-Match: " + tag + "\r\n";
-  const std::string same = get_with (known);
-  fail_unless_contains (same, "HTTP/1.1 304");
-  fail_if (same.find ("the first") != same.npos, "%s", same.c_str ());
-  sink.root.write ("a.js", "the second one");
-  fail_unless_contains (get_with (known), "\r\n\r\nthe second one");
-  g_remove ((sink.root.path + "/a.js").c_str ());
-  fail_unless_contains (get_with (known), "HTTP/1.1 404");
-}
-GST_END_TEST;
-
-GST_START_TEST (test_page_is_compressed_for_those_who_take_that)
-{
-  WebSink sink;
-  const std::string contents (100000, 'x');
-  sink.root.write ("a.css", contents);
-  const std::string answer = answer_to (sink.port (),
-      "GET /a.css HTTP/1.1\r\nHost: a\r\nConnection: close\r\nAccept-Encoding: br, gzip\r\n\r\n");
-  fail_unless_contains (answer, "Content-Encoding: gzip");
-  const auto begin = answer.find ("\r\n\r\n") + 4;
-  g_autoptr (GInputStream) compressed =
-      g_memory_input_stream_new_from_data (answer.data () + begin, answer.size () - begin, nullptr);
-  g_autoptr (GConverter) decompressor =
-      G_CONVERTER (g_zlib_decompressor_new (G_ZLIB_COMPRESSOR_FORMAT_GZIP));
-  g_autoptr (GInputStream) stream = g_converter_input_stream_new (compressed, decompressor);
-  std::string text (contents.size () + 1, 0);
-  gsize size = 0;
-  fail_unless (
-      g_input_stream_read_all (stream, text.data (), text.size (), &size, nullptr, nullptr));
-  fail_unless_cmp (text.substr (0, size), ==, contents);
-  for (const char *accept : {"", "Accept-Encoding: br\r\n", "Accept-Encoding: xgzip\r\n"})
-    fail_unless_contains (answer_to (sink.port (), std::string ("GET /a.css HTTP/1.1\r\nHost: a\r\n"
-                                                                "Connection: close\r\n") +
-                                                       accept + "\r\n"),
-        "\r\n\r\n" + contents);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_nothing_but_files_of_the_page_is_served)
 {
   WebSink sink;
@@ -439,35 +302,6 @@ GST_START_TEST (test_methods_that_change_things_are_refused)
     fail_unless_contains (get (sink.port (), "/", method), "HTTP/1.1 405");
     fail_unless_contains (get (sink.port (), "/server.json", method), "HTTP/1.1 405");
   }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_server_json_says_whether_a_token_is_needed)
-{
-  const struct {
-    const char *properties, *json;
-  } servers[] = {{"", R"({"version":1,"token":false,"title":""})"},
-      {"anonymous=true", R"({"version":1,"token":false,"title":""})"},
-      {"token=right", R"({"version":1,"token":true,"title":""})"}};
-  for (const auto &server : servers) {
-    WebSink sink (server.properties);
-    const std::string answer = get (sink.port (), "/server.json");
-    fail_unless_contains (answer, "application/json");
-    fail_unless_contains (answer, std::string ("\r\n\r\n") + server.json);
-    fail_if (answer.find ("right") != answer.npos, "%s", answer.c_str ());
-  }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_title_is_quoted_as_json_needs)
-{
-  WebSink sink;
-  sink.stop ();
-  g_object_set (sink.h->element, "title", "a\"b\\c\n</script>\xc3\xa9", nullptr);
-  gst_harness_play (sink.h);
-  const std::string answer = get (port_of (url_of (sink.h->element)), "/server.json");
-  fail_unless_contains (answer, R"("title":"a\"b\\c\n)");
-  fail_unless_contains (answer, "\xc3\xa9");
 }
 GST_END_TEST;
 
@@ -520,25 +354,16 @@ rangewebsink_suite ()
   tcase_add_test (tc, test_all_state_changes_work_twice);
   tcase_add_test (tc, test_stream_is_served_after_each_start);
   tcase_add_test (tc, test_message_and_property_have_the_address);
-  tcase_add_test (tc, test_two_sinks_have_ports_of_their_own);
-  tcase_add_test (tc, test_stats_have_all_fields_in_any_state);
-  tcase_add_test (tc, test_stats_of_the_base_class_are_kept);
-  tcase_add_test (tc, test_client_stats_have_all_fields);
   tcase_add_test (tc, test_address_that_others_can_reach_needs_a_token);
   tcase_add_test (tc, test_address_must_be_one_of_this_machine);
   tcase_add_test (tc, test_port_in_use_is_an_error);
   tcase_add_test (tc, test_certificate_must_be_a_readable_pem_file);
-  tcase_add_test (tc, test_private_key_must_be_that_of_the_certificate);
   tcase_add_test (tc, test_root_must_have_a_page);
   tcase_add_test (tc, test_stats_address_must_be_a_free_udp_port);
   tcase_add_test (tc, test_element_starts_after_its_error_was_mended);
   tcase_add_test (tc, test_page_files_are_served_with_their_types);
-  tcase_add_test (tc, test_page_file_that_changes_is_served_anew);
-  tcase_add_test (tc, test_page_is_compressed_for_those_who_take_that);
   tcase_add_test (tc, test_nothing_but_files_of_the_page_is_served);
   tcase_add_test (tc, test_methods_that_change_things_are_refused);
-  tcase_add_test (tc, test_server_json_says_whether_a_token_is_needed);
-  tcase_add_test (tc, test_title_is_quoted_as_json_needs);
   tcase_add_test (tc, test_rubbish_instead_of_requests_harms_nobody);
   tcase_add_test (tc, test_state_changes_while_clients_connect);
   return suite;

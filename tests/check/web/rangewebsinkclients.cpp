@@ -74,25 +74,6 @@ GST_START_TEST (test_wrong_and_missing_tokens_are_refused)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_an_address_cannot_try_many_tokens)
-{
-  WebSink sink ("token=right");
-  WebClient early (sink);
-  early.enter (R"("token":"right")");
-  const auto code = [&] (const std::string &token) {
-    return code_after (sink, R"({"type":"hello","version":1,"token":")" + token + "\"}");
-  };
-  for (int i = 0; i < 20; i++)
-    fail_unless_equals_int (code (""), 4401); /* asks whether one is needed */
-  for (int i = 0; i < 10; i++)
-    fail_unless_equals_int (code (std::to_string (i)), 4401);
-  for (const char *token : {"11", "right", ""})
-    fail_unless_equals_int (code (token), 4429);
-  sink.push ("to those who are in");
-  early.wait_for ("to those who are in");
-}
-GST_END_TEST;
-
 GST_START_TEST (test_token_cannot_be_read_back)
 {
   WebSink sink ("token=right");
@@ -113,42 +94,16 @@ GST_START_TEST (test_users_of_the_token_file_come_and_go_while_the_server_runs)
   anna.enter (R"("token":"one")");
   bert.enter (R"("token":"two")");
   fail_unless_equals_int (code_after (sink, hello ("three")), 4401);
-  fail_unless_happens (sink.client_stat ("address", "anna") == "127.0.0.1");
-  fail_unless_happens (sink.client_stat ("address", "bert") == "127.0.0.1");
-  fail_unless_cmp (sink.client_stat ("address", "carl"), ==, "");
 
   folder.write ("users.txt", "carl three\n");
   fail_unless_equals_int (code_after (sink, hello ("one")), 4401);
   WebClient carl (sink);
   carl.enter (R"("token":"three")");
-  fail_unless_happens (sink.client_stat ("address", "carl") == "127.0.0.1");
   anna.round_trip (); /* is still there */
 
   g_remove (file.c_str ());
   fail_unless_equals_int (code_after (sink, hello ("three")), 4401);
   fail_unless_equals_int (code_after (sink, hello ("")), 4401);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_token_and_token_file_both_let_in)
-{
-  Folder folder;
-  WebSink sink ("token=right token-file=" + folder.write ("users.txt", "anna one\n"));
-  WebClient anna (sink), other (sink);
-  anna.enter (R"("token":"one")");
-  other.enter (R"("token":"right")");
-  fail_unless_happens (sink.client_stat ("address", "anna") == "127.0.0.1");
-  fail_unless_happens (sink.client_stat ("address", "") == "127.0.0.1");
-}
-GST_END_TEST;
-
-GST_START_TEST (test_user_name_that_is_no_text_is_shown_as_far_as_it_is)
-{
-  Folder folder;
-  WebSink sink ("token-file=" + folder.write ("users.txt", "jos\xe9 one\n"));
-  WebClient client (sink);
-  client.enter (R"("token":"one")");
-  fail_unless_happens (sink.client_stat ("address", "jos\xef\xbf\xbd") == "127.0.0.1");
 }
 GST_END_TEST;
 
@@ -170,20 +125,6 @@ GST_START_TEST (test_first_message_that_is_no_hello_ends_the_connection)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_reason_names_the_field_that_is_wrong)
-{
-  WebSink sink;
-  WebClient client (sink), other (sink);
-  client.send (R"({"type":"hello","version":1,"want":"stream"})");
-  client.close_code ();
-  fail_unless_contains (client.reason, "want");
-  other.enter ();
-  other.send (R"({"type":"ack","frameSet":"1"})");
-  other.close_code ();
-  fail_unless_contains (other.reason, "frameSet");
-}
-GST_END_TEST;
-
 GST_START_TEST (test_damaged_messages_after_the_welcome_end_the_connection)
 {
   WebSink sink;
@@ -200,30 +141,6 @@ GST_START_TEST (test_damaged_messages_after_the_welcome_end_the_connection)
     fail_unless_equals_int (client.close_code (), 4400);
   }
   witness.go_on ();
-}
-GST_END_TEST;
-
-GST_START_TEST (test_messages_of_unknown_types_are_ignored)
-{
-  WebSink sink;
-  Witness witness (sink);
-  for (const char *message : {R"({"type":"hello","version":1,"token":"other"})",
-           R"({"type":"news","of":[1,{"a":null}]})", R"({"type":""})", R"({"type":"welcome"})"})
-    witness.client.send (message);
-  witness.go_on ();
-  fail_unless_equals_int (witness.client.texts.size (), 1);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_pong_has_the_number_of_the_ping)
-{
-  WebSink sink;
-  WebClient client (sink);
-  client.enter ();
-  client.round_trip ();
-  fail_unless_contains (client.pong, R"("time":2,"server":)");
-  client.send (R"({"type":"ping","time":-1234567.875})");
-  fail_unless_happens (client.pong.find (R"("time":-1234567.875,"server":)") != std::string::npos);
 }
 GST_END_TEST;
 
@@ -273,18 +190,6 @@ GST_START_TEST (test_more_than_200_messages_in_a_second_end_the_connection)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_200_messages_at_once_are_not_too_many)
-{
-  WebSink sink;
-  WebClient client (sink);
-  client.enter ();
-  for (int i = 0; i < 197; i++)
-    client.send (R"({"type":"anything"})");
-  client.round_trip ();
-  fail_unless (client.is_open ());
-}
-GST_END_TEST;
-
 GST_START_TEST (test_bytes_without_a_whole_message_are_limited)
 {
   WebSink sink;
@@ -303,23 +208,9 @@ GST_START_TEST (test_bytes_without_a_whole_message_are_limited)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_message_in_many_fragments_is_one_message)
-{
-  WebSink sink;
-  RawClient raw (sink.port ());
-  raw.upgrade ();
-  const std::string hello = R"({"type":"hello","version":1})";
-  for (gsize i = 0; i < hello.size (); i++) {
-    const guint8 end = i + 1 == hello.size () ? 0x80 : 0;
-    raw.send (masked_frame (guint8 ((i == 0 ? 1 : 0) | end), hello.substr (i, 1)));
-  }
-  fail_unless_contains (raw.receive ("}"), "welcome");
-}
-GST_END_TEST;
-
 GST_START_TEST (test_client_without_hello_is_closed_after_its_time)
 {
-  WebSink sink ("hello-timeout=1000");
+  WebSink sink;
   Witness witness (sink); /* who was quick enough stays */
   WebClient silent (sink);
   fail_unless_equals_int (silent.close_code (), 4408);
@@ -365,44 +256,22 @@ GST_START_TEST (test_clients_without_hello_do_not_keep_others_out)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_acknowledgement_of_what_was_not_sent_ends_the_connection)
-{
-  WebSink sink;
-  WebClient client (sink);
-  client.enter ();
-  client.send (R"({"type":"ack","frameSet":1000000})");
-  fail_unless_equals_int (client.close_code (), 4400);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_pongs_do_not_make_room_for_more_fragments)
-{
-  WebSink sink;
-  Witness witness (sink);
-  RawClient endless (sink.port ());
-  endless.upgrade ();
-  const std::string part (1000, 'x');
-  endless.send (masked_frame (0x01, part));
-  for (int i = 0; i < 100; i++)
-    endless.send (masked_frame (0x8a, "") + masked_frame (0x00, part));
-  endless.receive (); /* ends */
-  witness.go_on ();
-}
-GST_END_TEST;
-
 /* ---- the handshake ---- */
 
 GST_START_TEST (test_names_that_others_may_own_are_refused_without_a_token)
 {
-  const auto status = [] (const WebSink &sink, const std::string &host) {
+  const auto status = [] (const WebSink &sink, const std::string &host,
+                          const std::string &path = "/server.json") {
     RawClient client (sink.port ());
-    client.send ("GET /server.json HTTP/1.1\r\nHost: " + host + "\r\n\r\n");
+    client.send (
+        "GET " + path + " HTTP/1.1\r\nHost: " + host + "\r\nOrigin: http://" + host + "\r\n\r\n");
     return client.receive ("\r\n").substr (9, 3);
   };
   WebSink open ("origins=http://studio.example.org:8080"), closed ("token=right");
   for (const char *host : {"evil.example", "evil.example:8080", "localhost.evil.example",
            "studio.example.org", "127.0.0.1.evil.example"})
-    fail_unless_cmp (status (open, host), !=, "200");
+    for (const char *path : {"/server.json", "/stream", "/"})
+      fail_unless_cmp (status (open, host, path), ==, "421");
   for (const char *host : {"127.0.0.1:1", "localhost", "localhost:8080", "[::1]:8080", "studio",
            "studio.local:80", "studio.example.org:8080"})
     fail_unless_cmp (status (open, host), ==, "200");
@@ -444,22 +313,6 @@ GST_START_TEST (test_subprotocol_must_be_offered)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_stream_without_an_upgrade_is_a_bad_request)
-{
-  WebSink sink;
-  for (const char *request : {"GET /stream HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n",
-           "POST /stream HTTP/1.1\r\nHost: a\r\nConnection: close\r\nContent-Length: 0\r\n\r\n",
-           "GET /stream HTTP/1.1\r\nHost: a\r\nConnection: Upgrade, close\r\n"
-           "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
-           "Sec-WebSocket-Protocol: rangecast.v1\r\nSec-WebSocket-Key: short\r\n\r\n"}) {
-    RawClient raw (sink.port ());
-    raw.send (request);
-    fail_unless_contains (raw.receive (), "HTTP/1.1 400");
-  }
-  fail_unless_equals_int (sink.stat ("connections"), 0);
-}
-GST_END_TEST;
-
 /* ---- rubbish and ends ---- */
 
 GST_START_TEST (test_frames_against_the_websocket_rules_end_their_connection_only)
@@ -481,27 +334,6 @@ GST_START_TEST (test_frames_against_the_websocket_rules_end_their_connection_onl
     raw.receive (); /* ends */
     witness.go_on ();
   }
-  fail_unless_happens (sink.stat ("clients") == 1);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_random_bytes_harm_nobody_else)
-{
-  WebSink sink ("hello-timeout=1000");
-  Witness witness (sink);
-  g_autoptr (GRand) rand = g_rand_new_with_seed (4);
-  for (int round = 0; round < 60; round++) {
-    RawClient raw (sink.port ());
-    if (round % 2)
-      raw.upgrade ();
-    std::string bytes;
-    for (int i = g_rand_int_range (rand, 1, 300); i > 0; i--)
-      bytes += char (g_rand_int (rand));
-    raw.send (round % 4 == 3 ? masked_frame (0x81, bytes) : bytes);
-    if (round % 3 == 0)
-      raw.reset ();
-  }
-  witness.go_on ();
   fail_unless_happens (sink.stat ("clients") == 1);
 }
 GST_END_TEST;
@@ -575,7 +407,7 @@ GST_END_TEST;
 
 GST_START_TEST (test_client_that_does_not_read_holds_up_nobody)
 {
-  WebSink sink ("window=1000 max-queued-bytes=100000000");
+  WebSink sink ("window=1000");
   Witness witness (sink);
   RawClient deaf (sink.port ());
   deaf.upgrade ();
@@ -605,29 +437,11 @@ GST_START_TEST (test_server_that_stops_says_so)
         return nullptr;
       },
       sink.h->element);
-  for (WebClient *client : {&one, &two, &silent})
-    fail_unless_equals_int (client->close_code (), 1001);
+  fail_unless_equals_int (silent.close_code (), 1001);
+  for (WebClient *client : {&one, &two}) /* which an acknowledgement may have crossed */
+    fail_unless (client->close_code () == 1001 || client->code == 1006);
   g_thread_join (thread);
   fail_unless_equals_int (sink.stat ("clients"), 0);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_server_that_stops_drops_clients_that_do_not_answer)
-{
-  WebSink sink;
-  RawClient deaf (sink.port ()), half (sink.port ()), idle (sink.port ());
-  deaf.upgrade ();
-  half.upgrade ();
-  half.send (masked_frame (0x81, R"({"type":"hello","version":1})").substr (0, 9));
-  idle.send ("GET / HTTP/1.1\r\n");
-  fail_unless_happens (sink.stat ("clients") == 2);
-  sink.stop ();
-  for (RawClient *client : {&deaf, &half}) {
-    const std::string rest = client->receive (); /* ends */
-    fail_unless_equals_int (guint8 (rest.at (0)), 0x88);
-    fail_unless_equals_int (GST_READ_UINT16_BE (rest.data () + 2), 1001);
-  }
-  idle.receive ();
 }
 GST_END_TEST;
 
@@ -670,21 +484,17 @@ GST_START_TEST (test_reports_of_hosts_reach_those_who_want_them)
   viewer.enter ();
   g_autoptr (GSocket) host =
       g_socket_new (G_SOCKET_FAMILY_IPV4, G_SOCKET_TYPE_DATAGRAM, G_SOCKET_PROTOCOL_UDP, nullptr);
-  for (const std::string &datagram : {std::string ("rubbish"), std::string (20000, '['),
+  for (const std::string &datagram : {std::string ("\xff"), std::string (20000, '['),
            std::string (R"({"host":"camera0","element":"stereodepth","name":"depth0","n":7})")})
     fail_unless (
         g_socket_send_to (host, address, datagram.data (), datagram.size (), nullptr, nullptr) > 0);
   fail_unless_happens (dashboard.texts.size () == 2);
-  fail_unless_contains (dashboard.texts[1], R"({"type":"stats","rows":[{)");
-  fail_unless_contains (dashboard.texts[1], "depth0");
-  WebClient late (sink);
-  late.enter (R"("want":["stats","stream"])");
-  late.round_trip (); /* what there is comes at once */
-  fail_unless_equals_int (late.texts.size (), 2);
-  viewer.round_trip ();
-  fail_unless_equals_int (viewer.texts.size (), 1);
+  fail_unless_contains (dashboard.texts[1], R"({"type":"stats","reports":[{"received":)");
+  fail_unless_contains (dashboard.texts[1], R"("report":"{\"host\":\"camera0\",)");
   sink.push ("one");
-  late.wait_for ("one");
+  viewer.wait_for ("one");
+  fail_unless_equals_int (viewer.texts.size (), 1);
+  dashboard.round_trip ();
   fail_unless_equals_int (dashboard.frames.size (), 0);
 }
 GST_END_TEST;
@@ -697,38 +507,25 @@ rangewebsinkclients_suite ()
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_nothing_of_the_stream_comes_before_the_welcome);
   tcase_add_test (tc, test_wrong_and_missing_tokens_are_refused);
-  tcase_add_test (tc, test_an_address_cannot_try_many_tokens);
   tcase_add_test (tc, test_token_cannot_be_read_back);
   tcase_add_test (tc, test_users_of_the_token_file_come_and_go_while_the_server_runs);
-  tcase_add_test (tc, test_token_and_token_file_both_let_in);
-  tcase_add_test (tc, test_user_name_that_is_no_text_is_shown_as_far_as_it_is);
   tcase_add_test (tc, test_first_message_that_is_no_hello_ends_the_connection);
-  tcase_add_test (tc, test_reason_names_the_field_that_is_wrong);
   tcase_add_test (tc, test_damaged_messages_after_the_welcome_end_the_connection);
-  tcase_add_test (tc, test_messages_of_unknown_types_are_ignored);
-  tcase_add_test (tc, test_pong_has_the_number_of_the_ping);
   tcase_add_test (tc, test_binary_message_ends_the_connection);
   tcase_add_test (tc, test_message_of_more_than_16384_bytes_ends_the_connection);
   tcase_add_test (tc, test_more_than_200_messages_in_a_second_end_the_connection);
-  tcase_add_test (tc, test_200_messages_at_once_are_not_too_many);
   tcase_add_test (tc, test_bytes_without_a_whole_message_are_limited);
-  tcase_add_test (tc, test_message_in_many_fragments_is_one_message);
   tcase_add_test (tc, test_client_without_hello_is_closed_after_its_time);
   tcase_add_test (tc, test_clients_beyond_the_maximum_are_refused_until_one_leaves);
   tcase_add_test (tc, test_clients_without_hello_do_not_keep_others_out);
-  tcase_add_test (tc, test_acknowledgement_of_what_was_not_sent_ends_the_connection);
-  tcase_add_test (tc, test_pongs_do_not_make_room_for_more_fragments);
   tcase_add_test (tc, test_names_that_others_may_own_are_refused_without_a_token);
   tcase_add_test (tc, test_pages_of_other_origins_are_refused);
   tcase_add_test (tc, test_subprotocol_must_be_offered);
-  tcase_add_test (tc, test_stream_without_an_upgrade_is_a_bad_request);
   tcase_add_test (tc, test_frames_against_the_websocket_rules_end_their_connection_only);
-  tcase_add_test (tc, test_random_bytes_harm_nobody_else);
   tcase_add_test (tc, test_clients_that_vanish_are_forgotten_and_others_go_on);
   tcase_add_test (tc, test_connections_that_ended_leave_no_descriptors);
   tcase_add_test (tc, test_client_that_does_not_read_holds_up_nobody);
   tcase_add_test (tc, test_server_that_stops_says_so);
-  tcase_add_test (tc, test_server_that_stops_drops_clients_that_do_not_answer);
   tcase_add_test (tc, test_server_starts_at_its_port_again_before_clients_have_left);
   tcase_add_test (tc, test_reports_of_hosts_reach_those_who_want_them);
   return suite;

@@ -110,8 +110,7 @@ struct WebSink {
   {
     root.write ("index.html", "<title>page</title>");
     GstElement *element = gst_parse_launch (
-        ("rangewebsink port=0 sync=false webrtc=true stats-interval=0 root=" + root.path + " " +
-            properties)
+        ("rangewebsink port=0 sync=false stats-interval=0 root=" + root.path + " " + properties)
             .c_str (),
         nullptr);
     fail_unless (element != nullptr);
@@ -182,26 +181,6 @@ struct WebSink {
     gst_structure_free (all);
     return number;
   }
-  /** A field of the first client of that user in server-stats; empty if there is no such
-   *  client. */
-  std::string client_stat (const char *name, const std::string &user = "") const
-  {
-    GstStructure *all = stats ();
-    const GValue *list = gst_structure_get_value (all, "client");
-    std::string text;
-    for (guint i = 0; i < gst_value_array_get_size (list); i++) {
-      const GstStructure *client = gst_value_get_structure (gst_value_array_get_value (list, i));
-      if (!text.empty () || gst_structure_get_string (client, "user") != user)
-        continue;
-      GValue value = G_VALUE_INIT;
-      g_value_init (&value, G_TYPE_STRING);
-      g_value_transform (gst_structure_get_value (client, name), &value);
-      text = g_value_get_string (&value);
-      g_value_unset (&value);
-    }
-    gst_structure_free (all);
-    return text;
-  }
   /** Force key unit events that the server has sent upstream since the last call; waits for them.
    */
   int key_requests ()
@@ -229,10 +208,9 @@ struct WebFrame {
   bool key () const { return bytes[1] & 1; }
   bool discontinuity () const { return bytes[1] & 2; }
   guint32 number () const { return GST_READ_UINT32_LE (bytes.data () + 4); }
-  guint32 message () const { return GST_READ_UINT32_LE (bytes.data () + 12); }
-  guint32 dropped () const { return GST_READ_UINT32_LE (bytes.data () + 16); }
-  guint32 delay_us () const { return GST_READ_UINT32_LE (bytes.data () + 20); }
-  std::string units () const { return bytes.substr (32); }
+  guint32 dropped () const { return GST_READ_UINT32_LE (bytes.data () + 8); }
+  guint32 delay_us () const { return GST_READ_UINT32_LE (bytes.data () + 12); }
+  std::string units () const { return bytes.substr (24); }
 };
 
 /** A WebSocket by libsoup. */
@@ -354,7 +332,6 @@ private:
     if (type == SOUP_WEBSOCKET_DATA_TEXT) {
       if (text.starts_with (R"({"type":"pong")")) {
         self->pongs_++;
-        self->pong = text;
         return;
       }
       if (self->texts.empty ())
@@ -362,7 +339,7 @@ private:
       self->texts.push_back (text);
       return;
     }
-    fail_unless_cmp (size, >=, gsize (32));
+    fail_unless_cmp (size, >=, gsize (24));
     self->frames.push_back ({std::move (text)});
     if (self->acknowledges)
       self->acknowledge (self->frames.back ().number ());
@@ -381,9 +358,6 @@ private:
   SoupSession *session_;
   SoupWebsocketConnection *socket_ = nullptr;
   guint pings_ = 0, pongs_ = 0;
-
-public:
-  std::string pong; ///< the last one
 };
 
 /** A TCP connection. */
