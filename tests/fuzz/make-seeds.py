@@ -184,9 +184,6 @@ PARTNER = {
     "distortion": "[ 0.1, -0.2, 0., 0. ]",
     "partner_from_left": {"rotation": "[ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]", "translation": "[ -0.1, 0., 0. ]"},
 }
-PIXELS = {"rows": "1", "cols": "2", "dt": "\"8f\"", "data": "[ " + ", ".join(["10., 20., 30., 1., 8000., 5., 1., 7990."] * 2) + " ]"}
-# A kind of matrix, padded, and then the same numbers.
-BINARY = b64encode(b"8f".ljust(24) + struct.pack("<16f", *[10, 20, 30, 1, 8000, 5, 1, 7990] * 2)).decode()
 
 
 def yaml_of(node: dict, indent: int = 0) -> str:
@@ -221,11 +218,6 @@ def texts_of(node: dict) -> list[bytes]:
 def rig_file_seeds() -> list[bytes]:
     views = [[VIEW], [{**VIEW, "right": PARTNER, "third": PARTNER}], [VIEW, {**VIEW, "id": "7"}], []]
     return [text for some in views for text in texts_of({"rangecast_rig": "1", "views": some})]
-
-
-def background_seeds() -> list[bytes]:
-    datas = [PIXELS, {**PIXELS, "data": f'"$base64${BINARY}"'}, {**PIXELS, "data": f"!!binary |\n            {BINARY}"}]
-    return [text for pixels in datas for text in texts_of({"rangecast_background": "2", "views": [{"id": "0", "frames": "3", "pixels": pixels}]})]
 
 
 def range_meta_seeds() -> list[bytes]:
@@ -269,7 +261,7 @@ def main() -> None:
     parser.add_argument("folder", metavar="FOLDER", type=Path)
     to = parser.parse_args().folder
     seeds: dict[str, list[bytes]] = {"slice": too_large_numbers(), "access_unit": [], "rtp_depay": [], "byte_stream": [], "rig": []}
-    seeds |= {"rig_file": rig_file_seeds(), "background": background_seeds(), "range_meta": range_meta_seeds(), "parse": []}
+    seeds |= {"rig_file": rig_file_seeds(), "range_meta": range_meta_seeds(), "parse": []}
     seeds |= {"camera_texts": camera_texts_seeds(), "rtcp_reports": rtcp_reports_seeds()}
     for path in STREAMS:
         data = path.read_bytes()
