@@ -35,7 +35,7 @@ usage: demo.sh [options]
   --depth WHAT  properties of stereodepth, e.g. "algorithm=bm refine=0"
   --render WHAT  properties of striprender, e.g. "mode=strips", which is faster
   --latency MS  how long the parent waits for a late view (default: see parent-host.sh)
-With RANGECAST_STATS=udp://HOST:PORT (or a file) the hosts send their statistics there, for top.sh.
+With RANGECAST_STATS=udp://HOST:PORT (or a file) the hosts send their statistics there.
 END
 }
 

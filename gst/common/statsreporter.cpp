@@ -11,7 +11,7 @@
 
 namespace {
 
-constexpr guint kDefaultIntervalMs = 1000, kMaxIntervalMs = 3600000;
+constexpr guint kMaxIntervalMs = 3600000;
 /* Per interval; of more, the most recent ones count. */
 constexpr std::size_t kMaxLatencies = 1024;
 /* A greater time since capture means that the clocks are unrelated, ns. */
@@ -33,7 +33,7 @@ struct StatsReporter::State {
   std::vector<PreviousRow> previous;
   GstClockTime since = 0; /* start of the interval */
 
-  std::atomic<guint> interval_ms = kDefaultIntervalMs; /* written with `lock` held */
+  std::atomic<guint> interval_ms = 0; /* written with `lock` held */
 
   std::mutex lock;           /* guards the members up to n_latencies */
   Collect collect = nullptr; /* null: stopped */
@@ -164,8 +164,7 @@ StatsReporter::State::make_messages (
   n_latencies = 0;
   if (!known.empty ())
     gst_structure_set (messages[0], "latency-p50", G_TYPE_INT64, quantile_ns (known, 0.5),
-        "latency-p99", G_TYPE_INT64, quantile_ns (known, 0.99), "latency-max", G_TYPE_INT64,
-        gint64{*std::ranges::max_element (known)} * 1000, nullptr);
+        "latency-p99", G_TYPE_INT64, quantile_ns (known, 0.99), nullptr);
   return messages;
 }
 
@@ -288,7 +287,7 @@ StatsReporter::install (GObjectClass *object_class, guint property_id)
   g_object_class_install_property (object_class, property_id,
       g_param_spec_uint ("stats-interval", "Statistics interval",
           "Interval between rangecast-stats messages in milliseconds (0 = never)", 0,
-          kMaxIntervalMs, kDefaultIntervalMs, kMutablePlaying));
+          kMaxIntervalMs, 0, kMutablePlaying));
 }
 
 void

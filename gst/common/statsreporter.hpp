@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
-/* The element message `rangecast-stats`, which all elements post at regular intervals; its fields
+/* The element message `rangecast-stats`, which elements post every `stats-interval`; its fields
  * are documented in docs/guide/statistics.md. */
 
 #include <gst/gst.h>

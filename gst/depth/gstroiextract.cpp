@@ -342,12 +342,10 @@ request_roi (GstRoiExtract *self, ViewState &state, int view_id)
 
 /* ---- after each frame set ---- */
 
-/* Checks for what OpenCV can write, with clearer errors. */
 static Status
 check_save_path (const std::string &path)
 {
-  static constexpr std::string_view kExtensions[] = {
-      ".yml", ".yaml", ".json", ".yml.gz", ".yaml.gz", ".json.gz"};
+  static constexpr std::string_view kExtensions[] = {".yml", ".yaml"};
   return path.empty () ? Status () : rangecast::check_output_path (path, kExtensions);
 }
 

@@ -195,8 +195,8 @@ AvatarPainter::draw_range (const FrameTime &time, GstBuffer *buffer)
     return frame.status ();
   std::array<Roi, rangecast::kMaxViews> boxes;
   const std::size_t count = frame.views ().size ();
-  const Status status = scene_->render_range (frame.views (), seconds (time.capture_time),
-      empty_at (time), {boxes.data (), count}, settings_.n_threads);
+  const Status status = scene_->render_range (
+      frame.views (), seconds (time.capture_time), empty_at (time), {boxes.data (), count}, 0);
   for (std::size_t i = 0; status.ok () && settings_.person_only && i < count; i++)
     frame.crop (i, boxes[i]);
   return status;

@@ -20,7 +20,6 @@ struct AvatarSettings {
   bool is_live = false;
   std::string rig_export; ///< file; empty: none
   bool person_only = false;
-  int n_threads = 0; ///< 0: one per core
 };
 
 PropertyTable<AvatarSettings> &avatar_properties ();

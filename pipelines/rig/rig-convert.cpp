@@ -6,10 +6,9 @@
 #include <clocale>
 #include <fstream>
 #include <map>
-#include <opencv2/core.hpp>
 #include <rangecast/geometry/rig.hpp>
 #include <rangecast/rigfile/rig_file.hpp>
-#include <rangecast/roi/storage_check.hpp>
+#include <rangecast/rigfile/yaml_tree.hpp>
 #include <rangecast/stereo/rectification.hpp>
 #include <sstream>
 #include <string>
@@ -23,6 +22,7 @@ using rangecast::Pose;
 using rangecast::Rig;
 using rangecast::Status;
 using rangecast::View;
+using rangecast::YamlNode;
 
 struct Options {
   gint view_id = 0;
@@ -59,75 +59,78 @@ scale_view (View &view, double scale)
   view.right->intrinsics = view.right->intrinsics.scaled (sx, sy);
 }
 
-/* ---- files that OpenCV reads ---- */
+/* ---- files that OpenCV writes ---- */
 
-cv::FileStorage
-open_storage (const std::string &path)
+constexpr std::uint64_t kMaxFileBytes = 16 << 20;
+
+YamlNode
+read_file (const std::string &path)
 {
-  if (const rangecast::Status s = rangecast::check_storage (path); !s.ok ())
+  YamlNode file;
+  if (const Status s = rangecast::read_yaml (path, kMaxFileBytes, file); !s.ok ())
     throw BadInput{s.message ()};
-  cv::FileStorage file;
-  try {
-    if (std::ifstream (path).good () && file.open (path, cv::FileStorage::READ))
-      return file;
-  } catch (const cv::Exception &) {
-  }
-  throw BadInput{path + ": cannot be read as YAML or JSON"};
+  return file;
+}
+
+/* All numbers of a list, or of a list of lists. */
+std::vector<double>
+numbers_of (const YamlNode &node)
+{
+  if (node.type == YamlNode::Type::kNumber)
+    return {*node.number ()};
+  std::vector<double> values;
+  for (const YamlNode &item : node.items)
+    for (const double value : numbers_of (item))
+      values.push_back (value);
+  return values;
 }
 
 /* The files of one calibration. */
-struct OpencvFiles : std::vector<cv::FileStorage> {
+struct OpencvFiles : std::vector<YamlNode> {
   std::string names; /* for messages */
 };
 
-/* A matrix with one of several names in one of the files. */
-cv::Mat
-find_matrix (const OpencvFiles &files, std::initializer_list<const char *> names, const char *what)
+/* The numbers of a matrix with one of several names in one of the files.
+ * @param count  0: any */
+std::vector<double>
+find_matrix (const OpencvFiles &files, std::initializer_list<const char *> names, const char *what,
+    std::size_t count = 0)
 {
-  for (const cv::FileStorage &file : files)
+  for (const YamlNode &file : files)
     for (const char *name : names)
-      if (const cv::FileNode node = file[name]; node.isMap ()) {
-        cv::Mat m;
-        node.mat ().convertTo (m, CV_64F);
+      if (file[name].type == YamlNode::Type::kMap) {
+        const std::vector<double> m = numbers_of (file[name]["data"]);
+        if (count && m.size () != count)
+          throw BadInput{std::string (name) + ": needs " + std::to_string (count) +
+                         " numbers, got " + std::to_string (m.size ())};
         return m;
       }
   throw BadInput{files.names + ": no " + what + " (" + *names.begin () + ")"};
 }
 
+/* @param k  3 x 3, row by row */
 Intrinsics
-intrinsics_of (const cv::Mat &k)
+intrinsics_of (const std::vector<double> &k)
 {
-  if (k.rows != 3 || k.cols != 3)
-    throw BadInput{"a camera matrix is not 3 x 3"};
-  return {k.at<double> (0, 0), k.at<double> (1, 1), k.at<double> (0, 2), k.at<double> (1, 2)};
-}
-
-rangecast::Distortion
-distortion_of (const cv::Mat &d)
-{
-  return {d.begin<double> (), d.end<double> ()};
+  return {k[0], k[4], k[2], k[5]};
 }
 
 Pose
-pose_of (const cv::Mat &r, const cv::Mat &t, double unit_m)
+pose_of (const std::vector<double> &r, const std::vector<double> &t, double unit_m)
 {
-  if (r.rows != 3 || r.cols != 3 || t.total () != 3)
-    throw BadInput{"R and T: expected 3 x 3 and 3 x 1"};
   Pose pose;
-  std::copy (r.begin<double> (), r.end<double> (), pose.rotation.begin ());
-  const auto at = t.begin<double> ();
-  pose.translation = unit_m * rangecast::Vec3{at[0], at[1], at[2]};
+  std::ranges::copy (r, pose.rotation.begin ());
+  pose.translation = unit_m * rangecast::Vec3{t[0], t[1], t[2]};
   return pose;
 }
 
 void
 read_size (const OpencvFiles &files, const Options &options, View &view)
 {
-  for (const cv::FileStorage &file : files)
-    if (file["image_width"].isInt () && file["image_height"].isInt ()) {
-      view.width = int (file["image_width"]);
-      view.height = int (file["image_height"]);
-    }
+  for (const YamlNode &file : files) {
+    view.width = file["image_width"].integer ().value_or (view.width);
+    view.height = file["image_height"].integer ().value_or (view.height);
+  }
   char end = 0;
   if (options.size &&
       (std::sscanf (options.size, "%dx%d%c", &view.width, &view.height, &end) != 2 ||
@@ -145,57 +148,42 @@ read_opencv (const std::vector<std::string> &paths, const Options &options)
 {
   OpencvFiles files;
   for (const std::string &path : paths) {
-    files.push_back (open_storage (path));
+    files.push_back (read_file (path));
     files.names += (files.names.empty () ? "" : ", ") + path;
   }
   View view;
   read_size (files, options, view);
-  view.intrinsics = intrinsics_of (
-      find_matrix (files, {"M1", "K1", "cameraMatrix1", "camera_matrix_1"}, "left camera matrix"));
-  view.distortion =
-      distortion_of (find_matrix (files, {"D1", "distCoeffs1", "distortion_1"}, "left distortion"));
+  view.intrinsics = intrinsics_of (find_matrix (
+      files, {"M1", "K1", "cameraMatrix1", "camera_matrix_1"}, "left camera matrix", 9));
+  view.distortion = find_matrix (files, {"D1", "distCoeffs1", "distortion_1"}, "left distortion");
   PartnerCamera right;
-  right.intrinsics = intrinsics_of (
-      find_matrix (files, {"M2", "K2", "cameraMatrix2", "camera_matrix_2"}, "right camera matrix"));
-  right.distortion = distortion_of (
-      find_matrix (files, {"D2", "distCoeffs2", "distortion_2"}, "right distortion"));
-  right.partner_from_left = pose_of (find_matrix (files, {"R"}, "rotation left to right"),
-      find_matrix (files, {"T"}, "translation left to right"), options.unit_m);
+  right.intrinsics = intrinsics_of (find_matrix (
+      files, {"M2", "K2", "cameraMatrix2", "camera_matrix_2"}, "right camera matrix", 9));
+  right.distortion = find_matrix (files, {"D2", "distCoeffs2", "distortion_2"}, "right distortion");
+  right.partner_from_left = pose_of (find_matrix (files, {"R"}, "rotation left to right", 9),
+      find_matrix (files, {"T"}, "translation left to right", 3), options.unit_m);
   view.right = right;
   return view;
 }
 
 /* ---- Luxonis ---- */
 
-std::vector<double>
-numbers_of (const cv::FileNode &node)
+const YamlNode &
+luxonis_camera (const YamlNode &cameras, std::optional<int> socket)
 {
-  std::vector<double> values;
-  for (const cv::FileNode &item : node)
-    if (item.isSeq ())
-      for (const cv::FileNode &inner : item)
-        values.push_back (inner.real ());
-    else
-      values.push_back (item.real ());
-  return values;
-}
-
-cv::FileNode
-luxonis_camera (const cv::FileNode &cameras, int socket)
-{
-  for (const cv::FileNode &entry : cameras)
-    if (entry.isSeq () && entry.size () == 2 && entry[0].isInt () && int (entry[0]) == socket)
-      return entry[1];
-  throw BadInput{"no camera for socket " + std::to_string (socket)};
+  for (const YamlNode &entry : cameras.items)
+    if (socket && entry.items.size () == 2 && entry.items[0].integer () == socket)
+      return entry.items[1];
+  throw BadInput{"no camera for socket " + std::to_string (socket.value_or (-1))};
 }
 
 Intrinsics
-luxonis_intrinsics (const cv::FileNode &camera)
+luxonis_intrinsics (const YamlNode &camera)
 {
   const std::vector<double> k = numbers_of (camera["intrinsicMatrix"]);
   if (k.size () != 9)
-    throw BadInput{"intrinsicMatrix: expected 3 x 3 numbers"};
-  return {k[0], k[4], k[2], k[5]};
+    throw BadInput{"intrinsicMatrix: needs 3 x 3 numbers"};
+  return intrinsics_of (k);
 }
 
 /* The stereo pair that stereoRectificationData names. Lengths are centimetres, distortion has 14
@@ -203,31 +191,30 @@ luxonis_intrinsics (const cv::FileNode &camera)
 View
 read_luxonis (const std::vector<std::string> &paths, const Options &)
 {
-  const cv::FileStorage file = open_storage (paths[0]);
-  const cv::FileNode cameras = file["cameraData"], pair = file["stereoRectificationData"];
-  if (!cameras.isSeq () || !pair.isMap ())
-    throw BadInput{"expected a Luxonis calibration with cameraData and stereoRectificationData"};
-  const int right_socket = int (pair["rightCameraSocket"]);
-  const cv::FileNode left = luxonis_camera (cameras, int (pair["leftCameraSocket"]));
-  const cv::FileNode right = luxonis_camera (cameras, right_socket);
-  const cv::FileNode extrinsics = left["extrinsics"];
-  if (int (extrinsics["toCameraSocket"]) != right_socket)
+  const YamlNode file = read_file (paths[0]);
+  const YamlNode &cameras = file["cameraData"], &pair = file["stereoRectificationData"];
+  if (cameras.type != YamlNode::Type::kList || pair.type != YamlNode::Type::kMap)
+    throw BadInput{"no Luxonis calibration: cameraData or stereoRectificationData is missing"};
+  const std::optional<int> right_socket = pair["rightCameraSocket"].integer ();
+  const YamlNode &left = luxonis_camera (cameras, pair["leftCameraSocket"].integer ());
+  const YamlNode &right = luxonis_camera (cameras, right_socket);
+  const YamlNode &extrinsics = left["extrinsics"];
+  if (extrinsics["toCameraSocket"].integer () != right_socket)
     throw BadInput{"the left camera's extrinsics do not refer to the right one"};
   View view;
-  view.width = int (left["width"]);
-  view.height = int (left["height"]);
+  view.width = left["width"].integer ().value_or (0);
+  view.height = left["height"].integer ().value_or (0);
   view.intrinsics = luxonis_intrinsics (left);
   view.distortion = numbers_of (left["distortionCoeff"]);
   PartnerCamera partner;
   partner.intrinsics = luxonis_intrinsics (right);
   partner.distortion = numbers_of (right["distortionCoeff"]);
   const std::vector<double> r = numbers_of (extrinsics["rotationMatrix"]);
-  const cv::FileNode t = extrinsics["translation"];
-  if (r.size () != 9 || !t.isMap ())
-    throw BadInput{"extrinsics: expected rotationMatrix, 3 x 3, and translation"};
-  std::ranges::copy (r, partner.partner_from_left.rotation.begin ());
-  partner.partner_from_left.translation =
-      0.01 * rangecast::Vec3{t["x"].real (), t["y"].real (), t["z"].real ()};
+  const YamlNode &t = extrinsics["translation"];
+  const auto x = t["x"].number (), y = t["y"].number (), z = t["z"].number ();
+  if (r.size () != 9 || !x || !y || !z)
+    throw BadInput{"extrinsics: needs rotationMatrix, 3 x 3, and translation"};
+  partner.partner_from_left = pose_of (r, {*x, *y, *z}, 0.01);
   view.right = partner;
   view.near_m = 1;
   view.far_m = 6;

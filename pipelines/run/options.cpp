@@ -30,7 +30,7 @@ RunOptions::parse (int *argc, char ***argv)
       {"loop", 0, 0, G_OPTION_ARG_NONE, &loop, "Play a file again and again", nullptr},
       {"progress", 0, 0, G_OPTION_ARG_NONE, &progress, "Print a line every 2 s", nullptr},
       {"stats", 0, 0, G_OPTION_ARG_STRING, &stats,
-          "Send the elements' statistics to udp://HOST:PORT or a file, for top.sh (default: "
+          "Send the elements' statistics to udp://HOST:PORT or a file (default: "
           "environment variable RANGECAST_STATS; none)",
           "ADDRESS"},
       {"report", 0, 0, G_OPTION_ARG_FILENAME, &report, "Write the measurements", "JSON"},

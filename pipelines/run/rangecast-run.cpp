@@ -258,6 +258,26 @@ finish (Runner &runner)
       g_remove (*path);
 }
 
+/* Has an element post its statistics every second, unless its launch string says how often. */
+void
+request_stats (GstElement *element)
+{
+  GParamSpec *spec = g_object_class_find_property (G_OBJECT_GET_CLASS (element), "stats-interval");
+  guint interval = 0;
+  if (spec)
+    g_object_get (element, "stats-interval", &interval, nullptr);
+  if (spec && interval == 0)
+    g_object_set (element, "stats-interval", 1000u, nullptr);
+  if (!GST_IS_BIN (element))
+    return;
+  const auto request = [] (const GValue *item, gpointer) {
+    request_stats (GST_ELEMENT (g_value_get_object (item)));
+  };
+  GstIterator *elements = gst_bin_iterate_elements (GST_BIN (element));
+  gst_iterator_foreach (elements, request, nullptr);
+  gst_iterator_free (elements);
+}
+
 void
 play (Runner &runner)
 {
@@ -269,6 +289,8 @@ play (Runner &runner)
     gst_element_set_start_time (runner.pipeline, GST_CLOCK_TIME_NONE);
     gst_element_set_base_time (runner.pipeline, GstClockTime (runner.options.base_time));
   }
+  if (runner.stats)
+    request_stats (runner.pipeline);
   runner.measure->start ();
 
   if (gst_element_set_state (runner.pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)

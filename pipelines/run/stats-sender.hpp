@@ -8,8 +8,8 @@
 #include <memory>
 #include <string>
 
-/** Sends the elements' `rangecast-stats` messages on, for pipelines/top.sh: a JSON object a line,
- *  or a datagram. Never waits: what the network does not take is lost. */
+/** Sends the elements' `rangecast-stats` messages on, for the page /rig: a JSON object a line, or a
+ *  datagram. Never waits: what the network does not take is lost. */
 class StatsSender {
 public:
   /** @param address  udp://HOST:PORT, or a file, to which lines are appended

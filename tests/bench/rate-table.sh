@@ -23,12 +23,12 @@ run () {
   udp-relay --listen "$port" --to "127.0.0.1:$((port + 1))" --bandwidth "$kbit" >/dev/null 2>&1 &
   relay=$!
   timeout -k 5 $((seconds + 3)) gst-launch-1.0 -v -m rtpbin name=r rtp-profile=avpf latency=0 \
-    udpsrc "port=$((port + 1))" buffer-size=4000000 caps="$caps" ! r.recv_rtp_sink_0 r. ! rtpneighbourcodedepay ! identity silent=false \
-    ! neighbourcodedec ! fakesink sync=false \
+    udpsrc "port=$((port + 1))" buffer-size=4000000 caps="$caps" ! r.recv_rtp_sink_0 r. ! rtpneighbourcodedepay stats-interval=1000 ! identity silent=false \
+    ! neighbourcodedec stats-interval=1000 ! fakesink sync=false \
     r.send_rtcp_src_0 ! udpsink host=127.0.0.1 "port=$((port + 3))" sync=false async=false \
     udpsrc "port=$((port + 2))" ! r.recv_rtcp_sink_0 >"$name-viewer.log" 2>&1 &
   timeout -k 5 "$seconds" gst-launch-1.0 -m rtpbin name=r rtp-profile=avpf avatartestsrc is-live=true range-person-only=true views=2 \
-    ! video/x-range,width=320,height=240,framerate=15/1 ! queue max-size-buffers=2 ! neighbourcodeenc profile=entropy "$@" \
+    ! video/x-range,width=320,height=240,framerate=15/1 ! queue max-size-buffers=2 ! neighbourcodeenc profile=entropy stats-interval=1000 "$@" \
     ! rtpneighbourcodepay ! "$caps" ! r.send_rtp_sink_0 \
     r.send_rtp_src_0 ! udpsink host=127.0.0.1 "port=$port" sync=false async=false \
     r.send_rtcp_src_0 ! udpsink host=127.0.0.1 "port=$((port + 2))" sync=false async=false \

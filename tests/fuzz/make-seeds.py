@@ -145,9 +145,6 @@ PARTNER = {
     "distortion": "[ 0.1, -0.2, 0., 0. ]",
     "partner_from_left": {"rotation": "[ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]", "translation": "[ -0.1, 0., 0. ]"},
 }
-PIXELS = {"rows": "1", "cols": "2", "dt": "\"8f\"", "data": "[ " + ", ".join(["10., 20., 30., 1., 8000., 5., 1., 7990."] * 2) + " ]"}
-# A kind of matrix, padded, and then the same numbers.
-BINARY = b64encode(b"8f".ljust(24) + struct.pack("<16f", *[10, 20, 30, 1, 8000, 5, 1, 7990] * 2)).decode()
 
 
 def yaml_of(node: dict, indent: int = 0) -> str:
@@ -182,40 +179,6 @@ def texts_of(node: dict) -> list[bytes]:
 def rig_file_seeds() -> list[bytes]:
     views = [[VIEW], [{**VIEW, "right": PARTNER, "third": PARTNER}], [VIEW, {**VIEW, "id": "7"}], []]
     return [text for some in views for text in texts_of({"rangecast_rig": "1", "views": some})]
-
-
-def gltf_seeds() -> list[bytes]:
-    """A textured square in bones, with a sparse accessor and a strip, as JSON and as binary glTF."""
-    floats = lambda *values: struct.pack(f"<{len(values)}f", *values)
-    parts = [floats(-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0), floats(0, 1, 1, 1, 1, 0, 0, 0), struct.pack("<6H", 0, 1, 2, 0, 2, 3), bytes(16),
-             floats(*[1, 0, 0, 0] * 4), floats(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1), bytes((2, 3, 0, 0)), b"\x89PNG"]
-    places = [sum(map(len, parts[:i])) for i in range(len(parts))]
-    views = [{"buffer": 0, "byteOffset": at, "byteLength": len(part)} for at, part in zip(places, parts)]
-    shapes = [(5126, "VEC3", 4), (5126, "VEC2", 4), (5123, "SCALAR", 6), (5121, "VEC4", 4), (5126, "VEC4", 4), (5126, "MAT4", 1)]
-    accessors = [{"bufferView": i, "componentType": c, "type": t, "count": n} for i, (c, t, n) in enumerate(shapes)]
-    accessors[1]["sparse"] = {"count": 2, "indices": {"bufferView": 6, "componentType": 5121}, "values": {"bufferView": 1}}
-    accessors[3]["normalized"] = True
-    attributes = {"POSITION": 0, "NORMAL": 0, "TEXCOORD_0": 1, "COLOR_0": 3}
-    skinned = {"attributes": attributes | {"JOINTS_0": 3, "WEIGHTS_0": 4}, "indices": 2, "material": 0}
-    transform = {"KHR_texture_transform": {"offset": [0.5, 0], "rotation": 1, "scale": [2, 1]}}
-    model = {"asset": {"version": "2.0"}, "extensionsRequired": ["KHR_texture_transform"], "scene": 0, "scenes": [{"nodes": [0, 1]}],
-             "nodes": [{"mesh": 0, "skin": 0}, {"children": [2], "rotation": [0, 0, 0.7, 0.7], "scale": [1, 2, 1]}, {"mesh": 1, "translation": [0, 1, 0]}],
-             "meshes": [{"primitives": [skinned]}, {"primitives": [{"attributes": attributes, "mode": 5}, {"attributes": {"POSITION": 0}, "mode": 6}]}],
-             "skins": [{"joints": [1], "inverseBindMatrices": 5}], "samplers": [{"wrapS": 33648}], "textures": [{"source": 0, "sampler": 0}],
-             "images": [{"bufferView": 7}], "materials": [{"alphaMode": "MASK", "doubleSided": True, "pbrMetallicRoughness": {
-                 "baseColorFactor": [1, 0.5, 0, 1], "baseColorTexture": {"index": 0, "extensions": transform}}}],
-             "accessors": accessors, "bufferViews": views, "buffers": [{"byteLength": sum(map(len, parts))}]}
-    binary = b"".join(parts)
-    text = json.dumps(model, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
-    model["buffers"][0]["uri"] = "data:application/octet-stream;base64," + b64encode(binary).decode()
-    return [struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks, json.dumps(model, separators=(",", ":")).encode()]
-
-
-def background_seeds() -> list[bytes]:
-    datas = [PIXELS, {**PIXELS, "data": f'"$base64${BINARY}"'}, {**PIXELS, "data": f"!!binary |\n            {BINARY}"}]
-    return [text for pixels in datas for text in texts_of({"rangecast_background": "2", "views": [{"id": "0", "frames": "3", "pixels": pixels}]})]
 
 
 def range_meta_seeds() -> list[bytes]:
@@ -259,8 +222,8 @@ def main() -> None:
     parser.add_argument("folder", metavar="FOLDER", type=Path)
     to = parser.parse_args().folder
     seeds: dict[str, list[bytes]] = {"slice": too_large_numbers(), "access_unit": [], "rtp_depay": [], "byte_stream": [], "rig": []}
-    seeds |= {"rig_file": rig_file_seeds(), "background": background_seeds(), "range_meta": range_meta_seeds(), "parse": []}
-    seeds |= {"camera_texts": camera_texts_seeds(), "gltf": gltf_seeds()}
+    seeds |= {"rig_file": rig_file_seeds(), "range_meta": range_meta_seeds(), "parse": []}
+    seeds |= {"camera_texts": camera_texts_seeds()}
     for path in STREAMS:
         data = path.read_bytes()
         if path.stem == "damaged" or path.stem.startswith("rules-"):  # some of their sizes are lies
@@ -279,7 +242,7 @@ def main() -> None:
     for target, inputs in seeds.items():
         (to / target).mkdir(parents=True, exist_ok=True)
         for number, seed in enumerate(sorted(set(inputs))):
-            if 0 < len(seed) <= (2 * LARGEST if target == "gltf" else LARGEST):
+            if 0 < len(seed) <= LARGEST:
                 (to / target / f"{number:03}").write_bytes(seed)
 
 

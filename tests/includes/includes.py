@@ -31,7 +31,7 @@ LAYERS = (
     (CORE_FOLDERS, CORE_FOLDERS),
     (RIGFILE_FOLDERS, CORE_FOLDERS + RIGFILE_FOLDERS),
     (OVERLAY_FOLDERS, CORE_FOLDERS + OVERLAY_FOLDERS),
-    (VISION_FOLDERS, CORE_FOLDERS + VISION_FOLDERS),
+    (VISION_FOLDERS, CORE_FOLDERS + RIGFILE_FOLDERS + VISION_FOLDERS),
     (SCENE_FOLDERS, CORE_FOLDERS + VISION_FOLDERS + SCENE_FOLDERS),
     (("lib/rangecast/pch",), ()),
     (("lib/gstrange",), CORE_FOLDERS),
@@ -42,12 +42,12 @@ LAYERS = (
 # Headers of other projects that a folder must do without.
 GSTREAMER = ("gst/", "glib", "gio/", "gobject")
 FOREIGN = (
-    (CORE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "assimp/", "zlib.h", "yaml.h") + GSTREAMER),
-    (OVERLAY_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "assimp/", "zlib.h", "yaml.h") + GSTREAMER),
-    (RIGFILE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "assimp/") + GSTREAMER),
-    (VISION_FOLDERS, ("assimp/",) + GSTREAMER),
+    (CORE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "tiny_gltf.h", "tiny_obj_loader.h", "zlib.h", "yaml.h") + GSTREAMER),
+    (OVERLAY_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "tiny_gltf.h", "tiny_obj_loader.h", "zlib.h", "yaml.h") + GSTREAMER),
+    (RIGFILE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "tiny_gltf.h", "tiny_obj_loader.h") + GSTREAMER),
+    (VISION_FOLDERS, ("tiny_gltf.h", "tiny_obj_loader.h",) + GSTREAMER),
     (SCENE_FOLDERS, ("ceres/",) + GSTREAMER),
-    (("lib/gstrange", "gst/common", "gst/codec", "gst/rtp", "gst/mux", "gst/convert", "gst/render"), ("opencv2/", "ceres/", "assimp/", "arv.h")),
+    (("lib/gstrange", "gst/common", "gst/codec", "gst/rtp", "gst/mux", "gst/convert", "gst/render"), ("opencv2/", "ceres/", "tiny_gltf.h", "tiny_obj_loader.h", "arv.h")),
 )
 
 

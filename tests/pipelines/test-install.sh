@@ -82,11 +82,11 @@ test_plugins_for_streams_need_no_heavy_libraries () {
   local plugin needed
   for plugin in codec/libgstneighbourcode.so rtp/libgstrtpneighbourcode.so mux/libgstrangemux.so; do
     needed=$(ldd "${RANGECAST_BUILD:-$source_dir/build}/gst/$plugin")
-    ! grep -E 'opencv|aravis|ceres|assimp|libGL|libgstgl' <<<"$needed" || fail "$plugin needs them"
+    ! grep -E 'opencv|aravis|ceres|tinygltf|libGL|libgstgl' <<<"$needed" || fail "$plugin needs them"
     grep -q libgstreamer <<<"$needed" || fail "$plugin: $needed"
   done
   needed=$(readelf -d "${RANGECAST_BUILD:-$source_dir/build}/gst/render/libgstrangerender.so") # OpenGL, but nothing of the camera hosts
-  ! grep -E 'opencv|aravis|ceres|assimp' <<<"$needed" || fail "libgstrangerender.so needs them"
+  ! grep -E 'opencv|aravis|ceres|tinygltf' <<<"$needed" || fail "libgstrangerender.so needs them"
 }
 
 # Hides libraries from all plugins, as on a host where their packages are missing.
@@ -103,14 +103,14 @@ without () { # library... -- command...
 test_a_missing_library_costs_only_its_own_elements () {
   unshare -m true 2>/dev/null || skip "no right to make mount namespaces"
   export GST_REGISTRY=$PWD/registry.bin GST_REGISTRY_FORK=no
-  without libopencv_core libaravis-0.8 libassimp -- gst-inspect-1.0 >inspect.txt 2>/dev/null
+  without libopencv_core libaravis-0.8 libtinygltf -- gst-inspect-1.0 >inspect.txt 2>/dev/null
   for element in neighbourcodeenc neighbourcodedec rtpneighbourcodepay rangemux rangesplit cylinderfilter; do
     grep -q " $element: " inspect.txt || fail "no element $element"
   done
   for element in stereodepth stereocamsrc avatartestsrc; do
     ! grep -q " $element: " inspect.txt || fail "$element is there without its library"
   done
-  without libopencv_core libaravis-0.8 libassimp -- gst-launch-1.0 -q filesrc "location=$source_dir/tests/data/default.rcnc" \
+  without libopencv_core libaravis-0.8 libtinygltf -- gst-launch-1.0 -q filesrc "location=$source_dir/tests/data/default.rcnc" \
     ! neighbourcodeparse ! neighbourcodedec ! rangesplit name=s s.depth_0 ! fakesink || fail "cannot decode without OpenCV"
 }
 

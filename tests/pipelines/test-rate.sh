@@ -10,7 +10,7 @@ caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-C
 start_viewer () { # port seconds name caps
   timeout -k 5 "$2" gst-launch-1.0 -m rtpbin name=r rtp-profile=avpf latency=50 \
     udpsrc port=$(($1 + 1)) caps="$4" ! r.recv_rtp_sink_0 \
-    r. ! rtpneighbourcodedepay ! neighbourcodedec ! fakesink sync=false \
+    r. ! rtpneighbourcodedepay stats-interval=1000 ! neighbourcodedec ! fakesink sync=false \
     r.send_rtcp_src_0 ! udpsink host=127.0.0.1 port=$(($1 + 3)) sync=false async=false \
     udpsrc port=$(($1 + 2)) ! r.recv_rtcp_sink_0 >"$3-viewer.log" 2>&1 &
 }

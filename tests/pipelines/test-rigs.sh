@@ -128,7 +128,7 @@ test_messages_begin_with_the_file () {
   echo "cam0=[1 2 3]" >calib.txt
   expect_error "calib.txt: cam0: expected 9 numbers" rig-convert middlebury calib.txt rig.yaml
   echo '{"a": 1}' >calib.json
-  expect_error "calib.json: expected a Luxonis calibration" rig-convert luxonis calib.json rig.yaml
+  expect_error "calib.json: no Luxonis calibration" rig-convert luxonis calib.json rig.yaml
   opencv_pair 3.2
   expect_error "extrinsics.yml: view 0" rig-convert opencv intrinsics.yml extrinsics.yml swapped.yaml --size 640x480
   expect_error "intrinsics.yml: no " rig-convert opencv intrinsics.yml swapped.yaml --size 640x480

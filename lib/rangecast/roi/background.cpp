@@ -5,31 +5,35 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "storage_check.hpp"
+#include "../rigfile/yaml_tree.hpp"
 
 namespace rangecast {
 namespace {
 
-static_assert (sizeof (BackgroundPixel) == 8 * sizeof (float));
+constexpr int kFields = 8;
+static_assert (sizeof (BackgroundPixel) == kFields * sizeof (float));
 
-constexpr int kFileVersion = 2;
-/* A pixel takes 43 bytes in base64, and spaces: enough for about 20 views of 1920x1080. */
-constexpr std::uint64_t kMaxFileBytes = std::uint64_t{2} << 30;
+constexpr int kFileVersion = 3;
+constexpr std::uint64_t kMaxFileBytes = 65536;
+/* A field v is stored as (v + bias) * scale, so that any 16 bits are a value in its range. */
+struct Code {
+  float bias, scale;
+};
+constexpr Code kCodes[kFields] = {
+    {0, 257}, {0, 257}, {0, 257}, {1, 255}, {0, 1}, {0, 16}, {0, 65535}, {0, 1}};
 constexpr std::uint32_t kMaxAdaptMs = 10'000;
 constexpr int kAdaptSteps = 1000; // of 10 ms
 
-/* Files are untrusted; the segmenter requires values within their ranges. */
-bool
-is_sound (const BackgroundPixel &p)
+std::string
+image_path (const std::string &path, int id)
 {
-  const auto within = [] (float v, float low, float high) { return v >= low && v <= high; };
-  return within (p.mean[0], 0, 255) && within (p.mean[1], 0, 255) && within (p.mean[2], 0, 255) &&
-         within (p.spread, -1, 255) && within (p.depth, 0, 65535) &&
-         within (p.depth_spread, 0, 65535) && within (p.depth_share, 0, 1) &&
-         within (p.nearest, 0, 65535);
+  const std::filesystem::path file = path;
+  return (file.parent_path () / (file.stem ().string () + "-" + std::to_string (id) + ".pgm"))
+      .string ();
 }
 
 } // namespace
@@ -210,81 +214,83 @@ Status
 save_backgrounds (
     const std::string &path, const std::vector<std::pair<int, const BackgroundModel *>> &views)
 {
-  try {
-    cv::FileStorage file (path, cv::FileStorage::WRITE | cv::FileStorage::BASE64);
-    if (!file.isOpened ())
-      return {StatusCode::kNotFound, path + ": cannot be opened for writing"};
-    file << "rangecast_background" << kFileVersion;
-    file.startWriteStruct ("views", cv::FileNode::SEQ);
-    for (const auto &[id, model] : views) {
-      const cv::Mat pixels (model->height_, model->width_, CV_32FC (8),
-          const_cast<BackgroundPixel *> (model->pixels_.data ()));
-      file.startWriteStruct ("", cv::FileNode::MAP);
-      file << "id" << id << "frames" << model->frames_ << "pixels" << pixels;
-      file.endWriteStruct ();
+  std::ofstream list (path, std::ios::binary);
+  list << "%YAML:1.0\n---\nrangecast_background: " << kFileVersion << "\nviews:\n";
+  for (const auto &[id, model] : views) {
+    list << "   - { id: " << id << ", frames: " << model->frames_ << " }\n";
+    const std::string name = image_path (path, id);
+    std::ofstream image (name, std::ios::binary);
+    image << "P5\n" << model->width_ << " " << kFields * model->height_ << "\n65535\n";
+    std::string row (2 * model->pixels_.size (), 0);
+    for (std::size_t field = 0; field < kFields; field++) {
+      for (std::size_t i = 0; i < model->pixels_.size (); i++) {
+        const float v = (&model->pixels_[i].mean[0])[field];
+        const auto code = static_cast<unsigned> (std::lround (
+            std::clamp ((v + kCodes[field].bias) * kCodes[field].scale, 0.f, 65535.f)));
+        row[2 * i] = static_cast<char> (code >> 8);
+        row[2 * i + 1] = static_cast<char> (code & 255);
+      }
+      image.write (row.data (), static_cast<std::streamsize> (row.size ()));
     }
-    file.endWriteStruct ();
-    file.release ();
-  } catch (const std::exception &) {
-    return {StatusCode::kBadValue,
-        path + ": cannot be written; expected a name that ends in .yml, .yaml or .json"};
+    if (!image.flush ())
+      return {StatusCode::kNotFound, name + ": cannot be written"};
   }
+  if (!list.flush ())
+    return {StatusCode::kNotFound, path + ": cannot be written"};
   return {};
 }
 
-/* Reads one view. @return false if it does not have the form that save_backgrounds() writes */
-bool
-BackgroundModel::read (const cv::FileNode &node, int &id, BackgroundModel &model)
+/* Nothing is allocated that the file is too short for. */
+Status
+BackgroundModel::read (const std::string &path, int frames)
 {
-  cv::Mat pixels;
-  node["pixels"] >> pixels;
-  if (!node["id"].isInt () || !node["frames"].isInt ())
-    return false;
-  id = static_cast<int> (node["id"]);
-  if (id < 0 || id >= kMaxViews || pixels.type () != CV_32FC (8) || pixels.empty () ||
-      !pixels.isContinuous () || pixels.cols > kMaxImageSide || pixels.rows > kMaxImageSide)
-    return false;
-  const auto first = reinterpret_cast<const BackgroundPixel *> (pixels.data);
-  if (!std::all_of (first, first + pixels.total (), is_sound))
-    return false;
-  model.reset (pixels.cols, pixels.rows);
-  model.pixels_.assign (first, first + pixels.total ());
-  model.frames_ = std::max (1, static_cast<int> (node["frames"]));
-  model.measure_noise ();
-  model.infer_depth ();
-  return true;
+  std::ifstream file (path, std::ios::binary);
+  std::string magic;
+  int width = 0, height = 0, greatest = 0;
+  file >> magic >> width >> height >> greatest;
+  file.get ();
+  std::error_code error;
+  const auto size = std::filesystem::file_size (path, error);
+  if (!file || error || magic != "P5" || greatest != 65535 || width < 1 || width > kMaxImageSide ||
+      height < kFields || height > kFields * kMaxImageSide || height % kFields != 0 ||
+      size < std::uint64_t (width) * std::uint64_t (height) * 2)
+    return {StatusCode::kBadData, path + ": is missing or no 16-bit PGM image of a background"};
+  reset (width, height / kFields);
+  std::string row (2 * pixels_.size (), 0);
+  for (std::size_t field = 0; field < kFields; field++) {
+    if (!file.read (row.data (), static_cast<std::streamsize> (row.size ())))
+      return {StatusCode::kTruncated, path + ": ends too early"};
+    for (std::size_t i = 0; i < pixels_.size (); i++) {
+      const auto byte = [&] (std::size_t k) { return static_cast<std::uint8_t> (row[2 * i + k]); };
+      (&pixels_[i].mean[0])[field] =
+          float (byte (0) << 8 | byte (1)) / kCodes[field].scale - kCodes[field].bias;
+    }
+  }
+  frames_ = std::max (1, frames);
+  measure_noise ();
+  infer_depth ();
+  return {};
 }
 
 Status
 load_backgrounds (const std::string &path, std::vector<std::pair<int, BackgroundModel>> &views)
 {
-  const std::string expected =
-      "expected a background file (rangecast_background " + std::to_string (kFileVersion) + ")";
-  const auto bad = [&] (const std::string &what) {
-    return Status{StatusCode::kBadData, path + ": " + what + "; " + expected};
-  };
-  std::error_code error;
-  if (!std::filesystem::is_regular_file (path, error))
-    return {StatusCode::kNotFound, path + ": no such file; " + expected};
-  if (Status s = check_storage (path, {.max_bytes = kMaxFileBytes, .binary_type = "8f"}); !s.ok ())
-    return {s.code (), s.message () + "; " + expected};
+  YamlNode list;
+  if (Status s = read_yaml (path, kMaxFileBytes, list); !s.ok ())
+    return s;
+  if (list["rangecast_background"].integer () != kFileVersion)
+    return {StatusCode::kBadData, path + ": is no background file of version " +
+                                      std::to_string (kFileVersion) +
+                                      "; save the background again"};
   std::vector<std::pair<int, BackgroundModel>> loaded;
-  try {
-    const cv::FileStorage file (path, cv::FileStorage::READ);
-    const cv::FileNode version = file["rangecast_background"];
-    if (!file.isOpened () || !version.isInt ())
-      return bad ("has no rangecast_background version");
-    if (static_cast<int> (version) != kFileVersion)
-      return bad ("is version " + std::to_string (static_cast<int> (version)));
-    for (const cv::FileNode &node : file["views"]) {
-      int id = 0;
-      BackgroundModel model;
-      if (loaded.size () >= kMaxViews || !BackgroundModel::read (node, id, model))
-        return bad ("views[" + std::to_string (loaded.size ()) + "] is damaged");
-      loaded.emplace_back (id, std::move (model));
-    }
-  } catch (const std::exception &) {
-    return bad ("cannot be read");
+  for (const YamlNode &view : list["views"].items) {
+    const auto id = view["id"].integer (), frames = view["frames"].integer ();
+    if (!id || !frames || *id < 0 || *id >= kMaxViews || loaded.size () >= kMaxViews)
+      return {StatusCode::kBadData,
+          path + ": views[" + std::to_string (loaded.size ()) + "]: needs an id and frames"};
+    BackgroundModel &model = loaded.emplace_back (*id, BackgroundModel ()).second;
+    if (Status s = model.read (image_path (path, *id), *frames); !s.ok ())
+      return s;
   }
   views = std::move (loaded);
   return {};

@@ -8,10 +8,6 @@
 #include "../base/status.hpp"
 #include "../geometry/range_image.hpp"
 
-namespace cv {
-class FileNode;
-}
-
 namespace rangecast {
 
 /** Statistics of one pixel of the empty scene. */
@@ -87,7 +83,7 @@ private:
     float colour_m2 = 0, depth_m2 = 0;
     int colour_n = 0, depth_n = 0;
   };
-  static bool read (const cv::FileNode &node, int &id, BackgroundModel &model);
+  Status read (const std::string &path, int frames);
   void measure_noise ();
   void infer_depth ();
   static void move_towards (BackgroundPixel &pixel, const Rgbx &colour, std::uint16_t depth,
@@ -103,9 +99,9 @@ private:
 };
 
 /** @name The file form
- *  YAML or JSON, optionally with .gz, by file extension, as written by cv::FileStorage: for each
- * view a matrix of width x height x 8 floats, the fields of BackgroundPixel in order. Version 1
- * files, with 7 floats, are refused. Messages start with the path and say what was expected. @{ */
+ *  NAME.yml lists views by id; NAME-<id>.pgm beside it is a 16-bit PGM image of eight planes one
+ *  below the other, the fields of BackgroundPixel in order: colour times 257, its spread plus 1
+ *  times 255, depth, its spread times 16, its share times 65535, nearest depth. @{ */
 Status save_backgrounds (
     const std::string &path, const std::vector<std::pair<int, const BackgroundModel *>> &views);
 Status load_backgrounds (

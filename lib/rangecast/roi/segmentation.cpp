@@ -19,6 +19,12 @@ constexpr double kSight = 0.125;
  */
 constexpr int kGuard = 7;
 
+cv::Mat
+square (int side)
+{
+  return cv::getStructuringElement (cv::MORPH_RECT, cv::Size (side, side));
+}
+
 const Status kFailed = {StatusCode::kNoSpace, "background subtraction: OpenCV failed"};
 
 } // namespace
@@ -62,10 +68,10 @@ Segmenter::find_sides (const SegmentationSettings &settings)
   sides_.setTo (int (Side::kUnknown));
   sides_.setTo (int (Side::kBackground), placed_);
   /* Where the background had no depth, colour decides if it is conclusive. */
-  cv::bitwise_or (seen_, blank_, by_colour_);
-  cv::bitwise_or (by_colour_, other_, by_colour_);
-  cv::bitwise_not (by_colour_, by_colour_);
-  majority_.find (by_colour_, 2, inverse_);
+  cv::bitwise_or (seen_, blank_, inside_);
+  cv::bitwise_or (inside_, other_, inside_);
+  cv::bitwise_not (inside_, inside_);
+  majority_.find (inside_, 2, inverse_);
   sides_.setTo (int (Side::kBackground), inverse_);
   sides_.setTo (int (Side::kForeground), opened_);
   const int reach = std::clamp (int (kSight * sides_.cols), 16, 255);
@@ -73,8 +79,7 @@ Segmenter::find_sides (const SegmentationSettings &settings)
   /* A region that matches the background conclusively is a hole through which it is seen. Stereo
    * finds the depth of wide ones. */
   const int wide = 2 * settings.fringe + 1;
-  cv::morphologyEx (surrounded_, opened_, cv::MORPH_OPEN,
-      cv::getStructuringElement (cv::MORPH_RECT, cv::Size (wide, wide)));
+  cv::morphologyEx (surrounded_, opened_, cv::MORPH_OPEN, square (wide));
   cv::bitwise_and (opened_, seen_, opened_);
   cv::bitwise_or (opened_, blank_, opened_);
   cv::bitwise_not (opened_, inverse_);
@@ -177,7 +182,7 @@ Segmenter::ignore_lighting (int reach)
 {
   const int side = 2 * reach + 1, n = sides_.cols;
   cv::compare (sides_, int (Side::kForeground), opened_, cv::CMP_EQ);
-  cv::dilate (opened_, opened_, cv::getStructuringElement (cv::MORPH_RECT, cv::Size (side, side)));
+  cv::dilate (opened_, opened_, square (side));
   inverse_.create (sides_.size (), CV_8U);
   for_this_cpu ([&] {
     box_counts_.find (
@@ -197,8 +202,8 @@ Segmenter::ignore_lighting (int reach)
   compare_with_mean (inverse_, reach, kEnough, opened_);
   cv::bitwise_and (opened_, lit_, opened_);
   opened_.setTo (0, surrounded_);
-  cv::compare (sides_, int (Side::kForeground), dark_, cv::CMP_EQ);
-  opened_.setTo (0, dark_);
+  cv::compare (sides_, int (Side::kForeground), inverse_, cv::CMP_EQ);
+  opened_.setTo (0, inverse_);
   other_.setTo (0, opened_);
 }
 
@@ -225,15 +230,13 @@ Segmenter::join_cues (const SegmentationSettings &settings)
     cv::bitwise_or (other_, nearer_, mask_);
     return;
   }
-  const int side = settings.fringe | 1; /* an even kernel shifts by half a pixel */
-  if (kernel_.rows != side)
-    kernel_ = cv::getStructuringElement (cv::MORPH_RECT, cv::Size (side, side));
   find_sides (settings);
   ignore_lighting (settings.fringe);
   find_same (settings.fringe);
   cv::bitwise_and (inverse_, nearer_, inverse_);
   cv::bitwise_or (inverse_, same_, inverse_); /* wide where it extends into the object */
-  cv::morphologyEx (inverse_, opened_, cv::MORPH_OPEN, kernel_);
+  cv::morphologyEx (inverse_, opened_, cv::MORPH_OPEN,
+      square (settings.fringe | 1)); /* an even one would shift by half a pixel */
   cv::bitwise_not (same_, inverse_);
   cv::bitwise_and (nearer_, inverse_, mask_); /* nearer, and unlike the background */
   cv::bitwise_or (mask_, other_, mask_);
@@ -270,9 +273,7 @@ Segmenter::remove_small (cv::Mat &mask, int min_area, int keep)
 void
 Segmenter::find_quiet ()
 {
-  if (guard_.empty ())
-    guard_ = cv::getStructuringElement (cv::MORPH_RECT, cv::Size (2 * kGuard + 1, 2 * kGuard + 1));
-  cv::dilate (mask_, opened_, guard_);
+  cv::dilate (mask_, opened_, square (2 * kGuard + 1));
   cv::bitwise_not (opened_, opened_);
   cv::bitwise_and (calm_, opened_, quiet_);
   cv::compare (calm_, kYes, opened_, cv::CMP_EQ);

@@ -95,11 +95,10 @@ private:
   cv::Mat seen_;   /* the background's depth is known, 255 = yes */
   cv::Mat placed_; /* result of comparing depth with the background's, 255 = the same */
   cv::Mat sides_, surrounded_, inside_; /* inside_: surrounded_ without holes */
-  cv::Mat dark_, by_colour_;
-  cv::Mat ratio_, tolerance_; /* brightness relative to the background, and its noise */
-  cv::Mat counts_;            /* CV_16U: see compare_with_mean() */
-  cv::Mat opened_, kernel_, guard_;
-  cv::Mat mask_, inverse_, steps_;
+  cv::Mat ratio_, tolerance_;           /* brightness relative to the background, and its noise */
+  cv::Mat counts_;                      /* CV_16U: see compare_with_mean() */
+  cv::Mat mask_, steps_;
+  cv::Mat opened_, inverse_; /* scratch; after decide(), inverse_ is the background */
   ConnectedComponents components_;
   Majority majority_;
   BoxSums<std::uint16_t> box_counts_;

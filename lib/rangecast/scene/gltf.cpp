@@ -1,19 +1,38 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* After the Khronos Group's glTF 2.0 specification (ISO/IEC 12113:2022); section numbers are its.
  */
-#include "gltf.hpp"
+#include "model_file.hpp"
 
-#ifdef RANGECAST_HAVE_ASSIMP
+#ifdef RANGECAST_HAVE_MODELS
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <map>
+#include <span>
+#include <tiny_gltf.h>
 
-#include "gltf_document.hpp"
 #include "pattern.hpp"
+#include "texture.hpp"
+
+namespace fs = std::filesystem;
 
 namespace rangecast {
 namespace {
+
+constexpr std::size_t kMaxFile = std::size_t{1} << 30;
+constexpr std::size_t kMaxCount = 3 * kMaxModelTriangles, kMaxElements = 256'000'000;
+constexpr std::string_view kMagic = "glTF";
+
+/* Extensions that a file may require and that change nothing we draw, or that we read. */
+constexpr std::string_view kReadExtensions[] = {
+    "KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "KHR_xmp_json_ld"};
+
+using Bytes = std::span<const std::uint8_t>;
+
+/* ---- numbers ---- */
 
 /** A 3 x 4 matrix: rotation and scale, then translation in the last column. */
 struct Affine {
@@ -45,27 +64,27 @@ operator* (const Affine &a, const Affine &b)
 }
 
 /** @param values  4 x 4, column by column */
-template <typename Get>
+template <typename T>
 Affine
-affine_of (const Get &values)
+affine_of (const T *values)
 {
   Affine result;
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 4; j++)
-      result.m[i][j] = values (4 * j + i);
+      result.m[i][j] = double (values[4 * j + i]);
   return result;
 }
 
 Affine
-transform_of (const Json &node)
+transform_of (const tinygltf::Node &node)
 {
-  if (const Json &matrix = node["matrix"]; matrix.size () == 16)
-    return affine_of ([&] (int i) { return matrix[std::size_t (i)].number_or (0); });
-  const auto at = [&] (const char *name, std::size_t i, double otherwise) {
-    return node[name][i].number_or (otherwise);
+  if (node.matrix.size () == 16)
+    return affine_of (node.matrix.data ());
+  const auto at = [] (const std::vector<double> &values, std::size_t i, double otherwise) {
+    return i < values.size () ? values[i] : otherwise;
   };
-  const double x = at ("rotation", 0, 0), y = at ("rotation", 1, 0), z = at ("rotation", 2, 0),
-               w = at ("rotation", 3, 1);
+  const double x = at (node.rotation, 0, 0), y = at (node.rotation, 1, 0),
+               z = at (node.rotation, 2, 0), w = at (node.rotation, 3, 1);
   const double rotation[3][3] = {
       {1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
       {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
@@ -73,8 +92,8 @@ transform_of (const Json &node)
   Affine result;
   for (std::size_t i = 0; i < 3; i++) {
     for (std::size_t j = 0; j < 3; j++)
-      result.m[i][j] = rotation[i][j] * at ("scale", j, 1);
-    result.m[i][3] = at ("translation", i, 0);
+      result.m[i][j] = rotation[i][j] * at (node.scale, j, 1);
+    result.m[i][3] = at (node.translation, i, 0);
   }
   return result;
 }
@@ -86,23 +105,116 @@ displayed (double linear) /* the sRGB transfer function */
   return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow (c, 1 / 2.4) - 0.055;
 }
 
+/* A number in an extension. */
+double
+number_in (const tinygltf::Value &object, const char *name, double otherwise, int index = -1)
+{
+  if (!object.Has (name))
+    return otherwise;
+  const tinygltf::Value &member = object.Get (name);
+  const tinygltf::Value &value = index >= 0 && member.IsArray () ? member.Get (index) : member;
+  return value.IsNumber () ? value.GetNumberAsDouble () : otherwise;
+}
+
+tinygltf::Value
+extension (const tinygltf::ExtensionMap &extensions, const char *name)
+{
+  const auto found = extensions.find (name);
+  return found == extensions.end () ? tinygltf::Value () : found->second;
+}
+
+template <typename T>
+T
+load (const std::uint8_t *from)
+{
+  T value;
+  std::memcpy (&value, from, sizeof value);
+  return value;
+}
+
+float
+component (const std::uint8_t *from, int type, bool normalised)
+{
+  switch (type) {
+    case TINYGLTF_COMPONENT_TYPE_BYTE:
+      return normalised ? std::max (float (load<std::int8_t> (from)) / 127, -1.f)
+                        : float (load<std::int8_t> (from));
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return float (*from) / (normalised ? 255.f : 1.f);
+    case TINYGLTF_COMPONENT_TYPE_SHORT:
+      return normalised ? std::max (float (load<std::int16_t> (from)) / 32767, -1.f)
+                        : float (load<std::int16_t> (from));
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return float (load<std::uint16_t> (from)) / (normalised ? 65535.f : 1.f);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+      return float (load<std::uint32_t> (from));
+    default:
+      return load<float> (from);
+  }
+}
+
+/* ---- files ---- */
+
+/* tinygltf copies extras by recursion and makes an object of each value: what nests too deep would
+ * overflow the stack, and commas alone fill the memory. */
+Status
+check_json (std::string_view text)
+{
+  constexpr int kMaxDepth = 64, kMaxValues = 4'000'000;
+  int depth = 0, values = 1;
+  bool quoted = false;
+  for (std::size_t i = 0; i < text.size (); i++) {
+    const char c = text[i];
+    if (c == '"')
+      quoted = !quoted;
+    else if (quoted)
+      i += c == '\\';
+    else if (c == '[' || c == '{')
+      depth++, values++;
+    else if (c == ']' || c == '}')
+      depth--;
+    else if (c == ',')
+      values++;
+    if (depth > kMaxDepth || values > kMaxValues)
+      return {StatusCode::kUnsupported, "more than 4 million JSON values, or 64 levels of them"};
+  }
+  return {};
+}
+
+/* tinygltf would open directories and devices, too. */
+bool
+read_beside (std::vector<unsigned char> *bytes, std::string *error, const std::string &path, void *)
+{
+  const Status status = read_file (path, kMaxFile, "a file that a glTF model names", *bytes);
+  *error += status.message ();
+  return status.ok () && !bytes->empty ();
+}
+
+/* Pictures stay compressed: the texture's reader checks their size. The data of one in a buffer
+ * view is not read here, for nothing has checked where it lies. */
+bool
+keep_picture (tinygltf::Image *image, int, std::string *, std::string *, int, int,
+    const unsigned char *bytes, int size, void *)
+{
+  if (image->bufferView < 0)
+    image->image.assign (bytes, bytes + size);
+  return true;
+}
+
 /** For each joint, world from the mesh's space as the joint would move it. */
 using Skin = std::vector<Affine>;
 
-/** Whether a primitive follows the skin's joints; else its node's transform places it. */
-bool
-follows (const Json &attributes, const Skin &skin)
-{
-  return !skin.empty () && !attributes["JOINTS_0"].is_null ();
-}
+/** The elements of an accessor. */
+struct Values {
+  std::vector<float> numbers; ///< `components` for each element
+  std::size_t count = 0;
+  int components = 0;
+};
 
 /** Functions that return bool leave the reason in status_ when it is false. */
-class Reader : GltfDocument {
+class Reader {
 public:
-  Reader (std::string path, Model &model)
-      : GltfDocument (std::move (path), model.storage), model_ (model)
-  {
-  }
+  Reader (std::string path, Model &model) : path_ (std::move (path)), model_ (model) {}
 
   Status run ()
   {
@@ -112,47 +224,158 @@ public:
   }
 
 private:
+  using Primitive = tinygltf::Primitive;
+
+  bool fail (StatusCode code, const std::string &what)
+  {
+    status_ = {code, path_ + ": " + what};
+    return false;
+  }
+  bool fail_extension (const std::string &name)
+  {
+    return fail (StatusCode::kUnsupported,
+        "needs the glTF extension " + name + ", which is not supported; export it without");
+  }
+
+  bool load_document ();
+  bool view_bytes (int view, Bytes &bytes);
+  bool read (int accessor, Values &values);
   bool read_nodes ();
   bool read_pictures ();
-  bool read_texture (const Json &info, ModelMaterial &material);
+  bool read_texture (const tinygltf::TextureInfo &info, ModelMaterial &material);
   bool read_materials ();
   bool read_scene ();
-  bool read_node_mesh (int node);
+  bool read_node_mesh (std::size_t node);
   bool read_skin (int index);
-  bool read_primitive (const Json &primitive, const Affine &world, const Skin &skin);
-  bool read_vertices (
-      const Json &attributes, int coordinates, const Affine &world, const Skin &skin, Mesh &mesh);
-  bool read_weights (const Json &attributes, const Affine &world, const Skin &skin,
+  bool read_primitive (const Primitive &primitive, const Affine &world, const Skin &skin);
+  bool read_vertices (const Primitive &primitive, int coordinates, const Affine &world,
+      const Skin &skin, Mesh &mesh);
+  bool read_weights (const Primitive &primitive, const Affine &world, const Skin &skin,
       std::size_t vertices, std::vector<Affine> &pose);
-  bool read_triangles (const Json &primitive, bool mirrored, Mesh &mesh);
+  bool read_triangles (const Primitive &primitive, bool mirrored, Mesh &mesh);
 
+  const std::string path_;
+  Status status_;
+  tinygltf::Model file_;
   Model &model_;
+  std::size_t elements_ = 0;  ///< that accessors have given
   std::vector<Affine> world_; ///< of each node that a root reaches
   std::vector<bool> reached_;
   std::map<int, Skin> skins_; ///< that nodes have used
   std::size_t vertices_ = 0, triangles_ = 0;
 };
 
+bool
+Reader::load_document ()
+{
+  std::vector<std::uint8_t> bytes;
+  if (status_ = read_file (path_, kMaxFile, "a model (glTF or OBJ)", bytes); !status_.ok ())
+    return false;
+  const auto size = unsigned (bytes.size ());
+  bytes.resize (bytes.size () + 8); /* tinygltf 2.7 ignores a chunk's header when it checks ends */
+  const auto *text = reinterpret_cast<const char *> (bytes.data ());
+  const bool binary = std::string_view (text, size).starts_with (kMagic);
+  const std::size_t begin = binary ? 20 : 0, length = binary && size >= begin
+                                                          ? load<std::uint32_t> (bytes.data () + 12)
+                                                          : size;
+  if (begin > size || length > size - begin)
+    return fail (StatusCode::kTruncated, "ends before its JSON does");
+  if (const Status checked = check_json ({text + begin, length}); !checked.ok ())
+    return fail (checked.code (), checked.message ());
+
+  tinygltf::TinyGLTF reader;
+  reader.SetImageLoader (keep_picture, nullptr);
+  reader.SetFsCallbacks ({tinygltf::FileExists, tinygltf::ExpandFilePath, read_beside,
+      tinygltf::WriteWholeFile, nullptr});
+  const std::string folder = fs::absolute (fs::path (path_)).parent_path ().string ();
+  std::string error, warning;
+  const bool loaded =
+      binary ? reader.LoadBinaryFromMemory (&file_, &error, &warning, bytes.data (), size, folder)
+             : reader.LoadASCIIFromString (&file_, &error, &warning, text, size, folder);
+  if (!loaded) {
+    std::ranges::replace (error, '\n', ' ');
+    return fail (StatusCode::kBadData, "cannot be read as glTF 2.0: " + error.substr (0, 200));
+  }
+  for (const std::string &name : file_.extensionsRequired)
+    if (!name.starts_with ("KHR_materials_") && !std::ranges::count (kReadExtensions, name))
+      return fail_extension (name);
+  return true;
+}
+
+bool
+Reader::view_bytes (int index, Bytes &bytes)
+{
+  const std::string name = "buffer view " + std::to_string (index);
+  if (index < 0 || std::size_t (index) >= file_.bufferViews.size ())
+    return fail (StatusCode::kBadData, name + " is missing");
+  const tinygltf::BufferView &view = file_.bufferViews[std::size_t (index)];
+  if (view.buffer < 0 || std::size_t (view.buffer) >= file_.buffers.size ())
+    return fail (StatusCode::kBadData, name + " has no buffer");
+  const Bytes buffer = file_.buffers[std::size_t (view.buffer)].data;
+  if (view.byteOffset > buffer.size () || view.byteLength > buffer.size () - view.byteOffset)
+    return fail (StatusCode::kBadData, name + " reaches beyond its buffer");
+  bytes = buffer.subspan (view.byteOffset, view.byteLength);
+  return true;
+}
+
+bool
+Reader::read (int index, Values &values)
+{
+  const std::string name = "accessor " + std::to_string (index);
+  if (index < 0 || std::size_t (index) >= file_.accessors.size ())
+    return fail (StatusCode::kBadData, name + " is missing");
+  const tinygltf::Accessor &from = file_.accessors[std::size_t (index)];
+  if (from.sparse.isSparse || from.bufferView < 0)
+    return fail (StatusCode::kUnsupported,
+        name + " has no plain data: export without compression and sparse accessors");
+  Bytes bytes;
+  if (!view_bytes (from.bufferView, bytes))
+    return false;
+  values.count = from.count;
+  values.components = tinygltf::GetNumComponentsInType (std::uint32_t (from.type));
+  if (elements_ += std::min (values.count, kMaxElements); elements_ > kMaxElements)
+    return fail (StatusCode::kUnsupported, "accessors of more than 256 million elements");
+  if (from.componentType == TINYGLTF_COMPONENT_TYPE_INT ||
+      from.componentType == TINYGLTF_COMPONENT_TYPE_DOUBLE || values.components <= 0 ||
+      values.count > kMaxCount)
+    return fail (StatusCode::kBadData, name + " is of an unknown type or size");
+  const auto size =
+      std::size_t (tinygltf::GetComponentSizeInBytes (std::uint32_t (from.componentType)));
+  const auto n = std::size_t (values.components);
+  const std::size_t given = file_.bufferViews[std::size_t (from.bufferView)].byteStride,
+                    stride = given ? given : n * size; /* at most 252: tinygltf refuses more */
+  const bool fits = stride >= n * size && from.byteOffset <= bytes.size () &&
+                    (values.count == 0 ||
+                        (values.count - 1) * stride + n * size <= bytes.size () - from.byteOffset);
+  if (!fits)
+    return fail (StatusCode::kBadData, name + " reaches beyond its buffer view");
+  values.numbers.resize (values.count * n);
+  float *to = values.numbers.data ();
+  for (std::size_t i = 0; i < values.count; i++)
+    for (std::size_t c = 0; c < n; c++)
+      *to++ = component (bytes.data () + from.byteOffset + i * stride + c * size,
+          from.componentType, from.normalized);
+  return true;
+}
+
 /* World transforms; each node must have at most one parent (5.25), which also rules out cycles
  * among those that a root reaches. */
 bool
 Reader::read_nodes ()
 {
-  const Json &nodes = root_["nodes"];
-  const std::size_t n = nodes.size ();
-  std::vector<bool> child (n, false);
-  for (const Json &node : nodes.items)
-    for (const Json &index : node["children"].items) {
-      const auto i = std::size_t (index.index ());
-      if (i >= n || child[i])
+  const auto &nodes = file_.nodes;
+  std::vector<bool> child (nodes.size (), false);
+  for (const auto &node : nodes)
+    for (const int i : node.children) {
+      if (i < 0 || std::size_t (i) >= nodes.size () || child[std::size_t (i)])
         return fail (StatusCode::kBadData,
-            "a node's child is missing or has two parents; expected a tree of nodes");
-      child[i] = true;
+            "a node's child is missing or has two parents: nodes must be a tree");
+      child[std::size_t (i)] = true;
     }
-  world_.resize (n);
-  reached_.assign (n, false);
+  world_.resize (nodes.size ());
+  reached_.assign (nodes.size (), false);
   std::vector<std::size_t> open;
-  for (std::size_t i = 0; i < n; i++)
+  for (std::size_t i = 0; i < nodes.size (); i++)
     if (!child[i]) {
       open.push_back (i);
       world_[i] = transform_of (nodes[i]);
@@ -161,10 +384,9 @@ Reader::read_nodes ()
     const std::size_t parent = open.back ();
     open.pop_back ();
     reached_[parent] = true;
-    for (const Json &index : nodes[parent]["children"].items) {
-      const auto i = std::size_t (index.index ());
-      world_[i] = world_[parent] * transform_of (nodes[i]);
-      open.push_back (i);
+    for (const int i : nodes[parent].children) {
+      world_[std::size_t (i)] = world_[parent] * transform_of (nodes[std::size_t (i)]);
+      open.push_back (std::size_t (i));
     }
   }
   return true;
@@ -173,82 +395,71 @@ Reader::read_nodes ()
 bool
 Reader::read_pictures ()
 {
-  const Json &images = root_["images"];
-  for (std::size_t i = 0; i < images.size (); i++) {
-    ModelPicture picture;
-    picture.name = path_ + ": picture " + std::to_string (i);
-    picture.embedded = true;
-    const Json &uri = images[i]["uri"];
-    if (uri.is_null ()) {
-      if (!view_bytes (images[i]["bufferView"].index (), picture.bytes))
-        return false;
-    } else if (uri.text.starts_with ("data:")) {
-      if (!load_uri (uri.text, "a picture of a glTF model", picture.bytes))
-        return false;
-    } else {
-      picture.embedded = false;
-      picture.name = path_beside (uri.text);
-    }
+  for (auto &image : file_.images) {
+    ModelPicture picture{path_ + ": picture " + std::to_string (model_.pictures.size ()), {}};
+    Bytes bytes;
+    if (image.bufferView >= 0 && !view_bytes (image.bufferView, bytes))
+      return false;
+    if (image.bufferView >= 0)
+      picture.bytes.assign (bytes.begin (), bytes.end ());
+    else if (!image.image.empty ())
+      picture.bytes = std::move (image.image);
+    else
+      picture.name = (fs::path (path_).parent_path () / image.uri).string ();
     model_.pictures.push_back (std::move (picture));
   }
   return true;
 }
 
 bool
-Reader::read_texture (const Json &info, ModelMaterial &material)
+Reader::read_texture (const tinygltf::TextureInfo &info, ModelMaterial &material)
 {
-  const Json &texture = root_["textures"][std::size_t (info["index"].index ())];
-  const int source = texture["source"].index ();
-  if (source < 0 && !texture["extensions"].names.empty ())
-    return fail_extension (texture["extensions"].names[0]);
-  if (source < 0 || std::size_t (source) >= model_.pictures.size ())
+  if (std::size_t (info.index) >= file_.textures.size ())
+    return fail (StatusCode::kBadData, "a material names a texture that is missing");
+  const tinygltf::Texture &texture = file_.textures[std::size_t (info.index)];
+  if (texture.source < 0 && !texture.extensions.empty ())
+    return fail_extension (texture.extensions.begin ()->first);
+  if (texture.source < 0 || std::size_t (texture.source) >= model_.pictures.size ())
     return fail (StatusCode::kBadData, "a material's texture has no picture");
-  material.picture = source;
-  const Json &change = info["extensions"]["KHR_texture_transform"];
-  material.coordinates = std::max (
-      0, change["texCoord"].is_null () ? info["texCoord"].index () : change["texCoord"].index ());
-  const double angle = change["rotation"].number_or (0),
-               x = change["scale"][std::size_t{0}].number_or (1),
-               y = change["scale"][1].number_or (1), c = std::cos (angle), s = std::sin (angle);
-  material.transform = {c * x, s * y, change["offset"][std::size_t{0}].number_or (0), -s * x, c * y,
-      change["offset"][1].number_or (0)};
-  const auto wrap = [&] (const char *axis) {
-    const int mode = root_["samplers"][std::size_t (texture["sampler"].index ())][axis].index ();
-    return mode == 33071   ? TextureWrap::kClamp
-           : mode == 33648 ? TextureWrap::kMirror
-                           : TextureWrap::kRepeat;
+  material.picture = texture.source;
+  const tinygltf::Value change = extension (info.extensions, "KHR_texture_transform");
+  material.coordinates = int (std::clamp (number_in (change, "texCoord", info.texCoord), 0., 9.));
+  const double angle = number_in (change, "rotation", 0), x = number_in (change, "scale", 1, 0),
+               y = number_in (change, "scale", 1, 1), c = std::cos (angle), s = std::sin (angle);
+  material.transform = {c * x, s * y, number_in (change, "offset", 0, 0), -s * x, c * y,
+      number_in (change, "offset", 0, 1)};
+  if (texture.sampler < 0 || std::size_t (texture.sampler) >= file_.samplers.size ())
+    return true;
+  const auto wrap = [] (int mode) {
+    return mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? TextureWrap::kClamp
+           : mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? TextureWrap::kMirror
+                                                           : TextureWrap::kRepeat;
   };
-  material.wrap_u = wrap ("wrapS");
-  material.wrap_v = wrap ("wrapT");
+  const tinygltf::Sampler &sampler = file_.samplers[std::size_t (texture.sampler)];
+  material.wrap_u = wrap (sampler.wrapS);
+  material.wrap_v = wrap (sampler.wrapT);
   return true;
 }
 
 bool
 Reader::read_materials ()
 {
-  for (const Json &from : root_["materials"].items) {
-    const Json &extensions = from["extensions"];
-    const Json &old = extensions["KHR_materials_pbrSpecularGlossiness"];
-    const bool use_old =
-        from["pbrMetallicRoughness"]["baseColorTexture"].is_null () && !old.is_null ();
-    const Json &base = use_old ? old : from["pbrMetallicRoughness"];
-    const Json &texture = base[use_old ? "diffuseTexture" : "baseColorTexture"];
-    const Json &factor = base[use_old ? "diffuseFactor" : "baseColorFactor"];
+  for (const auto &from : file_.materials) {
+    const auto &base = from.pbrMetallicRoughness;
     ModelMaterial material;
-    if (!texture.is_null () && !read_texture (texture, material))
+    if (base.baseColorTexture.index >= 0 && !read_texture (base.baseColorTexture, material))
       return false;
-    for (std::size_t i = 0; i < 4; i++) {
-      const double value = std::clamp (factor[i].number_or (1), 0.0, 1.0);
+    for (std::size_t i = 0; i < std::min<std::size_t> (4, base.baseColorFactor.size ()); i++) {
+      const double value = std::clamp (base.baseColorFactor[i], 0.0, 1.0);
       material.factor[i] = i < 3 ? displayed (value) : value;
     }
-    material.has_colour = material.picture >= 0 || !factor.is_null ();
-    const std::string &mode = from["alphaMode"].text;
-    material.masked = mode == "MASK" || mode == "BLEND";
-    if (mode == "MASK")
-      material.alpha_cutoff = std::clamp (from["alphaCutoff"].number_or (0.5), 0.0, 1.0);
-    material.double_sided = from["doubleSided"].number != 0;
-    material.visible =
-        extensions["KHR_materials_transmission"]["transmissionFactor"].number_or (0) <= 0.5;
+    material.has_colour = material.picture >= 0 || from.values.contains ("baseColorFactor");
+    material.masked = from.alphaMode == "MASK" || from.alphaMode == "BLEND";
+    if (from.alphaMode == "MASK")
+      material.alpha_cutoff = std::clamp (from.alphaCutoff, 0.0, 1.0);
+    material.double_sided = from.doubleSided;
+    material.visible = number_in (extension (from.extensions, "KHR_materials_transmission"),
+                           "transmissionFactor", 0) <= 0.5;
     model_.palette.push_back (material);
   }
   return true;
@@ -258,44 +469,40 @@ Reader::read_materials ()
 bool
 Reader::read_scene ()
 {
-  const std::size_t n = root_["nodes"].size ();
-  const Json &scene = root_["scenes"][std::size_t (std::max (0, root_["scene"].index ()))];
-  std::vector<std::size_t> open;
-  if (scene.is_null ())
-    for (std::size_t i = 0; i < n; i++)
-      open.push_back (i);
-  std::vector<bool> drawn (n, false);
-  for (const Json &index : scene["nodes"].items)
-    open.push_back (std::size_t (index.index ()));
+  const auto scene = std::size_t (std::max (0, file_.defaultScene));
+  std::vector<int> open;
+  for (std::size_t i = 0; i < file_.nodes.size () && scene >= file_.scenes.size (); i++)
+    open.push_back (int (i));
+  if (scene < file_.scenes.size ())
+    open = file_.scenes[scene].nodes;
+  std::vector<bool> drawn (file_.nodes.size (), false);
   while (!open.empty ()) {
-    const std::size_t i = open.back ();
+    const auto i = std::size_t (open.back ());
     open.pop_back ();
-    if (i >= n || !reached_[i])
+    if (i >= drawn.size () || !reached_[i])
       return fail (StatusCode::kBadData, "a scene names a node that is missing or has no root");
-    if (drawn[i])
-      continue;
+    if (!drawn[i])
+      open.insert (open.end (), file_.nodes[i].children.begin (), file_.nodes[i].children.end ());
     drawn[i] = true;
-    for (const Json &index : root_["nodes"][i]["children"].items)
-      open.push_back (std::size_t (index.index ()));
   }
-  for (std::size_t i = 0; i < n; i++)
-    if (drawn[i] && !read_node_mesh (int (i)))
+  for (std::size_t i = 0; i < drawn.size (); i++)
+    if (drawn[i] && !read_node_mesh (i))
       return false;
   return true;
 }
 
 bool
-Reader::read_node_mesh (int node)
+Reader::read_node_mesh (std::size_t index)
 {
-  const Json &from = root_["nodes"][std::size_t (node)];
-  const int index = from["mesh"].index ();
-  if (index < 0)
+  const tinygltf::Node &node = file_.nodes[index];
+  if (node.mesh < 0)
     return true;
-  const int skin = from["skin"].index ();
-  if (skin >= 0 && !skins_.contains (skin) && !read_skin (skin))
+  if (std::size_t (node.mesh) >= file_.meshes.size ())
+    return fail (StatusCode::kBadData, "a node names a mesh that is missing");
+  if (node.skin >= 0 && !skins_.contains (node.skin) && !read_skin (node.skin))
     return false;
-  for (const Json &primitive : root_["meshes"][std::size_t (index)]["primitives"].items)
-    if (!read_primitive (primitive, world_[std::size_t (node)], skins_[skin]))
+  for (const Primitive &primitive : file_.meshes[std::size_t (node.mesh)].primitives)
+    if (!read_primitive (primitive, world_[index], skins_[node.skin]))
       return false;
   return true;
 }
@@ -304,47 +511,50 @@ bool
 Reader::read_skin (int index)
 {
   Skin &skin = skins_[index];
-  const Json &from = root_["skins"][std::size_t (index)];
-  const Json &joints = from["joints"];
+  if (std::size_t (index) >= file_.skins.size ())
+    return fail (StatusCode::kBadData, "a node names a skin that is missing");
+  const tinygltf::Skin &from = file_.skins[std::size_t (index)];
   Values inverse; /* absent: identities (5.28.1) */
-  if (!from["inverseBindMatrices"].is_null ()) {
-    if (!read (from["inverseBindMatrices"].index (), inverse))
+  if (from.inverseBindMatrices >= 0) {
+    if (!read (from.inverseBindMatrices, inverse))
       return false;
-    if (inverse.components != 16 || inverse.count < joints.size ())
+    if (inverse.components != 16 || inverse.count < from.joints.size ())
       return fail (StatusCode::kBadData, "a skin has fewer matrices than joints");
   }
-  for (std::size_t i = 0; i < joints.size (); i++) {
-    const auto node = std::size_t (joints[i].index ());
+  for (std::size_t i = 0; i < from.joints.size (); i++) {
+    const auto node = std::size_t (from.joints[i]);
     if (node >= world_.size ())
       return fail (StatusCode::kBadData, "a skin names a node that is missing");
-    const Affine bind = inverse.count == 0 ? Affine{} : affine_of ([&] (int k) {
-      return double (inverse.numbers[16 * i + std::size_t (k)]);
-    });
-    skin.push_back (world_[node] * bind);
+    skin.push_back (inverse.count == 0
+                        ? world_[node]
+                        : world_[node] * affine_of (inverse.numbers.data () + 16 * i));
   }
   return true;
 }
 
+/** Whether a primitive follows the skin's joints; else its node's transform places it. */
 bool
-Reader::read_primitive (const Json &primitive, const Affine &world, const Skin &skin)
+follows (const tinygltf::Primitive &primitive, const Skin &skin)
 {
-  const int mode = primitive["mode"].is_null () ? 4 : primitive["mode"].index ();
-  if (mode < 4 || mode > 6) /* points and lines have no surface */
-    return true;
-  const Json &position =
-      root_["accessors"][std::size_t (primitive["attributes"]["POSITION"].index ())];
-  for (const std::string &name : primitive["extensions"].names)
-    if (position["bufferView"].is_null () && name.find ("compression") != std::string::npos)
-      return fail_extension (name);
-  const int material = primitive["material"].index ();
-  if (material >= int (model_.palette.size ()))
+  return !skin.empty () && primitive.attributes.contains ("JOINTS_0") &&
+         primitive.attributes.contains ("WEIGHTS_0");
+}
+
+bool
+Reader::read_primitive (const Primitive &primitive, const Affine &world, const Skin &skin)
+{
+  if (primitive.mode == TINYGLTF_MODE_TRIANGLE_STRIP ||
+      primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN)
+    return fail (StatusCode::kUnsupported, "has strips or fans; export triangles");
+  if (primitive.mode >= 0 && primitive.mode != TINYGLTF_MODE_TRIANGLES)
+    return true; /* points and lines have no surface */
+  if (primitive.material >= int (model_.palette.size ()))
     return fail (StatusCode::kBadData, "a mesh names a material that is missing");
-  if (position["count"].size_or (0) > kMaxModelVertices)
-    return fail (StatusCode::kUnsupported, "more than 4 million vertices");
+  const int material = std::max (primitive.material, -1);
   const int coordinates = material < 0 ? 0 : model_.palette[std::size_t (material)].coordinates;
-  const bool mirrored = !follows (primitive["attributes"], skin) && world.determinant () < 0;
+  const bool mirrored = !follows (primitive, skin) && world.determinant () < 0;
   Mesh mesh;
-  if (!read_vertices (primitive["attributes"], coordinates, world, skin, mesh) ||
+  if (!read_vertices (primitive, coordinates, world, skin, mesh) ||
       !read_triangles (primitive, mirrored, mesh))
     return false;
   drop_unused_vertices (mesh);
@@ -357,76 +567,71 @@ Reader::read_primitive (const Json &primitive, const Affine &world, const Skin &
   return true;
 }
 
-/* One transform a vertex if there is a skin: its joints' mean. */
+/* One transform a vertex if there is a skin: the mean of its four joints'. */
 bool
-Reader::read_weights (const Json &attributes, const Affine &world, const Skin &skin,
+Reader::read_weights (const Primitive &primitive, const Affine &world, const Skin &skin,
     std::size_t vertices, std::vector<Affine> &pose)
 {
-  if (!follows (attributes, skin))
+  if (!follows (primitive, skin))
     return true;
-  Affine none;
-  for (auto &row : none.m)
-    std::fill (std::begin (row), std::end (row), 0.0);
-  pose.assign (vertices, none);
-  std::vector<double> sums (vertices);
-  for (const char *set : {"0", "1"}) {
-    const std::string joints_name = std::string ("JOINTS_") + set,
-                      weights_name = std::string ("WEIGHTS_") + set;
-    if (attributes[joints_name].is_null () || attributes[weights_name].is_null ())
-      continue;
-    Values joints, weights;
-    if (!read (attributes[joints_name].index (), joints) ||
-        !read (attributes[weights_name].index (), weights))
-      return false;
-    if (joints.count != vertices || weights.count != vertices || joints.components != 4 ||
-        weights.components != 4)
-      return fail (StatusCode::kBadData, "joints or weights do not fit the vertices");
-    for (std::size_t i = 0; i < 4 * vertices; i++) {
-      const double weight = weights.numbers[i];
+  Values joints, weights;
+  if (!read (primitive.attributes.at ("JOINTS_0"), joints) ||
+      !read (primitive.attributes.at ("WEIGHTS_0"), weights))
+    return false;
+  if (joints.count != vertices || weights.count != vertices || joints.components != 4 ||
+      weights.components != 4)
+    return fail (StatusCode::kBadData, "joints or weights do not fit the vertices");
+  for (std::size_t i = 0; i < vertices; i++) {
+    Affine mean{};
+    for (auto &row : mean.m)
+      std::fill (std::begin (row), std::end (row), 0.0);
+    double sum = 0;
+    for (std::size_t j = 4 * i; j < 4 * i + 4; j++) {
+      const double weight = double (weights.numbers[j]);
       if (!(weight > 0 && std::isfinite (weight)))
         continue;
-      if (!(joints.numbers[i] >= 0 && joints.numbers[i] < float (skin.size ())))
+      if (!(joints.numbers[j] >= 0 && joints.numbers[j] < float (skin.size ())))
         return fail (StatusCode::kBadData, "a vertex follows a joint that is missing");
-      const Affine &joint = skin[std::size_t (joints.numbers[i])];
+      const Affine &joint = skin[std::size_t (joints.numbers[j])];
       for (int k = 0; k < 12; k++)
-        pose[i / 4].m[k / 4][k % 4] += weight * joint.m[k / 4][k % 4];
-      sums[i / 4] += weight;
+        mean.m[k / 4][k % 4] += weight * joint.m[k / 4][k % 4];
+      sum += weight;
     }
-  }
-  for (std::size_t i = 0; i < vertices; i++) {
-    if (!(sums[i] > 0)) {
-      pose[i] = world;
-      continue;
-    }
-    for (auto &row : pose[i].m)
+    for (auto &row : mean.m)
       for (double &value : row)
-        value /= sums[i];
+        value /= sum;
+    pose.push_back (sum > 0 ? mean : world);
   }
   return true;
 }
 
 bool
 Reader::read_vertices (
-    const Json &attributes, int coordinates, const Affine &world, const Skin &skin, Mesh &mesh)
+    const Primitive &primitive, int coordinates, const Affine &world, const Skin &skin, Mesh &mesh)
 {
+  const auto &attributes = primitive.attributes;
   Values positions, normals, places, colours;
   const auto optional = [&] (const std::string &name, Values &values) {
-    if (attributes[name].is_null ())
+    const auto found = attributes.find (name);
+    if (found == attributes.end ())
       return true;
-    if (!read (attributes[name].index (), values))
+    if (!read (found->second, values))
       return false;
     if (values.count != positions.count || values.components < 2)
       return fail (StatusCode::kBadData, name + " does not fit the vertices");
     return true;
   };
-  if (!read (attributes["POSITION"].index (), positions))
+  if (const auto found = attributes.find ("POSITION");
+      !read (found == attributes.end () ? -1 : found->second, positions))
     return false;
+  if (positions.count > kMaxModelVertices)
+    return fail (StatusCode::kUnsupported, "more than 4 million vertices");
   if (positions.components != 3)
     return fail (StatusCode::kBadData, "POSITION is not of type VEC3");
   std::vector<Affine> pose;
   if (!optional ("NORMAL", normals) || !optional ("COLOR_0", colours) ||
       !optional ("TEXCOORD_" + std::to_string (coordinates), places) ||
-      !read_weights (attributes, world, skin, positions.count, pose))
+      !read_weights (primitive, world, skin, positions.count, pose))
     return false;
   for (std::size_t i = 0; i < positions.count; i++) {
     const Affine &to = pose.empty () ? world : pose[i];
@@ -464,39 +669,40 @@ Reader::read_vertices (
 }
 
 bool
-Reader::read_triangles (const Json &primitive, bool mirrored, Mesh &mesh)
+Reader::read_triangles (const Primitive &primitive, bool mirrored, Mesh &mesh)
 {
   Values indices;
   indices.components = 1;
-  if (primitive["indices"].is_null ()) {
+  if (primitive.indices < 0) {
     indices.count = mesh.vertices.size ();
     for (std::size_t i = 0; i < indices.count; i++)
       indices.numbers.push_back (float (i));
-  } else if (!read (primitive["indices"].index (), indices)) {
+  } else if (!read (primitive.indices, indices)) {
     return false;
   }
   if (indices.components != 1 || !std::ranges::all_of (indices.numbers, [&] (float i) {
         return i >= 0 && i < float (mesh.vertices.size ());
       }))
     return fail (StatusCode::kBadData, "an index names a vertex that is missing");
-  const int mode = primitive["mode"].is_null () ? 4 : primitive["mode"].index ();
-  const auto add = [&] (std::size_t a, std::size_t b, std::size_t c) {
-    const auto at = [&] (std::size_t i) { return std::uint32_t (indices.numbers[i]); };
-    if (mirrored)
-      std::swap (b, c);
-    mesh.triangles.push_back ({at (a), at (b), at (c)});
-  };
-  for (std::size_t i = 0; i + 2 < indices.count; i += mode == 4 ? 3 : 1)
-    if (mode == 6)
-      add (0, i + 1, i + 2);
-    else if (mode == 5 && i % 2)
-      add (i, i + 2, i + 1);
-    else
-      add (i, i + 1, i + 2);
+  for (std::size_t i = 0; i + 2 < indices.count; i += 3) {
+    const auto at = [&] (std::size_t k) { return std::uint32_t (indices.numbers[i + k]); };
+    mesh.triangles.push_back ({at (0), at (mirrored ? 2 : 1), at (mirrored ? 1 : 2)});
+  }
   return true;
 }
 
 } // namespace
+
+bool
+is_gltf (const std::string &path)
+{
+  std::string ending = fs::path (path).extension ().string ();
+  std::ranges::transform (
+      ending, ending.begin (), [] (unsigned char c) { return std::tolower (c); });
+  char magic[4] = {};
+  std::ifstream (path, std::ios::binary).read (magic, sizeof magic);
+  return ending == ".gltf" || ending == ".glb" || std::string_view (magic, 4) == kMagic;
+}
 
 Status
 read_gltf (const std::string &path, Model &model)

@@ -1,12 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "model.hpp"
 
-#ifdef RANGECAST_HAVE_ASSIMP
+#ifdef RANGECAST_HAVE_MODELS
 
 #include <algorithm>
-#include <assimp/Importer.hpp>
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
 #include <cctype>
 #include <cmath>
 #include <filesystem>
@@ -15,7 +12,7 @@
 #include <tuple>
 #include <utility>
 
-#include "gltf.hpp"
+#include "model_file.hpp"
 #include "pattern.hpp"
 #include "texture.hpp"
 
@@ -50,130 +47,6 @@ is_drawable (const Mesh &mesh)
          std::ranges::all_of (mesh.triangles, triangle_ok);
 }
 
-/* ---- what assimp reads ---- */
-
-Rgbx
-byte_colour (const aiColor4D &c)
-{
-  const auto byte = [] (float value) { return to_byte (255 * std::clamp (value, 0.f, 1.f)); };
-  return {byte (c.r), byte (c.g), byte (c.b), 255};
-}
-
-Mesh
-mesh_of (const aiMesh &from)
-{
-  Mesh mesh;
-  for (unsigned i = 0; i < from.mNumVertices; i++) {
-    const aiVector3D &p = from.mVertices[i];
-    MeshVertex vertex{p.x, p.y, p.z, 0, 0, 0, 0, 0, 0};
-    if (from.HasNormals ()) {
-      const aiVector3D &n = from.mNormals[i];
-      vertex.nx = n.x, vertex.ny = n.y, vertex.nz = n.z;
-    }
-    if (from.HasTextureCoords (0)) {
-      vertex.u = from.mTextureCoords[0][i].x;
-      vertex.v = 1 - from.mTextureCoords[0][i].y; /* assimp counts from the picture's bottom */
-    }
-    mesh.vertices.push_back (vertex);
-    if (from.HasVertexColors (0))
-      mesh.colours.push_back (byte_colour (from.mColors[0][i]));
-  }
-  for (unsigned i = 0; i < from.mNumFaces; i++) {
-    const aiFace &face = from.mFaces[i];
-    if (face.mNumIndices == 3) /* points and lines have no surface */
-      mesh.triangles.push_back ({face.mIndices[0], face.mIndices[1], face.mIndices[2]});
-  }
-  return mesh;
-}
-
-/* A picture inside the model's own file: compressed, or plain BGRA, for which there is no name. */
-void
-add_picture (const aiScene &scene, const std::string &model, const char *name, Model &to)
-{
-  ModelPicture picture;
-  if (const aiTexture *embedded = scene.GetEmbeddedTexture (name)) {
-    picture.name = model + " (its texture)";
-    picture.embedded = true;
-    const auto *bytes = reinterpret_cast<const std::uint8_t *> (embedded->pcData);
-    if (embedded->mHeight == 0)
-      picture.bytes = to.storage.emplace_back (bytes, bytes + embedded->mWidth);
-  } else {
-    std::string text = name;
-    std::ranges::replace (text, '\\', '/'); /* as programs on Windows write it */
-    const fs::path folder = fs::path (model).parent_path (), path = text;
-    /* Some exporters write where the picture was on their own machine. */
-    std::error_code error;
-    const bool there = fs::exists (folder / path, error);
-    const bool beside = fs::exists (folder / path.filename (), error);
-    picture.name = (folder / (!there && beside ? path.filename () : path)).string ();
-  }
-  to.pictures.push_back (std::move (picture));
-}
-
-ModelMaterial
-material_of (const aiScene &scene, const std::string &model, const aiMaterial &from, Model &to)
-{
-  ModelMaterial material;
-  material.double_sided = true; /* OBJ has no flag for it, and leaves sheets open */
-  aiString name;
-  aiTextureMapMode modes[2] = {aiTextureMapMode_Wrap, aiTextureMapMode_Wrap};
-  for (aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE})
-    if (material.picture < 0 &&
-        from.GetTexture (type, 0, &name, nullptr, nullptr, nullptr, nullptr, modes) == AI_SUCCESS) {
-      material.picture = int (to.pictures.size ());
-      add_picture (scene, model, name.C_Str (), to);
-    }
-  const auto wrap = [] (aiTextureMapMode mode) {
-    return mode == aiTextureMapMode_Clamp    ? TextureWrap::kClamp
-           : mode == aiTextureMapMode_Mirror ? TextureWrap::kMirror
-                                             : TextureWrap::kRepeat;
-  };
-  material.wrap_u = wrap (modes[0]);
-  material.wrap_v = wrap (modes[1]);
-  /* A picture that is both colour and opacity has its own alpha. */
-  aiString opacity;
-  material.masked = from.GetTexture (aiTextureType_OPACITY, 0, &opacity) == AI_SUCCESS &&
-                    material.picture >= 0 && opacity == name;
-  aiColor4D colour;
-  const bool unnamed = from.GetName () == aiString (AI_DEFAULT_MATERIAL_NAME);
-  if (material.picture < 0 && !unnamed && /* exporters leave any colour beside a picture */
-      from.Get (AI_MATKEY_COLOR_DIFFUSE, colour) == AI_SUCCESS) {
-    material.factor = {colour.r, colour.g, colour.b, 1};
-    material.has_colour = true;
-  }
-  material.has_colour |= material.picture >= 0;
-  float visible = 1;
-  from.Get (AI_MATKEY_OPACITY, visible);
-  material.visible = visible >= 0.5f;
-  return material;
-}
-
-Status
-read_with_assimp (const std::string &path, Model &model)
-{
-  Assimp::Importer importer;
-  const aiScene *scene =
-      importer.ReadFile (path, aiProcess_Triangulate | aiProcess_JoinIdenticalVertices |
-                                   aiProcess_PreTransformVertices | aiProcess_SortByPType);
-  if (!scene)
-    return {StatusCode::kBadData, path + ": cannot be read as a model; expected glTF or OBJ"};
-  std::size_t vertices = 0, triangles = 0;
-  for (unsigned i = 0; i < scene->mNumMeshes; i++) {
-    const aiMesh &mesh = *scene->mMeshes[i];
-    vertices += mesh.mNumVertices;
-    triangles += mesh.mNumFaces;
-    if (vertices > kMaxModelVertices || triangles > kMaxModelTriangles)
-      return {
-          StatusCode::kUnsupported, path + ": more than 4 million vertices or 8 million triangles"};
-    model.meshes.push_back (mesh_of (mesh));
-    model.materials.push_back (
-        mesh.mMaterialIndex < scene->mNumMaterials ? int (mesh.mMaterialIndex) : -1);
-  }
-  for (unsigned i = 0; i < scene->mNumMaterials; i++)
-    model.palette.push_back (material_of (*scene, path, *scene->mMaterials[i], model));
-  return {};
-}
-
 /* ---- textures ---- */
 
 std::string
@@ -205,13 +78,6 @@ colour_map_beside (const std::string &model)
   return found;
 }
 
-void
-turn_texture (Mesh &mesh)
-{
-  for (MeshVertex &vertex : mesh.vertices)
-    vertex.v = 1 - vertex.v;
-}
-
 /** Gives meshes their textures; a texture that several materials share is decoded once. */
 class Texturer {
 public:
@@ -227,7 +93,7 @@ public:
     const std::size_t n = model.pictures.size ();
     max_side_ = n <= 16 ? 2048 : n <= 64 ? 1024 : n <= 256 ? 512 : 256;
     const std::set<int> materials (model.materials.begin (), model.materials.end ());
-    if (settings.texture.empty () && !any_picture && materials.size () <= 1)
+    if (!any_picture && materials.size () <= 1)
       beside_ = colour_map_beside (settings.path);
   }
 
@@ -236,24 +102,19 @@ public:
     const ModelMaterial plain,
         &m = material < 0 ? plain : model_.palette[static_cast<std::size_t> (material)];
     mesh.double_sided = m.double_sided;
-    Status status;
-    if (!settings_.texture.empty ()) {
-      status = from_file (settings_.texture, mesh);
-    } else if (!beside_.empty ()) {
+    if (!beside_.empty ()) {
       /* A colour map that lies beside a glTF file which does not name it was usually made for the
        * scan's first format, where v counts from the bottom; exporters copy v unchanged. */
-      if (is_gltf (settings_.path))
-        turn_texture (mesh);
-      status = from_file (beside_, mesh);
-    } else if (m.picture >= 0) {
-      status = from_material (m, mesh);
-    } else if (any_colour_) {
+      for (MeshVertex &vertex : mesh.vertices)
+        vertex.v = is_gltf (settings_.path) ? 1 - vertex.v : vertex.v;
+      return from_file (beside_, mesh);
+    }
+    if (m.picture >= 0)
+      return from_material (m, mesh);
+    if (any_colour_)
       mesh.texture = Mesh::plain_texture ({to_byte (255 * m.factor[0]), to_byte (255 * m.factor[1]),
           to_byte (255 * m.factor[2]), 255});
-    }
-    if (settings_.texture_flip)
-      turn_texture (mesh);
-    return status;
+    return {};
   }
 
 private:
@@ -278,7 +139,7 @@ private:
           static_cast<std::uint8_t> (std::clamp (std::lround (255 * m.alpha_cutoff), 0l, 255l));
     auto &texture = made_[{m.picture, m.factor, settings.alpha_cutoff}];
     if (!texture) {
-      const Status s = picture.embedded
+      const Status s = !picture.bytes.empty ()
                            ? decode_texture (picture.bytes, picture.name, settings, texture)
                            : read_texture (picture.name, settings, texture);
       if (!s.ok ())
@@ -375,9 +236,9 @@ make_figure (const ModelSettings &settings, Model &model, Figure &figure)
     if (Status s = texturer.dress (material, mesh); !s.ok ())
       return s;
     if (!is_drawable (mesh))
-      return {StatusCode::kBadData, settings.path + ": a position, texture coordinate or index is "
-                                                    "out of range; expected finite positions below "
-                                                    "1e9 and texture coordinates below 1e4"};
+      return {
+          StatusCode::kBadData, settings.path + ": a position is not below 1e9, a texture "
+                                                "coordinate not below 1e4, or an index is missing"};
     if (mesh.double_sided)
       drop_second_sides (mesh);
     if (!has_normals (mesh))
@@ -397,17 +258,17 @@ load_model (const ModelSettings &settings, Figure &figure)
   const std::string &path = settings.path;
   std::error_code error;
   if (!fs::is_regular_file (path, error))
-    return {StatusCode::kNotFound, path + ": no such file; expected a model (glTF or OBJ)"};
+    return {StatusCode::kNotFound, path + ": no such model file (glTF or OBJ)"};
   Figure loaded;
   try {
     Model model;
-    Status status = is_gltf (path) ? read_gltf (path, model) : read_with_assimp (path, model);
+    Status status = is_gltf (path) ? read_gltf (path, model) : read_obj (path, model);
     if (status.ok ())
       status = make_figure (settings, model, loaded);
     if (!status.ok ())
       return status;
-  } catch (const std::exception &) { /* assimp, and allocations */
-    return {StatusCode::kBadData, path + ": cannot be read as a model; expected glTF or OBJ"};
+  } catch (const std::exception &) { /* of the readers, and of allocations */
+    return {StatusCode::kBadData, path + ": cannot be read as a model (glTF or OBJ)"};
   }
   if (!fit_figure (loaded, settings.top_m))
     return {StatusCode::kBadValue,
@@ -426,7 +287,7 @@ Status
 load_model (const ModelSettings &settings, Figure &)
 {
   return {StatusCode::kUnsupported,
-      settings.path + ": this build reads no models (built without assimp); expected no location"};
+      settings.path + ": built without models (option avatar-models); unset location"};
 }
 
 } // namespace rangecast

@@ -9,17 +9,15 @@
 namespace rangecast {
 
 struct ModelSettings {
-  std::string path;    ///< glTF (.glb, .gltf), OBJ or whatever else assimp reads
-  std::string texture; ///< JPEG or PNG for all meshes; empty: what each material names, else a
-                       ///< picture beside a model of one material whose name says that it is a
-                       ///< colour map, else plain skin
-  bool texture_flip = false;    ///< turn textures upside down
+  std::string path;             ///< glTF (.glb, .gltf) or OBJ
   double top_m = kTopAutomatic; ///< see fit_figure()
 };
 
-/** Loads a textured figure, and scales and centres it as fit_figure() says.
+/** Loads a textured figure, and scales and centres it as fit_figure() says. Where no material names
+ *  a picture, one beside a model of one material is its texture if its name says that it is a
+ *  colour map.
  *  @return kNotFound, kBadData or kUnsupported naming the file; kUnsupported in a build without
- *          assimp */
+ *          models */
 Status load_model (const ModelSettings &settings, Figure &figure);
 
 } // namespace rangecast

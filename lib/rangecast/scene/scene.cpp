@@ -167,8 +167,6 @@ check (const SceneSettings &s)
   if (s.model_top_m != kTopAutomatic && s.model_top_m != kTopAll &&
       !(s.model_top_m >= 0.1 && s.model_top_m <= kPersonHeight))
     return bad_setting ("model-top", "-1, 0, or 0.1 to 1.8 metres");
-  if (s.model.empty () && !s.texture.empty ())
-    return bad_setting ("texture", "a model (property location)");
   return check_room (s);
 }
 
@@ -377,9 +375,8 @@ Scene::create (const SceneSettings &settings, std::unique_ptr<Scene> &scene)
     for (int i = 0; i < settings.persons; i++)
       impl.figures.push_back (
           make_figure (settings.seed + static_cast<std::uint32_t> (i), settings.dress));
-  else if (Status status = load_model (
-               {settings.model, settings.texture, settings.texture_flip, settings.model_top_m},
-               impl.figures.emplace_back ());
+  else if (Status status =
+               load_model ({settings.model, settings.model_top_m}, impl.figures.emplace_back ());
            !status.ok ())
     return status;
   impl.noise.fill (settings.noise_sigma, settings.seed);

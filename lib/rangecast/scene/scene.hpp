@@ -33,11 +33,9 @@ struct SceneSettings {
   double motion = 1;       ///< of the figure: 0 = still, 1 = as of a person who talks, up to 2
   std::uint32_t seed = 1;  ///< of all patterns and of the noise
   std::string model;       ///< glTF or OBJ file; empty: the built-in figure
-  std::string texture;     ///< picture for the model; empty: what the model names, or one beside it
-  bool texture_flip = false; ///< turn the model's texture upside down
-  double model_top_m = -1;   ///< of a model of 1.8 m, kept from the crown down, 0.1 .. 1.8; 0: all
-                             ///< of it, 0.5 m large; -1: 0.5 m of a standing person, else all
-  unsigned dress = 0;        ///< what the built-in figure wears, DressFlags
+  double model_top_m = -1; ///< of a model of 1.8 m, kept from the crown down, 0.1 .. 1.8; 0: all
+                           ///< of it, 0.5 m large; -1: 0.5 m of a standing person, else all
+  unsigned dress = 0;      ///< what the built-in figure wears, DressFlags
 
   int persons = 1;    ///< figures, 1 .. kMaxPersons; the others stand 0.4 m behind, left and right
   double far_m = 1.3; ///< farthest depth, 1 .. 6; from 3.5 on it reaches the room's walls

@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "texture.hpp"
 
-#ifdef RANGECAST_HAVE_ASSIMP
+#ifdef RANGECAST_HAVE_MODELS
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -55,38 +54,12 @@ jpeg_size (Bytes b)
   return {};
 }
 
-/* PNM: "P6", width, height as text, with comments between. */
-Size
-pnm_size (Bytes b)
-{
-  std::int64_t sizes[2] = {};
-  std::size_t at = 2;
-  for (std::int64_t &size : sizes) {
-    while (at < b.size () && (std::isspace (b[at]) || b[at] == '#'))
-      if (b[at++] == '#')
-        while (at < b.size () && b[at] != '\n')
-          at++;
-    while (at < b.size () && std::isdigit (b[at]) && size <= kMaxSide)
-      size = 10 * size + (b[at++] - '0');
-  }
-  return {sizes[0], sizes[1]};
-}
-
 Size
 picture_size (Bytes b)
 {
-  if (b.size () < 26)
-    return b.size () > 2 && b[0] == 'P' ? pnm_size (b) : Size{};
-  if (std::memcmp (b.data (), "\x89PNG\r\n\x1a\n", 8) == 0)
+  if (b.size () > 24 && std::memcmp (b.data (), "\x89PNG\r\n\x1a\n", 8) == 0)
     return {big_endian (b, 16, 4), big_endian (b, 20, 4)};
-  if (b[0] == 0xff && b[1] == 0xd8)
-    return jpeg_size (b);
-  if (b[0] == 'B' && b[1] == 'M') {
-    std::int32_t sides[2]; /* little-endian; a negative height is a picture from the top */
-    std::memcpy (sides, b.data () + 18, sizeof sides);
-    return {sides[0], std::abs (std::int64_t (sides[1]))};
-  }
-  return b[0] == 'P' && b[1] >= '1' && b[1] <= '6' ? pnm_size (b) : Size{};
+  return b.size () > 2 && b[0] == 0xff && b[1] == 0xd8 ? jpeg_size (b) : Size{};
 }
 
 /* Any depth and number of channels to BGRA of 8 bits. */
@@ -143,14 +116,15 @@ decode_texture (Bytes bytes, const std::string &name, const TextureSettings &set
     std::shared_ptr<const MipMap> &texture)
 {
   const Status bad = {
-      StatusCode::kBadData, name + ": cannot be read as a picture; expected JPEG or PNG"};
+      StatusCode::kBadData, name + ": is no image that can be read; convert it to JPEG or PNG"};
   const Size size = picture_size (bytes);
   if (size.width <= 0 || size.height <= 0)
     return bad;
   if (size.width > kMaxSide || size.height > kMaxSide || size.width * size.height > kMaxPixels)
-    return {StatusCode::kUnsupported, name + ": a picture of " + std::to_string (size.width) + "x" +
-                                          std::to_string (size.height) +
-                                          " pixels; expected at most 64 million, 16384 a side"};
+    return {
+        StatusCode::kUnsupported, name + ": a picture of " + std::to_string (size.width) + "x" +
+                                      std::to_string (size.height) +
+                                      " pixels; at most 64 million and 16384 a side are supported"};
   try {
     const cv::Mat data (
         1, static_cast<int> (bytes.size ()), CV_8U, const_cast<std::uint8_t *> (bytes.data ()));
@@ -182,10 +156,10 @@ read_file (
   const auto size = fs::is_regular_file (path, error) ? fs::file_size (path, error) : 0;
   std::ifstream file (path, std::ios::binary);
   if (error || !fs::is_regular_file (path, error) || !file)
-    return {StatusCode::kNotFound, path + ": no such file; expected " + what};
+    return {StatusCode::kNotFound, path + ": no such file: " + what};
   if (size > limit)
     return {StatusCode::kUnsupported,
-        path + ": larger than " + std::to_string (limit >> 20) + " MiB; expected " + what};
+        path + ": larger than " + std::to_string (limit >> 20) + " MiB: " + what};
   bytes.resize (size);
   file.read (reinterpret_cast<char *> (bytes.data ()), static_cast<std::streamsize> (size));
   bytes.resize (static_cast<std::size_t> (file.gcount ()));

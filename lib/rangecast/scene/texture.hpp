@@ -18,7 +18,7 @@ struct TextureSettings {
   std::uint8_t alpha_cutoff = 0;   ///< see Mesh; 0: alpha is ignored
 };
 
-/** Decodes JPEG, PNG, BMP or PNM. The size in the picture's header is checked before anything of
+/** Decodes JPEG or PNG. The size in the picture's header is checked before anything of
  *  that size is allocated.
  *  @param name  of the picture, for the error
  *  @return kBadData or kUnsupported naming the picture */

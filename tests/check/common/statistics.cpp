@@ -378,7 +378,6 @@ GST_START_TEST (test_latency_is_from_capture_to_now_on_the_elements_clock)
   const auto all = enc.end ();
   fail_unless_equals_int64 (all[0].time ("latency-p50"), 30 * GST_MSECOND);
   fail_unless_equals_int64 (all[0].time ("latency-p99"), 50 * GST_MSECOND);
-  fail_unless_equals_int64 (all[0].time ("latency-max"), 50 * GST_MSECOND);
 }
 GST_END_TEST;
 
@@ -411,7 +410,7 @@ GST_END_TEST;
 GST_START_TEST (test_nothing_is_posted_when_off_or_paused)
 {
   const Rig rig = ring_rig (1, 64, 48);
-  Watched off ("neighbourcodeenc stats-interval=0", range_caps (rig));
+  Watched off ("neighbourcodeenc", range_caps (rig));
   Watched paused ("neighbourcodeenc stats-interval=5", range_caps (rig));
   Watched on ("neighbourcodeenc stats-interval=20", range_caps (rig));
   gst_element_set_state (paused.h->element, GST_STATE_PAUSED);
@@ -428,7 +427,7 @@ GST_END_TEST;
 GST_START_TEST (test_can_be_switched_while_playing)
 {
   const Rig rig = ring_rig (1, 64, 48);
-  Watched enc ("neighbourcodeenc stats-interval=0", range_caps (rig));
+  Watched enc ("neighbourcodeenc", range_caps (rig));
   g_object_set (enc.h->element, "stats-interval", 10u, nullptr);
   enc.wait ();
   enc.wait ();
@@ -471,6 +470,11 @@ GST_START_TEST (test_counters_start_over_with_each_start)
       nullptr);
   fail_unless (pipeline != nullptr);
   GstElement *source = gst_bin_get_by_name (GST_BIN (pipeline), "source");
+  for (const char *name : {"roi", "enc", "pay", "depay", "dec", "filter", "mux"}) {
+    GstElement *element = gst_bin_get_by_name (GST_BIN (pipeline), name);
+    g_object_set (element, "stats-interval", 3600000u, nullptr);
+    gst_object_unref (element);
+  }
   for (const guint64 expected : {3, 2}) {
     g_object_set (source, "num-buffers", int (expected), nullptr);
     gst_element_set_state (pipeline, GST_STATE_PLAYING);
@@ -597,7 +601,7 @@ GST_START_TEST (test_all_elements_have_the_property)
     fail_unless (element != nullptr, "%s", name);
     guint interval = 0;
     g_object_get (element, "stats-interval", &interval, nullptr);
-    fail_unless_equals_int (interval, 1000);
+    fail_unless_equals_int (interval, 0);
     g_object_set (element, "stats-interval", 250u, nullptr);
     g_object_get (element, "stats-interval", &interval, nullptr);
     fail_unless_equals_int (interval, 250);

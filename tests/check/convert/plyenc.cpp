@@ -15,12 +15,6 @@
 #include <type_traits>
 #include <vector>
 
-#ifdef RANGECAST_HAVE_ASSIMP
-#include <assimp/scene.h>
-
-#include <assimp/Importer.hpp>
-#endif
-
 using namespace rangecast;
 using namespace rangecast::testing;
 
@@ -628,36 +622,6 @@ GST_START_TEST (test_memory_that_ends_anywhere_is_one_error)
 }
 GST_END_TEST;
 
-#ifdef RANGECAST_HAVE_ASSIMP
-GST_START_TEST (test_assimp_reads_points_colours_and_normals)
-{
-  const Rig rig = ring_rig (2);
-  GstHarness *h = ply_harness (rig);
-  g_object_set (h->element, "normals", TRUE, "view-id", TRUE, nullptr);
-  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig));
-  const Ply ply = parse_ply (output, true, true);
-  GstMapInfo map;
-  fail_unless (gst_buffer_map (output, &map, GST_MAP_READ));
-  Assimp::Importer importer;
-  const aiScene *scene = importer.ReadFileFromMemory (map.data, map.size, 0, "ply");
-  gst_buffer_unmap (output, &map);
-  fail_unless (scene && scene->mNumMeshes == 1, "%s", importer.GetErrorString ());
-  const aiMesh &mesh = *scene->mMeshes[0];
-  fail_unless_equals_int (mesh.mNumVertices, ply.points);
-  fail_unless (mesh.HasNormals () && mesh.HasVertexColors (0));
-  unsigned wrong = 0;
-  for (unsigned i = 0; i < mesh.mNumVertices; i++)
-    for (unsigned k = 0; k < 3; k++)
-      wrong += mesh.mVertices[i][k] != ply.xyz[3 * i + k] ||
-               mesh.mNormals[i][k] != ply.normals[3 * i + k] ||
-               std::abs (mesh.mColors[0][i][k] * 255 - ply.rgb[3 * i + k]) > 0.01;
-  fail_unless_equals_int (wrong, 0);
-  gst_buffer_unref (output);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-#endif
-
 static Suite *
 plyenc_suite ()
 {
@@ -683,9 +647,6 @@ plyenc_suite ()
   tcase_add_test (tc, test_format_is_the_one_that_downstream_names);
   tcase_add_test (tc, test_format_set_while_playing_waits_for_ready);
   tcase_add_test (tc, test_memory_that_ends_anywhere_is_one_error);
-#ifdef RANGECAST_HAVE_ASSIMP
-  tcase_add_test (tc, test_assimp_reads_points_colours_and_normals);
-#endif
   return suite;
 }
 

@@ -236,15 +236,6 @@ take_bytes (GstBuffer *buffer)
   return bytes;
 }
 
-GST_START_TEST (test_same_seed_and_capture_time_give_the_same_picture)
-{
-  const std::string picture = take_bytes (nth_picture (4, 10, 7));
-  fail_unless (take_bytes (nth_picture (2, 5, 7)) == picture, "0.4 s, whatever came before");
-  fail_if (take_bytes (nth_picture (2, 5, 8)) == picture, "another seed");
-  fail_if (take_bytes (nth_picture (1, 5, 7)) == picture, "another time");
-}
-GST_END_TEST;
-
 GST_START_TEST (test_loop_goes_forwards_and_backwards_through_the_first_pictures)
 {
   GstHarness *h =
@@ -413,71 +404,6 @@ GST_START_TEST (test_range_pool_of_downstream_is_used_and_others_are_not)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_downstreams_alignment_is_kept_to)
-{
-  for (const char *pad : {"src", "left"}) {
-    GstHarness *h = gst_harness_new_with_padnames ("avatartestsrc", nullptr, pad);
-    GstAllocationParams params;
-    gst_allocation_params_init (&params);
-    params.align = 4095;
-    gst_harness_set_propose_allocator (h, nullptr, &params);
-    g_object_set (h->element, "num-buffers", 1, nullptr);
-    gst_harness_set_sink_caps_str (h, "video/x-raw,format=RGBx; video/x-range");
-    gst_harness_play (h);
-    GstBuffer *buffer = gst_harness_pull (h);
-    GstMemory *memory = gst_buffer_peek_memory (buffer, 0);
-    GstMapInfo map;
-    fail_unless (gst_memory_map (memory, &map, GST_MAP_READ));
-    fail_unless_equals_int (GPOINTER_TO_SIZE (map.data) % 4096, 0);
-    gst_memory_unmap (memory, &map);
-    gst_buffer_unref (buffer);
-    gst_harness_teardown (h);
-  }
-}
-GST_END_TEST;
-
-/* A pool that takes no settings at all. */
-typedef struct {
-  GstVideoBufferPool parent;
-} StubbornPool;
-typedef struct {
-  GstVideoBufferPoolClass parent;
-} StubbornPoolClass;
-static GType stubborn_pool_get_type ();
-G_DEFINE_TYPE (StubbornPool, stubborn_pool, GST_TYPE_VIDEO_BUFFER_POOL)
-
-static gboolean
-refuse_config (GstBufferPool *, GstStructure *)
-{
-  return FALSE;
-}
-
-static void
-stubborn_pool_init (StubbornPool *)
-{
-}
-
-static void
-stubborn_pool_class_init (StubbornPoolClass *klass)
-{
-  GST_BUFFER_POOL_CLASS (klass)->set_config = refuse_config;
-}
-
-GST_START_TEST (test_downstreams_pool_that_refuses_is_replaced)
-{
-  auto pool = GST_BUFFER_POOL (g_object_new (stubborn_pool_get_type (), nullptr));
-  gst_object_ref_sink (pool);
-  GstHarness *h = harness_with_pool ("left", "video/x-raw,format=RGBx", pool);
-  GstBuffer *buffer = gst_harness_pull (h);
-  fail_unless (buffer);
-  fail_unless (buffer->pool);
-  ck_assert_ptr_ne (buffer->pool, pool);
-  gst_buffer_unref (buffer);
-  gst_harness_teardown (h);
-  gst_object_unref (pool);
-}
-GST_END_TEST;
-
 /* ---- other ways to go wrong ---- */
 
 GST_START_TEST (test_file_that_is_no_model_is_one_error_that_names_it)
@@ -515,26 +441,6 @@ GST_START_TEST (test_dress_is_set_by_the_names_of_its_pieces)
   g_object_get (source, "dress", &pieces, nullptr);
   fail_unless_equals_int (pieces, kDressAll);
   gst_object_unref (source);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_dressed_figure_is_another_picture)
-{
-  std::string pictures[2];
-  for (guint dressed : {0, 1}) {
-    GstHarness *h = source_harness ("left", "video/x-raw,format=RGBx,width=64,height=48");
-    g_object_set (h->element, "num-buffers", 1, "dress", dressed ? kDressAll : 0u, nullptr);
-    gst_harness_play (h);
-    pictures[dressed] = take_bytes (gst_harness_pull (h));
-    gst_harness_teardown (h);
-  }
-  fail_unless_cmp (pictures[0], !=, pictures[1]);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_model_top_that_is_no_length_is_named)
-{
-  fail_unless_contains (run ("avatartestsrc model-top=0.05 ! fakesink"), "model-top");
 }
 GST_END_TEST;
 
@@ -576,25 +482,6 @@ GST_START_TEST (test_capsfilters_change_changes_all_pads_at_one_frame)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_second_run_begins_as_the_first)
-{
-  GstHarness *h = source_harness ("left", "video/x-raw,format=RGBx,width=64,height=48");
-  std::string first;
-  for (int run = 0; run < 2; run++) {
-    gst_harness_play (h);
-    GstBuffer *buffer = gst_harness_pull (h);
-    fail_unless_equals_uint64 (GST_BUFFER_PTS (buffer), 0);
-    if (run == 1)
-      fail_unless_cmp (bytes_of (buffer), ==, first);
-    first = take_bytes (buffer);
-    gst_element_set_state (h->element, GST_STATE_NULL);
-    while (GstBuffer *rest = gst_harness_try_pull (h))
-      gst_buffer_unref (rest);
-  }
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
 static Suite *
 avatartestsrc_suite ()
 {
@@ -611,21 +498,15 @@ avatartestsrc_suite ()
   tcase_add_test (tc, test_live_frames_lie_on_multiples_of_the_frame_period);
   tcase_add_test (tc, test_rig_is_exported_with_the_size_of_the_caps);
   tcase_add_test (tc, test_caps_change_mid_stream_changes_the_size);
-  tcase_add_test (tc, test_same_seed_and_capture_time_give_the_same_picture);
   tcase_add_test (tc, test_loop_goes_forwards_and_backwards_through_the_first_pictures);
   tcase_add_test (tc, test_loop_is_drawn_again_for_another_size_and_rate);
   tcase_add_test (tc, test_loop_that_needs_too_much_memory_is_an_error_that_names_it);
   tcase_add_test (tc, test_each_camera_pad_gives_its_own_cameras_picture);
   tcase_add_test (tc, test_padded_strides_of_downstreams_pool_are_kept_to);
   tcase_add_test (tc, test_range_pool_of_downstream_is_used_and_others_are_not);
-  tcase_add_test (tc, test_downstreams_alignment_is_kept_to);
-  tcase_add_test (tc, test_downstreams_pool_that_refuses_is_replaced);
   tcase_add_test (tc, test_file_that_is_no_model_is_one_error_that_names_it);
   tcase_add_test (tc, test_dress_is_set_by_the_names_of_its_pieces);
-  tcase_add_test (tc, test_dressed_figure_is_another_picture);
-  tcase_add_test (tc, test_model_top_that_is_no_length_is_named);
   tcase_add_test (tc, test_capsfilters_change_changes_all_pads_at_one_frame);
-  tcase_add_test (tc, test_second_run_begins_as_the_first);
   return suite;
 }
 

@@ -63,7 +63,7 @@ inline constexpr Rgbx kRed{200, 0, 0, 255}, kGreen{0, 200, 0, 255}, kBlue{0, 0, 
 inline Status
 load (const std::string &path, Figure &figure, double top_m = kTopAll)
 {
-  return load_model ({path, "", false, top_m}, figure);
+  return load_model ({path, top_m}, figure);
 }
 
 inline Status

@@ -2,7 +2,7 @@
 /* How much of a model is shown and how large; models in Wavefront OBJ. */
 #include "../test-support.hpp"
 
-#ifdef RANGECAST_HAVE_ASSIMP
+#ifdef RANGECAST_HAVE_MODELS
 
 #include "model-support.hpp"
 
@@ -151,7 +151,7 @@ TEST (Model, test_dressed_head_has_ten_meshes_in_their_own_colours)
 
 TEST (Model, test_models)
 {
-  GTEST_SKIP () << "built without assimp";
+  GTEST_SKIP () << "built without models";
 }
 
 #endif

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -12,11 +11,10 @@
 
 namespace rangecast {
 
-/** A picture of a model: a file, or bytes inside the model's own file. */
+/** An image of a model, JPEG or PNG. */
 struct ModelPicture {
-  std::string name;                    ///< path, or what an error calls it
-  std::span<const std::uint8_t> bytes; ///< of an embedded one, inside the model's storage
-  bool embedded = false;
+  std::string name;                ///< path, or what an error calls it
+  std::vector<std::uint8_t> bytes; ///< of an embedded one; empty: read the file `name`
 };
 
 struct ModelMaterial {
@@ -32,27 +30,27 @@ struct ModelMaterial {
   TextureWrap wrap_u = TextureWrap::kRepeat, wrap_v = TextureWrap::kRepeat;
 };
 
-/** A model as its file describes it: meshes in the file's own units, without textures. A copy's
- * pictures point into the original. */
+/** A model as its file describes it: meshes in the file's own units, without textures. */
 struct Model {
   std::vector<Mesh> meshes;
   std::vector<int> materials; ///< of each mesh, index into `palette`, -1: none
   std::vector<ModelMaterial> palette;
   std::vector<ModelPicture> pictures;
-  std::vector<std::vector<std::uint8_t>> storage; ///< what pictures' bytes lie in
 };
 
 /** More than any scan that a software rasteriser could draw live. */
 inline constexpr std::size_t kMaxModelVertices = 4'000'000, kMaxModelTriangles = 8'000'000;
 
+/** Whether a file is glTF, by its name or first bytes. */
+bool is_gltf (const std::string &path);
+
 /** Reads a glTF 2.0 file, JSON or binary: all meshes of its scene with their nodes' transforms, and
- *  skins in the pose of the joints' nodes. No index, offset or length is used before it is checked.
- *  Not through assimp: version 5.2 reads normalised integer attributes as garbage and follows
- *  accessors and skins that are not there.
+ *  skins in the pose of the joints' nodes. Indices, offsets and lengths are checked here: tinygltf
+ *  copies them from the file.
  *  @return kBadData or kTruncated for what is not glTF; kUnsupported naming the extension */
 Status read_gltf (const std::string &path, Model &model);
 
-/** Whether a file is glTF, by its name or first bytes. */
-bool is_gltf (const std::string &path);
+/** Reads a Wavefront OBJ file and its materials. */
+Status read_obj (const std::string &path, Model &model);
 
 } // namespace rangecast
