@@ -20,7 +20,7 @@
 #include "gstrangecombine.h"
 
 #include "common/bufferpools.hpp"
-#include "common/downstream.hpp"
+#include "common/capsadvice.hpp"
 #include "common/elementproperties.hpp"
 #include "framepairing.hpp"
 #include "padlinkwatch.hpp"

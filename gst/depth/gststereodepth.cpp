@@ -29,7 +29,7 @@
 #include "gststereodepth.h"
 
 #include "common/bufferpools.hpp"
-#include "common/downstream.hpp"
+#include "common/capsadvice.hpp"
 #include "common/elementproperties.hpp"
 #include "common/videoframereader.hpp"
 #include "framepairing.hpp"

@@ -50,7 +50,7 @@
 
 #include "clockconsensus.hpp"
 #include "clockpublisher.hpp"
-#include "common/downstream.hpp"
+#include "common/capsadvice.hpp"
 #include "common/properties.hpp"
 #include "common/statsreporter.hpp"
 #include "frameset.hpp"

@@ -39,7 +39,6 @@
 #include <vector>
 
 #include "category.hpp"
-#include "common/capserrors.hpp"
 #include "common/capturetime.hpp"
 #include "common/elementproperties.hpp"
 #include "server.hpp"
@@ -63,7 +62,6 @@ struct GstRangeWebSinkPrivate {
   GstSegment audio_segment{}; /* streaming thread of the audio pad only */
 
   /* streaming thread only */
-  CapsErrors caps_errors;
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
 };
 
@@ -98,7 +96,7 @@ gst_range_web_sink_set_caps (GstBaseSink *base, GstCaps *caps)
 {
   GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (base)->priv;
   gstrange::RangeInfo info;
-  if (!priv->caps_errors.accept (GST_ELEMENT (base), gstrange::parse_caps (caps, info)))
+  if (gst_range_flow_return (GST_ELEMENT (base), gstrange::parse_caps (caps, info)) != GST_FLOW_OK)
     return FALSE;
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
   priv->reporter.set_views (info.rig);
@@ -293,7 +291,6 @@ gst_range_web_sink_start (GstElement *element)
   }
   if (settings.root.empty ())
     settings.root = default_root (element);
-  priv->caps_errors.reset ();
   priv->last_pts = GST_CLOCK_TIME_NONE;
   std::erase_if (priv->stopped, [] (const auto &server) { return server->has_stopped (); });
   auto server = std::make_shared<web::Server> (GST_OBJECT (element), settings, request_key);
