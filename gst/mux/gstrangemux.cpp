@@ -48,8 +48,7 @@
 
 #include "clockpublisher.hpp"
 #include "common/capsadvice.hpp"
-#include "common/properties.hpp"
-#include "common/statsreporter.hpp"
+#include "common/elementproperties.hpp"
 #include "frameset.hpp"
 #include "rigcheck.hpp"
 #include "streamtimes.hpp"
@@ -59,8 +58,6 @@ using rangecast::StatusCode;
 
 GST_DEBUG_CATEGORY_STATIC (gst_range_mux_debug);
 #define GST_CAT_DEFAULT gst_range_mux_debug
-
-enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
 
 namespace {
 
@@ -96,6 +93,8 @@ struct GstRangeMuxPrivate {
   ClockPublisher clock;
   StatsReporter reporter;
   std::atomic<bool> caps_dirty = true; /* choose_streams() is to run again */
+
+  int configured_port = ClockPublisher::kOff; /* between start and stop */
 
   /* streaming thread only; vectors are kept for their memory */
   bool live = false;
@@ -185,8 +184,9 @@ static GstFlowReturn
 negotiate (GstRangeMux *self, const MuxStreams &streams)
 {
   GstRangeMuxPrivate *priv = self->priv;
-  MuxFormat format;
-  const Status status = choose_streams (streams, !priv->live, format);
+  gstrange::RangeInfo info;
+  GstCaps *caps = nullptr;
+  const Status status = choose_streams (streams, !priv->live, info, caps);
   if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
       flow != GST_FLOW_OK)
     return flow;
@@ -194,15 +194,13 @@ negotiate (GstRangeMux *self, const MuxStreams &streams)
     if (stream->alive && (!stream->other_rig.ok () || !stream->clash.ok ()))
       set_state (self, *stream, stream->clash.ok () ? StreamState::kOtherRig : StreamState::kClash,
           priv->times.oldest ());
-  if (format.info.views () == 0)
+  if (!caps)
     return GST_FLOW_OK; /* no stream is left */
-  GstCaps *caps = format.coded ? gstrange::make_neighbour_code_caps (format.info, "access-unit")
-                               : gstrange::make_range_caps (format.info);
-  GST_INFO_OBJECT (self, "%d views: %" GST_PTR_FORMAT, format.info.views (), caps);
+  GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT, caps);
   gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
   gst_caps_unref (caps);
-  priv->frame_duration = format.info.frame_duration ();
-  priv->reporter.set_views (format.info.rig);
+  priv->frame_duration = info.frame_duration ();
+  priv->reporter.set_views (info.rig);
   return GST_FLOW_OK;
 }
 
@@ -311,13 +309,8 @@ join_matching (GstRangeMux *self, const MuxStreams &streams, FrameTimes &times)
       times.speed = speed_of (*stream);
     }
     drop_buffer (priv, *stream);
-    if (!priv->joiner.add (stream->buffer)) {
-      GST_DEBUG_OBJECT (stream->pad, "dropping a buffer with the view-id of another pad");
-      if (!std::exchange (stream->clash_reported, true))
-        gst_range_post_warning (GST_ELEMENT (self),
-            {StatusCode::kBadValue, "pad " + std::string (GST_PAD_NAME (stream->pad)) +
-                                        ": its buffers have view-ids of another pad; dropped"});
-    }
+    if (!priv->joiner.add (stream->buffer))
+      GST_WARNING_OBJECT (stream->pad, "dropping a buffer with the view-id of another pad");
     set_state (self, *stream, StreamState::kIn, stream->running);
     std::lock_guard guard (priv->lock);
     stream->matched++;
@@ -459,15 +452,6 @@ handle_caps (GstRangeMux *self, MuxStream &stream, GstCaps *caps)
   return TRUE;
 }
 
-static std::shared_ptr<MuxStream>
-find_stream (GstRangeMuxPrivate *priv, GstAggregatorPad *pad)
-{
-  std::lock_guard guard (priv->lock);
-  const auto found =
-      std::ranges::find (priv->streams, pad, [] (const auto &stream) { return stream->pad; });
-  return found == priv->streams.end () ? nullptr : *found;
-}
-
 static gboolean
 gst_range_mux_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
 {
@@ -475,8 +459,10 @@ gst_range_mux_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstE
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
     GstCaps *caps;
     gst_event_parse_caps (event, &caps);
-    const auto stream = find_stream (self->priv, pad);
-    if (stream && !handle_caps (self, *stream, caps)) {
+    const CurrentStreams streams (self->priv);
+    const auto stream =
+        std::ranges::find (*streams, pad, [] (const auto &one) { return one->pad; });
+    if (stream != (*streams).end () && !handle_caps (self, **stream, caps)) {
       gst_event_unref (event);
       return FALSE;
     }
@@ -536,31 +522,22 @@ gst_range_mux_release_pad (GstElement *element, GstPad *pad)
 
 /* ---- the clock for other hosts ---- */
 
-static bool
-report_clock_error (GstRangeMux *self, const Status &status)
+/* While it is published, the property reads the actual port. */
+static void
+set_port (GstRangeMux *self, int port)
 {
-  if (!status.ok ())
-    GST_ELEMENT_ERROR (self, RESOURCE, BUSY, ("%s", status.message ().c_str ()), (nullptr));
-  return status.ok ();
-}
-
-static bool
-publish_clock (GstRangeMux *self, int port)
-{
-  GstClock *clock = gst_element_get_clock (GST_ELEMENT (self));
-  const Status status = self->priv->clock.start (port, clock);
-  gst_clear_object (&clock);
-  if (self->priv->clock.port () != ClockPublisher::kOff)
-    g_object_notify (G_OBJECT (self), "clock-port"); /* 0 has become a number */
-  return report_clock_error (self, status);
+  {
+    std::lock_guard guard (self->priv->lock);
+    self->priv->settings.clock_port = port;
+  }
+  g_object_notify (G_OBJECT (self), "clock-port");
 }
 
 /* The pipeline selects its clock on the way to PLAYING, and may select another one later. */
 static gboolean
 gst_range_mux_set_clock (GstElement *element, GstClock *clock)
 {
-  auto self = GST_RANGE_MUX (element);
-  report_clock_error (self, self->priv->clock.set_clock (clock));
+  GST_RANGE_MUX (element)->priv->clock.set_clock (element, clock);
   return GST_ELEMENT_CLASS (gst_range_mux_parent_class)->set_clock (element, clock);
 }
 
@@ -580,20 +557,14 @@ make_stats (const GstRangeMuxPrivate *priv)
       counters.frames, "complete", G_TYPE_UINT64, counters.complete, "incomplete", G_TYPE_UINT64,
       counters.frames - counters.complete, "dropped-late", G_TYPE_UINT64, late, "out-of-sync",
       G_TYPE_UINT64, out_of_sync, "left-out", G_TYPE_UINT64, left_out, nullptr);
-  for (const auto &s : priv->streams) {
-    GstStructure *of_pad = gst_structure_new ("pad", "received", G_TYPE_UINT64, s->received,
-        "matched", G_TYPE_UINT64, s->matched, "late", G_TYPE_UINT64, s->dropped_late, "out-of-sync",
-        G_TYPE_UINT64, s->out_of_sync, "left-out", G_TYPE_UINT64, s->left_out, "skew", G_TYPE_INT64,
-        gint64 (s->skew), "state", G_TYPE_STRING, name_of (s->state), "offset", G_TYPE_INT64,
-        gint64 (s->offset.load ()), nullptr);
-    gst_structure_set (stats, GST_PAD_NAME (s->pad), GST_TYPE_STRUCTURE, of_pad, nullptr);
+  for (const auto &stream : priv->streams) {
+    GstStructure *of_pad = stream->stats ();
+    gst_structure_set (stats, GST_PAD_NAME (stream->pad), GST_TYPE_STRUCTURE, of_pad, nullptr);
     gst_structure_free (of_pad);
   }
   return stats;
 }
 
-/* A pad's `lost` counts the frame sets that its stream is missing from, also those before its first
- * buffer. */
 static std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
@@ -603,12 +574,8 @@ collect_stats (GstElement *element)
   std::vector<StatsRow> rows (1);
   guint64 late = 0;
   for (const auto &stream : priv->streams) {
+    rows.push_back (stream->row (counters.frames));
     late += stream->dropped_late + stream->out_of_sync;
-    rows.push_back ({.pad = GST_PAD_NAME (stream->pad),
-        .counters = {.frames = stream->received,
-            .lost = counters.frames - std::min (counters.frames, stream->matched),
-            .late = stream->dropped_late + stream->out_of_sync},
-        .views = stream->views});
   }
   rows[0].counters = {
       .frames = counters.frames, .lost = counters.frames - counters.complete, .late = late};
@@ -635,8 +602,11 @@ gst_range_mux_start (GstAggregator *aggregator)
     if (Status s = rangecast::load_rig (settings.rig_file, priv->rig);
         gst_range_flow_return (GST_ELEMENT (self), s) != GST_FLOW_OK)
       return FALSE;
-  if (!publish_clock (self, settings.clock_port))
+  if (!priv->clock.start (GST_ELEMENT (self), settings.clock_port))
     return FALSE;
+  priv->configured_port = settings.clock_port;
+  if (settings.clock_port != ClockPublisher::kOff)
+    set_port (self, priv->clock.port ());
   priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->counters = {};
@@ -651,6 +621,8 @@ gst_range_mux_stop (GstAggregator *aggregator)
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
   priv->reporter.stop ();
   priv->clock.stop ();
+  if (priv->configured_port != ClockPublisher::kOff)
+    set_port (GST_RANGE_MUX (aggregator), priv->configured_port);
   priv->joiner.drop ();
   return TRUE;
 }
@@ -677,33 +649,6 @@ mux_properties ()
 }
 
 static void
-gst_range_mux_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  GstRangeMuxPrivate *priv = GST_RANGE_MUX (object)->priv;
-  if (id == PROP_STATS_INTERVAL) /* without our lock: the reporter sets a timer */
-    return priv->reporter.set_interval (g_value_get_uint (value));
-  std::lock_guard guard (priv->lock);
-  if (!mux_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_range_mux_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  GstRangeMuxPrivate *priv = GST_RANGE_MUX (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (id == PROP_STATS)
-    return g_value_take_boxed (value, make_stats (priv));
-  if (id == PROP_STATS_INTERVAL)
-    return g_value_set_uint (value, priv->reporter.interval ());
-  Settings settings = priv->settings;
-  if (priv->clock.port () != ClockPublisher::kOff)
-    settings.clock_port = priv->clock.port ();
-  if (!mux_properties ().get (settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
 gst_range_mux_finalize (GObject *object)
 {
   delete GST_RANGE_MUX (object)->priv;
@@ -723,15 +668,10 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto aggregator_class = GST_AGGREGATOR_CLASS (klass);
 
-  object_class->set_property = gst_range_mux_set_property;
-  object_class->get_property = gst_range_mux_get_property;
   object_class->finalize = gst_range_mux_finalize;
-
-  mux_properties ().install (object_class, PROP_SETTINGS);
-  install_stats (object_class, PROP_STATS,
+  install_properties<GstRangeMux, mux_properties, make_stats> (object_class,
       "Counters since the element was started: frames, complete, incomplete, dropped-late, "
       "out-of-sync, left-out, and a structure for each sink pad");
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &sink_template, GST_TYPE_AGGREGATOR_PAD);

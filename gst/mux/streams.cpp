@@ -13,7 +13,7 @@ void
 MuxStream::reset ()
 {
   release ();
-  has_caps = coded = chosen = alive = clash_reported = late = shift_known = false;
+  has_caps = coded = chosen = alive = late = shift_known = false;
   in_sync = true;
   other_rig = clash = {};
   seen = since = GST_CLOCK_TIME_NONE;
@@ -30,6 +30,25 @@ MuxStream::title () const
   if (has_caps)
     text += " (view " + std::to_string (info.rig.views.front ().id) + ")";
   return text;
+}
+
+GstStructure *
+MuxStream::stats () const
+{
+  return gst_structure_new ("pad", "received", G_TYPE_UINT64, received, "matched", G_TYPE_UINT64,
+      matched, "late", G_TYPE_UINT64, dropped_late, "out-of-sync", G_TYPE_UINT64, out_of_sync,
+      "left-out", G_TYPE_UINT64, left_out, "skew", G_TYPE_INT64, gint64 (skew), "state",
+      G_TYPE_STRING, name_of (state), "offset", G_TYPE_INT64, gint64 (offset.load ()), nullptr);
+}
+
+StatsRow
+MuxStream::row (guint64 frames) const
+{
+  return {.pad = GST_PAD_NAME (pad),
+      .counters = {.frames = received,
+          .lost = frames - std::min (frames, matched),
+          .late = dropped_late + out_of_sync},
+      .views = views};
 }
 
 /* ---- which streams make up frame sets ---- */
@@ -52,7 +71,7 @@ clash_of (const MuxStream &stream, const std::vector<MuxStream *> &chosen)
 }
 
 Status
-choose_streams (const MuxStreams &streams, bool strict, MuxFormat &format)
+choose_streams (const MuxStreams &streams, bool strict, gstrange::RangeInfo &info, GstCaps *&caps)
 {
   std::vector<MuxStream *> order, chosen;
   for (const auto &stream : streams) {
@@ -76,11 +95,12 @@ choose_streams (const MuxStreams &streams, bool strict, MuxFormat &format)
     else if (strict)
       return stream->clash;
   }
-  format = {};
-  if (!chosen.empty ())
-    format = {
-        chosen.front ()->coded, gstrange::make_info (std::move (united),
-                                    chosen.front ()->info.fps_n, chosen.front ()->info.fps_d)};
+  if (chosen.empty ())
+    return {};
+  const MuxStream &first = *chosen.front ();
+  info = gstrange::make_info (std::move (united), first.info.fps_n, first.info.fps_d);
+  caps = first.coded ? gstrange::make_neighbour_code_caps (info, "access-unit")
+                     : gstrange::make_range_caps (info);
   return {};
 }
 

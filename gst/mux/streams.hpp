@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/matcher.hpp"
+#include "common/statsreporter.hpp"
 
 /** Whether a stream's buffers become part of frame sets, and why not. */
 enum class StreamState {
@@ -39,6 +40,12 @@ struct MuxStream : PadStream {
   /** "pad sink_1 (view 1)" */
   [[nodiscard]] std::string title () const;
 
+  /* under the element's lock */
+  [[nodiscard]] GstStructure *stats () const; ///< transfer full
+  /** @param frames  of the element: `lost` counts those that the stream is missing from, also
+   *  before its first buffer */
+  [[nodiscard]] StatsRow row (guint64 frames) const;
+
   /* streaming thread */
   bool has_caps = false, coded = false;
   gstrange::RangeInfo info;
@@ -46,7 +53,6 @@ struct MuxStream : PadStream {
   rangecast::Status clash;                  ///< why it is not chosen
   bool chosen = false;                      ///< by choose_streams()
   bool alive = false;                       ///< not silent
-  bool clash_reported = false;              ///< of view-ids of buffers
   bool in_sync = true;                      ///< live: its capture times are of the right clock
   bool late = false;                        ///< the frame at its head is
   bool shift_known = false;                 ///< `shift` is valid
@@ -67,18 +73,14 @@ struct MuxStream : PadStream {
 
 using MuxStreams = std::vector<std::shared_ptr<MuxStream>>;
 
-/** What the frame sets of the chosen streams are. */
-struct MuxFormat {
-  bool coded = false;
-  gstrange::RangeInfo info;
-};
-
 /** Chooses the streams that make up frame sets: those of the format of the first one, raw or coded,
  *  with each view-id once and at most kMaxRigPixels. Streams that were chosen before and are alive
  *  have priority, so that two hosts with the same view-id do not alternate. Sets `chosen` and
  *  `clash` of each.
- *  @param strict  return an error for the first stream that has to be left out */
-rangecast::Status choose_streams (const MuxStreams &streams, bool strict, MuxFormat &format);
+ *  @param strict  return an error for the first stream that has to be left out
+ *  @param[out] info, caps  of the frame sets; caps are transfer full, null if no stream is left */
+rangecast::Status choose_streams (
+    const MuxStreams &streams, bool strict, gstrange::RangeInfo &info, GstCaps *&caps);
 
 /** Nick for statistics and messages. */
 const char *name_of (StreamState state);
