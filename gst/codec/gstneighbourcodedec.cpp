@@ -41,11 +41,9 @@
 #include <vector>
 
 #include "common/bufferpools.hpp"
-#include "common/capserrors.hpp"
+#include "common/capsadvice.hpp"
 #include "common/codedunits.hpp"
-#include "common/downstream.hpp"
 #include "common/elementproperties.hpp"
-#include "common/requirecaps.hpp"
 #include "common/streamlock.hpp"
 #include "concealment.hpp"
 
@@ -86,7 +84,6 @@ struct GstNeighbourCodeDecPrivate {
   std::atomic<bool> is_temporal{false}; /* later frame sets refer to the latest */
 
   /* streaming thread only */
-  CapsErrors caps_errors;
   rangecast::AccessUnitDecoder decoder;
   GstBufferPool *pool = nullptr;
   Concealment concealment;
@@ -170,7 +167,7 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
     return priv->decoder.set_rig (info.rig);
   });
   priv->reporter.set_views (info.rig);
-  if (!priv->caps_errors.accept (GST_ELEMENT (self), status))
+  if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
   GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
   reset_slices (priv);
@@ -206,19 +203,18 @@ gst_neighbour_code_dec_accept_caps (
 static gboolean
 take_caps (GstBaseTransform *base, GstEvent *event)
 {
-  CapsErrors &errors = GST_NEIGHBOUR_CODE_DEC (base)->priv->caps_errors;
   GstCaps *caps = nullptr;
   gst_event_parse_caps (event, &caps);
   if (is_byte_stream (caps)) {
     gst_event_unref (event);
-    return errors.accept (GST_ELEMENT (base),
+    gst_range_flow_return (GST_ELEMENT (base),
         {StatusCode::kUnsupported,
-            "pad sink: alignment=byte-stream; expected neighbourcodeparse before this element"});
+            "pad sink: alignment=byte-stream; add neighbourcodeparse before this element"});
+    return FALSE;
   }
   if (GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)->sink_event (base, event))
     return TRUE;
-  if (std::string text = explain_downstream (GST_BASE_TRANSFORM_SRC_PAD (base)); !text.empty ())
-    errors.accept (GST_ELEMENT (base), {StatusCode::kUnsupported, std::move (text)});
+  require_downstream (GST_ELEMENT (base), GST_BASE_TRANSFORM_SRC_PAD (base));
   return FALSE;
 }
 
@@ -514,7 +510,6 @@ gst_neighbour_code_dec_start (GstBaseTransform *base)
 {
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (base)->priv;
   priv->reporter.start (GST_ELEMENT (base), collect_stats);
-  priv->caps_errors.reset ();
   std::lock_guard guard (priv->lock);
   priv->frames = priv->coded_bytes = 0;
   priv->totals = {};
@@ -598,7 +593,6 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
       "Decodes neighbour-coded range images", "gst-rangecast");
 
   transform_class->src_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_src_event);
-  transform_class->submit_input_buffer = GST_DEBUG_FUNCPTR (submit_with_caps);
   transform_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_stop);
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_transform_caps);

@@ -40,10 +40,8 @@
 #include <span>
 
 #include "bitrate.hpp"
-#include "common/capserrors.hpp"
 #include "common/controlledvalues.hpp"
 #include "common/recycledmemories.hpp"
-#include "common/requirecaps.hpp"
 #include "common/statsreporter.hpp"
 #include "common/streamlock.hpp"
 #include "encsettings.hpp"
@@ -81,7 +79,6 @@ struct GstNeighbourCodeEncPrivate {
   /* streaming thread only */
   bool warned_target = false;
   gstrange::RangeInfo info;
-  CapsErrors caps_errors;
   NeighbourCodeRate rate; /* but for its member `receivers`: any thread */
   rangecast::AccessUnitEncoder encoder;
   EncoderSettings configured; /* of encoder */
@@ -170,7 +167,7 @@ gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
     priv->prefixes.set_rig (priv->info);
   gst_clear_buffer (&priv->input);
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
-  return priv->caps_errors.accept (GST_ELEMENT (base), status);
+  return gst_range_flow_return (GST_ELEMENT (base), status) == GST_FLOW_OK;
 }
 
 /* ---- a frame set: rate, key frame sets, encoding ---- */
@@ -532,7 +529,6 @@ gst_neighbour_code_enc_start (GstBaseTransform *base)
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
   priv->rate.reset ();
   priv->warned_target = false;
-  priv->caps_errors.reset ();
   priv->last_key = GST_CLOCK_TIME_NONE;
   priv->encoder.request_key ();
   priv->key_requests.reset ();
@@ -657,7 +653,6 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
 
   transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_sink_event);
   transform_class->src_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_src_event);
-  transform_class->submit_input_buffer = GST_DEBUG_FUNCPTR (submit_with_caps);
   transform_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_stop);
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform_caps);

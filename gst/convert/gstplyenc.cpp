@@ -15,9 +15,7 @@
  */
 #include "gstplyenc.h"
 
-#include "common/capserrors.hpp"
 #include "common/elementproperties.hpp"
-#include "common/requirecaps.hpp"
 #include "common/streamlock.hpp"
 
 #include <gstrange/gstrangeframe.hpp>
@@ -55,7 +53,6 @@ struct GstPlyEncPrivate {
   /* streaming thread */
   PointCloudFormat::Kind kind = PointCloudFormat::kPly; /* of the output caps */
   gstrange::RangeInfo info;
-  CapsErrors caps_errors;
   guint64 frames = 0; /* since start or flush */
 };
 
@@ -150,7 +147,7 @@ gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
   warn_of_other_name (self);
   const rangecast::Status status =
       rangecast::guarded ("plyenc", [&] { return gstrange::parse_caps (in, self->priv->info); });
-  return self->priv->caps_errors.accept (GST_ELEMENT (self), status);
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
 /* Writes the file into a new buffer. */
@@ -236,7 +233,6 @@ static gboolean
 gst_ply_enc_start (GstBaseTransform *base)
 {
   GstPlyEncPrivate *priv = GST_PLY_ENC (base)->priv;
-  priv->caps_errors.reset ();
   priv->frames = 0;
   std::lock_guard guard (priv->lock);
   priv->choice = priv->settings.choice;
@@ -328,7 +324,6 @@ gst_ply_enc_class_init (GstPlyEncClass *klass)
   gst_element_class_set_static_metadata (element_class, "PLY encoder", "Encoder/Image",
       "Encodes each range frame set as a binary PLY or PCD point cloud", "gst-rangecast");
 
-  transform_class->submit_input_buffer = GST_DEBUG_FUNCPTR (submit_with_caps);
   transform_class->start = GST_DEBUG_FUNCPTR (gst_ply_enc_start);
   transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_ply_enc_sink_event);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_ply_enc_stop);

@@ -19,9 +19,7 @@
 #include "gstrangesplit.h"
 
 #include "common/bufferpools.hpp"
-#include "common/capserrors.hpp"
 #include "common/elementproperties.hpp"
-#include "common/requirecaps.hpp"
 
 #include <gst/base/gstflowcombiner.h>
 #include <gst/video/gstvideopool.h>
@@ -94,7 +92,6 @@ struct GstRangeSplitPrivate {
 
   /* streaming thread */
   gstrange::RangeInfo info;
-  CapsErrors caps_errors;
   GstSegment segment;
   guint group_id = GST_GROUP_ID_INVALID;
 
@@ -314,11 +311,11 @@ push_view (GstRangeSplit *self, SplitPad &pad, const SplitSettings &settings,
 }
 
 static GstFlowReturn
-gst_range_split_chain (GstPad *sink, GstObject *parent, GstBuffer *buffer)
+gst_range_split_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
 {
   auto self = GST_RANGE_SPLIT (parent);
   GstFlowReturn flow = GST_FLOW_OK;
-  if (!require_caps (GST_ELEMENT (self), sink) || self->priv->info.views () == 0) {
+  if (self->priv->info.views () == 0) {
     gst_buffer_unref (buffer);
     return GST_FLOW_NOT_NEGOTIATED;
   }
@@ -351,7 +348,7 @@ handle_caps (GstRangeSplit *self, GstEvent *event)
   gst_event_parse_caps (event, &caps);
   const rangecast::Status status = gstrange::parse_caps (caps, self->priv->info);
   gst_event_unref (event);
-  if (!self->priv->caps_errors.accept (GST_ELEMENT (self), status))
+  if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
   GST_INFO_OBJECT (self, "caps: %d views, %dx%d", self->priv->info.views (), self->priv->info.width,
       self->priv->info.height);
@@ -460,7 +457,6 @@ gst_range_split_change_state (GstElement *element, GstStateChange transition)
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) { /* pads are inactive: nobody streams */
     std::lock_guard guard (self->priv->lock);
     self->priv->info = {};
-    self->priv->caps_errors.reset ();
     self->priv->group_id = GST_GROUP_ID_INVALID;
     gst_segment_init (&self->priv->segment, GST_FORMAT_TIME);
     gst_flow_combiner_reset (self->priv->combiner);

@@ -20,10 +20,9 @@
 #include "gstrangecombine.h"
 
 #include "common/bufferpools.hpp"
-#include "common/downstream.hpp"
+#include "common/capsadvice.hpp"
 #include "common/elementproperties.hpp"
-#include "framepairing.hpp"
-#include "padlinkwatch.hpp"
+#include "common/matcher.hpp"
 #include "viewsettings.hpp"
 
 #include <gst/video/video.h>
@@ -60,6 +59,7 @@ GST_DEBUG_CATEGORY_STATIC (gst_range_combine_debug);
 
 namespace {
 
+constexpr const char *kPadNames[] = {"colour", "depth"};
 constexpr double kDefaultDepthScale = 0.001;
 /* Focal length by width of an ordinary RGB-D camera, with a horizontal field of view of 63 degrees
  */
@@ -83,11 +83,9 @@ struct GstRangeCombinePrivate {
   CombineSettings settings;
   guint64 frames = 0;
 
-  PadLinkWatch pad_links; /* any thread */
-
   /* streaming thread */
   GstAggregatorPad *colour_pad, *depth_pad; /* owned by the element */
-  std::optional<PairMatcher> matcher;
+  std::optional<FrameMatcher> matcher;
   std::optional<GstVideoInfo> colour, depth; /* caps */
   std::optional<View> depth_view;            /* of the depth camera, from the caps */
   bool negotiate = true;                     /* there are new caps */
@@ -146,7 +144,7 @@ gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, 
       gst_event_unref (event);
       return FALSE;
     }
-    priv->pad_links.begin (GST_ELEMENT (aggregator));
+    priv->matcher->watch_links ();
     (pad == priv->colour_pad ? priv->colour : priv->depth) = *info;
     if (pad == priv->depth_pad && !read_depth_view (GST_RANGE_COMBINE (aggregator), event)) {
       gst_event_unref (event);
@@ -442,7 +440,7 @@ combine (GstRangeCombine *self, GstBuffer *colour, GstBuffer *depth, GstBuffer *
 }
 
 static GstFlowReturn
-push_pair (GstRangeCombine *self, const PairMatcher::Pair &pair)
+push_pair (GstRangeCombine *self)
 {
   GstRangeCombinePrivate *priv = self->priv;
   auto aggregator = GST_AGGREGATOR (self);
@@ -451,11 +449,12 @@ push_pair (GstRangeCombine *self, const PairMatcher::Pair &pair)
   if (flow != GST_FLOW_OK)
     return flow;
   const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
-  const GstClockTime capture = gstrange::capture_time_of (priv->colour_pad, pair.first, live);
+  GstBuffer *colour = priv->matcher->buffer (0), *depth = priv->matcher->buffer (1);
+  const GstClockTime capture = gstrange::capture_time_of (priv->colour_pad, colour, live);
   const View &view = priv->view;
   Status status = gstrange::add_view (output, view.id, {0, 0, view.width, view.height}, capture);
   if (status.ok ())
-    status = combine (self, pair.first, pair.second, output);
+    status = combine (self, colour, depth, output);
   flow = gst_range_flow_return (GST_ELEMENT (self), status);
   if (flow != GST_FLOW_OK) {
     gst_buffer_unref (output);
@@ -463,12 +462,11 @@ push_pair (GstRangeCombine *self, const PairMatcher::Pair &pair)
   }
   const GstClockTime duration = GST_CLOCK_TIME_IS_VALID (priv->frame_duration)
                                     ? priv->frame_duration
-                                    : GST_BUFFER_DURATION (pair.first);
-  const GstClockTime running = gstrange::running_time_of (priv->colour_pad, pair.first);
+                                    : GST_BUFFER_DURATION (colour);
+  const GstClockTime running = priv->matcher->running ();
   gstrange::stamp (aggregator, output, running, duration, capture);
   GST_LOG_OBJECT (self, "pair at %" GST_TIME_FORMAT, GST_TIME_ARGS (running));
-  priv->matcher->record_output (running, duration);
-  if (pair.discont)
+  if (priv->matcher->discont ())
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
   {
     std::lock_guard guard (priv->lock);
@@ -477,25 +475,8 @@ push_pair (GstRangeCombine *self, const PairMatcher::Pair &pair)
   return gst_aggregator_finish_buffer (aggregator, output);
 }
 
-/* Announces time without pairs, up to the pair that waits, so that downstream does not wait. */
 static GstFlowReturn
-push_gap (GstRangeCombine *self, GstBuffer *waiting)
-{
-  GstRangeCombinePrivate *priv = self->priv;
-  GstClockTime begin, end;
-  const GstClockTime until =
-      waiting ? gstrange::running_time_of (priv->colour_pad, waiting) : GST_CLOCK_TIME_NONE;
-  if (!priv->matcher->pop_gap (until, begin, end) || !priv->colour || !priv->depth)
-    return GST_FLOW_OK;
-  if (priv->negotiate)
-    if (const GstFlowReturn flow = negotiate (self); flow != GST_FLOW_OK)
-      return flow;
-  priv->matcher->push_gap (GST_AGGREGATOR (self), begin, end);
-  return GST_FLOW_OK;
-}
-
-static GstFlowReturn
-gst_range_combine_aggregate (GstAggregator *aggregator, gboolean)
+gst_range_combine_aggregate (GstAggregator *aggregator, gboolean timeout)
 {
   auto self = GST_RANGE_COMBINE (aggregator);
   GstRangeCombinePrivate *priv = self->priv;
@@ -503,30 +484,23 @@ gst_range_combine_aggregate (GstAggregator *aggregator, gboolean)
    * the nearest. NONE is the maximum. */
   const GstClockTime duration =
       std::min (frame_duration (priv->colour), frame_duration (priv->depth));
-  PairMatcher::Pair pair;
-  const GstFlowReturn taken = priv->matcher->pop_pair (duration, pair);
-  if (taken == GST_FLOW_EOS) /* of fewer frames than are looked at */
+  GstFlowReturn flow = priv->matcher->next (gstrange::pairing_tolerance (duration), timeout);
+  if (flow == GST_FLOW_EOS) /* of fewer frames than are looked at */
     warn_of_range (self);
-  GstFlowReturn flow = push_gap (self, pair.first);
-  if (taken != GST_FLOW_OK)
-    return flow == GST_FLOW_OK ? taken : flow;
-  if (flow == GST_FLOW_OK && priv->negotiate)
+  if (flow != GST_FLOW_OK)
+    return flow;
+  if (priv->negotiate)
     flow = negotiate (self);
   if (flow == GST_FLOW_OK)
-    flow = push_pair (self, pair);
-  gst_buffer_unref (pair.first);
-  gst_buffer_unref (pair.second);
+    flow = push_pair (self);
+  priv->matcher->release ();
   return flow;
 }
 
-/* Without a frame on both pads there is nothing to push, so there is no deadline. */
 static GstClockTime
 gst_range_combine_get_next_time (GstAggregator *aggregator)
 {
-  GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
-  log_waiting (GST_CAT_DEFAULT, priv->colour_pad);
-  log_waiting (GST_CAT_DEFAULT, priv->depth_pad);
-  return GST_CLOCK_TIME_NONE;
+  return GST_RANGE_COMBINE (aggregator)->priv->matcher->next_time ();
 }
 
 /* ---- lifecycle ---- */
@@ -541,7 +515,7 @@ gst_range_combine_start (GstAggregator *aggregator)
   priv->negotiate = true;
   priv->frames_to_check = kCheckedFrames;
   priv->out_of_range.reset ();
-  priv->matcher->reset ();
+  priv->matcher->start ();
   std::lock_guard guard (priv->lock);
   priv->frames = 0;
   return TRUE;
@@ -558,7 +532,7 @@ static gboolean
 gst_range_combine_stop (GstAggregator *aggregator)
 {
   GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
-  priv->pad_links.reset ();
+  priv->matcher->stop ();
   drop_pool_and_converter (priv);
   return TRUE;
 }
@@ -625,8 +599,8 @@ static GstStructure *
 make_stats (const GstRangeCombinePrivate *priv)
 {
   return gst_structure_new ("application/x-rangecombine-stats", "frames", G_TYPE_UINT64,
-      priv->frames, "dropped-colour", G_TYPE_UINT64, priv->matcher->dropped_first (),
-      "dropped-depth", G_TYPE_UINT64, priv->matcher->dropped_second (), nullptr);
+      priv->frames, "dropped-colour", G_TYPE_UINT64, priv->matcher->dropped (0), "dropped-depth",
+      G_TYPE_UINT64, priv->matcher->dropped (1), nullptr);
 }
 
 static void
@@ -640,9 +614,9 @@ static void
 gst_range_combine_init (GstRangeCombine *self)
 {
   auto priv = self->priv = new GstRangeCombinePrivate;
-  priv->colour_pad = add_sink_pad (GST_ELEMENT (self), "colour");
-  priv->depth_pad = add_sink_pad (GST_ELEMENT (self), "depth");
-  priv->matcher.emplace (priv->colour_pad, priv->depth_pad, GST_CAT_DEFAULT);
+  priv->colour_pad = add_sink_pad (GST_ELEMENT (self), kPadNames[0]);
+  priv->depth_pad = add_sink_pad (GST_ELEMENT (self), kPadNames[1]);
+  priv->matcher.emplace (GST_ELEMENT (self), GST_CAT_DEFAULT, kPadNames);
 }
 
 static void

@@ -21,10 +21,8 @@
  */
 #include "gstroiextract.h"
 
-#include "common/capserrors.hpp"
 #include "common/controlledvalues.hpp"
 #include "common/elementproperties.hpp"
-#include "common/requirecaps.hpp"
 #include "common/streamlock.hpp"
 #include "roisettings.hpp"
 
@@ -108,7 +106,6 @@ struct GstRoiExtractPrivate {
   std::atomic<bool> relearn{false}; /* set by capture-background */
 
   /* streaming thread */
-  CapsErrors caps_errors;
   std::string unsaved; /* file that could not be written; reported once */
   gstrange::RangeInfo info;
   std::array<std::unique_ptr<ViewState>, rangecast::kMaxViews> views;
@@ -217,7 +214,7 @@ gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
     GST_DEBUG_OBJECT (
         self, "%s", all_learnt (priv) ? "background is known" : "learning background");
   }
-  return priv->caps_errors.accept (GST_ELEMENT (self), status);
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
 /* ---- segmentation ---- */
@@ -522,7 +519,6 @@ gst_roi_extract_start (GstBaseTransform *base)
   const Status status = check_save_path (copy_settings (priv).save_background);
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
     return FALSE;
-  priv->caps_errors.reset ();
   priv->unsaved.clear ();
   priv->reporter.start (GST_ELEMENT (base), collect_stats);
   std::lock_guard guard (priv->lock);
@@ -605,7 +601,6 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
       "Removes the background of range images by depth and colour and crops them to the rest",
       "gst-rangecast");
 
-  transform_class->submit_input_buffer = GST_DEBUG_FUNCPTR (submit_with_caps);
   transform_class->start = GST_DEBUG_FUNCPTR (gst_roi_extract_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_roi_extract_stop);
   transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_roi_extract_sink_event);

@@ -29,12 +29,11 @@
 #include "gststereodepth.h"
 
 #include "common/bufferpools.hpp"
-#include "common/downstream.hpp"
+#include "common/capsadvice.hpp"
 #include "common/elementproperties.hpp"
+#include "common/matcher.hpp"
 #include "common/videoframereader.hpp"
-#include "framepairing.hpp"
 #include "packedinput.hpp"
-#include "padlinkwatch.hpp"
 #include "roischedule.hpp"
 #include "stereosettings.hpp"
 
@@ -70,42 +69,24 @@ GST_DEBUG_CATEGORY_STATIC (gst_stereo_depth_debug);
  *
  *   sink_event       records the caps of each pad
  *   aggregate
- *     dequeue_pair   takes a left and a right image of one running time off their pads. A left
- *                    image waits for a right one without a deadline: it is dropped when a later
- *                    right image or a GAP arrives
- *     push_gap       announces time without pairs
+ *     next           takes a left and a right image of one running time off their pads, and the
+ *                    third one of that time, if there is a pad for it
  *     drop_if_late   drops the pair if its depth would arrive too late (QoS)
- *     dequeue_third  takes the third image of that time, if there is a pad for it; waits for it
- *                    until the deadline
  *     negotiate      after new caps: loads the view, configures the matcher, sets output caps
- *     push_pair      rectifies, matches and pushes
- *
- * A pair that waits for its third image is kept in `pair`, off its pads: a source that feeds all
- * pads from one thread and loses a third image would otherwise block on pad left forever. So caps
- * of later images can arrive before the pair is matched, see Input::next_info. */
+ *     push_pair      rectifies, matches and pushes */
 
 namespace {
 
 enum Side { kLeft, kRight, kThird };
 constexpr const char *kPadNames[] = {"left", "right", "third"};
 
-/* Successive images without partner before a warning is posted: two seconds at 25 Hz. */
-constexpr guint64 kMaxUnpaired = 100;
-
 struct Input {
   std::optional<GstVideoInfo> info;
-  std::optional<GstVideoInfo> next_info; /* left, right: caps that follow the pair that waits */
   VideoFrameReader reader;
 };
 
-/* A left and a right image. Times are those of the left image. */
-struct WaitingPair {
-  PairMatcher::Pair buffers; /* null: none waits */
-  GstClockTime running = GST_CLOCK_TIME_NONE, capture = 0;
-};
-
 struct Counters {
-  guint64 frames = 0, restricted_frames = 0, third_frames = 0, dropped_third = 0, dropped_late = 0;
+  guint64 frames = 0, restricted_frames = 0, third_frames = 0, dropped_late = 0;
   GstClockTime match_time = 0;
 };
 
@@ -122,7 +103,6 @@ struct GstStereoDepthPrivate {
 
   /* thread-safe */
   StatsReporter reporter;
-  PadLinkWatch pad_links;
   RoiSchedule rois;
   std::atomic<bool> third_released = false; /* cleared by the streaming thread */
 
@@ -130,8 +110,8 @@ struct GstStereoDepthPrivate {
 
   /* streaming thread */
   GstAggregatorPad *left, *right; /* owned by the element */
-  std::optional<PairMatcher> matcher;
-  WaitingPair pair;
+  std::optional<FrameMatcher> matcher;
+  GstClockTime capture = 0; /* of the pair: that of the left image */
   Input inputs[3];
   bool negotiate = true;        /* left or right have new caps */
   bool negotiate_third = false; /* third has new caps: negotiate with its next image */
@@ -140,8 +120,7 @@ struct GstStereoDepthPrivate {
   bool discont = false;                        /* images were dropped since the last pair */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE; /* of the last left image that was matched */
   GstClockTime processing_time = 0;            /* mean time to match a pair, at most `latency` */
-  guint64 dropped_before_pair = 0;             /* images without partner up to the last pair */
-  bool warned_mirrored = false, warned_unpaired = false;
+  bool warned_mirrored = false;
 };
 
 struct _GstStereoDepth {
@@ -189,14 +168,10 @@ gst_stereo_depth_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, G
       gst_event_unref (event);
       return FALSE;
     }
-    priv->pad_links.begin (GST_ELEMENT (aggregator));
+    priv->matcher->watch_links ();
     apply_release_of_third (priv);
-    if (side != kThird && priv->pair.buffers.first) {
-      priv->inputs[side].next_info = info;
-    } else {
-      priv->inputs[side].info = info;
-      (side == kThird ? priv->negotiate_third : priv->negotiate) = true;
-    }
+    priv->inputs[side].info = info;
+    (side == kThird ? priv->negotiate_third : priv->negotiate) = true;
   }
   return GST_AGGREGATOR_CLASS (gst_stereo_depth_parent_class)->sink_event (aggregator, pad, event);
 }
@@ -220,63 +195,12 @@ gst_stereo_depth_sink_query (GstAggregator *aggregator, GstAggregatorPad *pad, G
 
 /* ---- pairs of images ---- */
 
-/* Two cameras with unrelated clocks may never capture at the same time. */
-static void
-warn_if_unpaired (GstStereoDepth *self, bool paired)
-{
-  GstStereoDepthPrivate *priv = self->priv;
-  const guint64 dropped = priv->matcher->dropped_first () + priv->matcher->dropped_second ();
-  if (paired)
-    priv->dropped_before_pair = dropped;
-  if (priv->warned_unpaired || dropped - priv->dropped_before_pair < kMaxUnpaired)
-    return;
-  priv->warned_unpaired = true;
-  GST_ELEMENT_WARNING (self, STREAM, FAILED,
-      ("Left and right images do not pair up: expected times that differ by at most half a frame, "
-       "or 5 ms if the caps have no framerate"),
-      ("the last %" G_GUINT64_FORMAT " images found no partner",
-          dropped - priv->dropped_before_pair));
-}
-
-static GstFlowReturn
-dequeue_pair (GstStereoDepth *self)
-{
-  GstStereoDepthPrivate *priv = self->priv;
-  WaitingPair &pair = priv->pair;
-  const GstFlowReturn flow =
-      priv->matcher->pop_pair (frame_duration (priv->inputs[kLeft].info), pair.buffers);
-  const bool is_first_after_drop =
-      priv->matcher->dropped_first () + priv->matcher->dropped_second () >
-      priv->dropped_before_pair;
-  warn_if_unpaired (self, flow == GST_FLOW_OK);
-  if (flow == GST_FLOW_OK) {
-    priv->discont |= is_first_after_drop;
-    pair.running = gstrange::running_time_of (priv->left, pair.buffers.first);
-    pair.capture = gstrange::capture_time_of (priv->left, pair.buffers.first, is_live (self));
-  }
-  return flow;
-}
-
-/* Caps that followed the pair apply from now on. */
-static void
-release_pair (GstStereoDepthPrivate *priv)
-{
-  gst_clear_buffer (&priv->pair.buffers.first);
-  gst_clear_buffer (&priv->pair.buffers.second);
-  priv->pair = {};
-  for (const Side side : {kLeft, kRight})
-    if (Input &input = priv->inputs[side]; input.next_info) {
-      input.info = std::exchange (input.next_info, std::nullopt);
-      priv->negotiate = true;
-    }
-}
-
 /* Drops the pair if a sink would discard its depth, and posts a QOS message. */
 static bool
 drop_if_late (GstStereoDepth *self)
 {
   GstStereoDepthPrivate *priv = self->priv;
-  const GstClockTime running = priv->pair.running;
+  const GstClockTime running = priv->matcher->running ();
   GstClockTime earliest;
   guint64 frames, dropped;
   double proportion;
@@ -292,7 +216,7 @@ drop_if_late (GstStereoDepth *self)
   }
   GST_DEBUG_OBJECT (self, "dropping pair at %" GST_TIME_FORMAT ": late by %.1f ms (QoS)",
       GST_TIME_ARGS (running), double (earliest - running) / GST_MSECOND);
-  GstBuffer *left = priv->pair.buffers.first;
+  GstBuffer *left = priv->matcher->buffer (kLeft);
   GST_OBJECT_LOCK (priv->left);
   const GstClockTime stream_time =
       gst_segment_to_stream_time (&priv->left->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (left));
@@ -303,30 +227,7 @@ drop_if_late (GstStereoDepth *self)
   gst_message_set_qos_stats (message, GST_FORMAT_BUFFERS, frames, dropped);
   gst_element_post_message (GST_ELEMENT (self), message);
   priv->discont = true;
-  release_pair (priv);
   return true;
-}
-
-/* The third image of the pair; null if it was lost, its stream has ended or there is no such pad:
- * the pair is then matched without it.
- * @return GST_AGGREGATOR_FLOW_NEED_DATA while it may still arrive */
-static GstFlowReturn
-dequeue_third (GstStereoDepth *self, bool timeout, GstBuffer **third)
-{
-  GstStereoDepthPrivate *priv = self->priv;
-  GstPad *pad = gst_element_get_static_pad (GST_ELEMENT (self), "third");
-  if (!pad)
-    return GST_FLOW_OK;
-  guint64 dropped = 0;
-  const GstFlowReturn flow = pop_companion (GST_AGGREGATOR_PAD (pad), GST_CAT_DEFAULT,
-      priv->pair.running, gstrange::pairing_tolerance (frame_duration (priv->inputs[kLeft].info)),
-      timeout, dropped, third);
-  gst_object_unref (pad);
-  if (*third && !priv->inputs[kThird].info) /* the pad was released meanwhile */
-    gst_clear_buffer (third);
-  std::lock_guard guard (priv->lock);
-  priv->counters.dropped_third += dropped;
-  return flow;
 }
 
 /* ---- negotiation ---- */
@@ -422,24 +323,6 @@ gst_stereo_depth_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
 
 /* ---- output ---- */
 
-/* Announces time without pairs, up to the pair that waits, so that downstream does not wait. */
-static GstFlowReturn
-push_gap (GstStereoDepth *self)
-{
-  GstStereoDepthPrivate *priv = self->priv;
-  GstClockTime begin, end;
-  if (!priv->matcher->pop_gap (priv->pair.running, begin, end))
-    return GST_FLOW_OK;
-  if (!priv->pool) { /* caps come before a GAP */
-    if (!priv->inputs[kLeft].info || !priv->inputs[kRight].info)
-      return GST_FLOW_OK;
-    if (const GstFlowReturn flow = negotiate (self, false); flow != GST_FLOW_OK)
-      return flow;
-  }
-  priv->matcher->push_gap (GST_AGGREGATOR (self), begin, end);
-  return GST_FLOW_OK;
-}
-
 /* Matches the images that the readers have open. */
 static Status
 match_images (GstStereoDepth *self, bool with_third, GstBuffer *output)
@@ -458,7 +341,7 @@ match_images (GstStereoDepth *self, bool with_third, GstBuffer *output)
   }
   bool restricted = false;
   const Roi roi = priv->rois.next (priv->core, interval, restricted);
-  if (Status s = gstrange::add_view (output, priv->core.range_view ().id, roi, priv->pair.capture);
+  if (Status s = gstrange::add_view (output, priv->core.range_view ().id, roi, priv->capture);
       !s.ok ())
     return s;
   gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
@@ -469,7 +352,7 @@ match_images (GstStereoDepth *self, bool with_third, GstBuffer *output)
     return status;
   const GstClockTime elapsed = gst_util_get_timestamp () - begin;
   GST_LOG_OBJECT (self, "pair at %" GST_TIME_FORMAT ": matched %dx%d at (%d, %d)%s in %.1f ms",
-      GST_TIME_ARGS (priv->pair.running), roi.width, roi.height, roi.x, roi.y,
+      GST_TIME_ARGS (priv->matcher->running ()), roi.width, roi.height, roi.x, roi.y,
       with_third ? " with third image" : "", double (elapsed) / GST_MSECOND);
   std::lock_guard guard (priv->lock);
   priv->counters.frames++;
@@ -484,7 +367,7 @@ static Status
 match_pair (GstStereoDepth *self, GstBuffer *third, GstBuffer *output)
 {
   GstStereoDepthPrivate *priv = self->priv;
-  GstBuffer *buffers[] = {priv->pair.buffers.first, priv->pair.buffers.second, third};
+  GstBuffer *buffers[] = {priv->matcher->buffer (kLeft), priv->matcher->buffer (kRight), third};
   for (int i = 0; i < 3 && buffers[i]; i++)
     if (!priv->inputs[i].reader.open (buffers[i]))
       return {StatusCode::kBadData,
@@ -498,7 +381,7 @@ match_pair (GstStereoDepth *self, GstBuffer *third, GstBuffer *output)
 static void
 reset_after_break (GstStereoDepthPrivate *priv)
 {
-  const GstClockTime before = priv->last_pts, now = GST_BUFFER_PTS (priv->pair.buffers.first),
+  const GstClockTime before = priv->last_pts, now = GST_BUFFER_PTS (priv->matcher->buffer (kLeft)),
                      duration = frame_duration (priv->inputs[kLeft].info);
   priv->last_pts = now;
   const GstClockTime limit = GST_SECOND + (GST_CLOCK_TIME_IS_VALID (duration) ? 2 * duration : 0);
@@ -511,8 +394,7 @@ static GstFlowReturn
 push_pair (GstStereoDepth *self, GstBuffer *third)
 {
   GstStereoDepthPrivate *priv = self->priv;
-  const WaitingPair &pair = priv->pair;
-  GstBuffer *left = pair.buffers.first;
+  GstBuffer *left = priv->matcher->buffer (kLeft);
   auto aggregator = GST_AGGREGATOR (self);
   GstBuffer *output = nullptr;
   GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &output);
@@ -537,11 +419,10 @@ push_pair (GstStereoDepth *self, GstBuffer *third)
   const GstClockTime duration = GST_BUFFER_DURATION_IS_VALID (left)
                                     ? GST_BUFFER_DURATION (left)
                                     : frame_duration (priv->inputs[kLeft].info);
-  gstrange::stamp (aggregator, output, pair.running, duration, pair.capture);
-  if (pair.buffers.discont || priv->discont)
+  gstrange::stamp (aggregator, output, priv->matcher->running (), duration, priv->capture);
+  if (priv->matcher->discont () || priv->discont)
     GST_BUFFER_FLAG_SET (output, GST_BUFFER_FLAG_DISCONT);
   priv->discont = false;
-  priv->matcher->record_output (pair.running, duration);
   priv->reporter.passed (GST_ELEMENT (self), output);
   return gst_aggregator_finish_buffer (aggregator, output);
 }
@@ -565,55 +446,29 @@ gst_stereo_depth_aggregate (GstAggregator *aggregator, gboolean timeout)
   auto self = GST_STEREO_DEPTH (aggregator);
   GstStereoDepthPrivate *priv = self->priv;
   apply_release_of_third (priv);
-  if (!priv->pair.buffers.first) {
-    const GstFlowReturn taken = dequeue_pair (self);
-    if (const GstFlowReturn flow = push_gap (self); flow != GST_FLOW_OK)
-      return flow;
-    if (taken == GST_FLOW_EOS)
-      priv->reporter.finish ();
-    if (taken != GST_FLOW_OK)
-      return taken;
-  }
-  if (drop_if_late (self))
-    return GST_FLOW_OK;
-  GstBuffer *third = nullptr;
-  GstFlowReturn flow = dequeue_third (self, timeout, &third);
-  if (flow != GST_FLOW_OK)
+  GstFlowReturn flow = priv->matcher->next (
+      gstrange::pairing_tolerance (frame_duration (priv->inputs[kLeft].info)), timeout);
+  if (flow == GST_FLOW_EOS)
+    priv->reporter.finish ();
+  if (flow != GST_FLOW_OK || drop_if_late (self))
     return flow;
+  priv->capture =
+      gstrange::capture_time_of (priv->left, priv->matcher->buffer (kLeft), is_live (self));
+  GstBuffer *third = priv->inputs[kThird].info ? priv->matcher->buffer (kThird) : nullptr;
   if (priv->negotiate || (priv->negotiate_third && third))
     flow = negotiate (self, third != nullptr);
   if (flow == GST_FLOW_OK)
     flow = push_pair (self, third);
-  gst_clear_buffer (&third);
-  release_pair (priv);
+  priv->matcher->release ();
   update_processing_time (self);
   return flow;
 }
 
-/* The deadline for the third image of the next pair; there is none while left or right is missing,
- * because without them there is nothing to push. */
 static GstClockTime
 gst_stereo_depth_get_next_time (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
-  log_waiting (GST_CAT_DEFAULT, priv->left);
-  log_waiting (GST_CAT_DEFAULT, priv->right);
-  if (GstPad *third = gst_element_get_static_pad (GST_ELEMENT (aggregator), "third")) {
-    log_waiting (GST_CAT_DEFAULT, GST_AGGREGATOR_PAD (third));
-    gst_object_unref (third);
-  }
-  GstClockTime time = priv->pair.running;
-  if (!priv->pair.buffers.first) {
-    if (gst_aggregator_pad_is_eos (priv->left) || gst_aggregator_pad_is_eos (priv->right))
-      return 0; /* the stream ends now, whatever the third camera does */
-    for (GstAggregatorPad *pad : {priv->left, priv->right}) {
-      GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad);
-      if (!buffer)
-        return GST_CLOCK_TIME_NONE;
-      time = std::min (time, gstrange::running_time_of (pad, buffer)); /* NONE is the maximum */
-      gst_buffer_unref (buffer);
-    }
-  }
+  const GstClockTime time = priv->matcher->next_time ();
   return GST_CLOCK_TIME_IS_VALID (time) ? time - std::min (time, priv->processing_time) : time;
 }
 
@@ -687,9 +542,9 @@ collect_stats (GstElement *element)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (element)->priv;
   std::lock_guard guard (priv->lock);
-  const guint64 unpaired = priv->matcher->dropped_first () + priv->matcher->dropped_second ();
+  const FrameMatcher &m = *priv->matcher;
   return {{.counters = {.frames = priv->counters.frames,
-               .lost = unpaired + priv->counters.dropped_third,
+               .lost = m.dropped (kLeft) + m.dropped (kRight) + m.dropped (kThird),
                .late = priv->counters.dropped_late}}};
 }
 
@@ -701,10 +556,10 @@ gst_stereo_depth_start (GstAggregator *aggregator)
     input.info.reset ();
   priv->negotiate = true;
   priv->negotiate_third = priv->third_released = false;
-  priv->warned_unpaired = priv->discont = false;
+  priv->discont = false;
   priv->last_pts = GST_CLOCK_TIME_NONE;
-  priv->dropped_before_pair = priv->processing_time = 0;
-  priv->matcher->reset ();
+  priv->processing_time = 0;
+  priv->matcher->start ();
   priv->rois.reset ();
   priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
@@ -718,7 +573,6 @@ static GstFlowReturn
 gst_stereo_depth_flush (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
-  release_pair (priv);
   priv->matcher->flush ();
   priv->rois.restart_interval ();
   priv->core.reset ();
@@ -734,9 +588,8 @@ gst_stereo_depth_stop (GstAggregator *aggregator)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
   priv->reporter.stop ();
-  priv->pad_links.reset ();
   drop_pool (priv->pool);
-  release_pair (priv);
+  priv->matcher->stop ();
   for (Input &input : priv->inputs)
     input.reader.reset ();
   return TRUE;
@@ -754,14 +607,14 @@ static GstStructure *
 make_stats (const GstStereoDepthPrivate *priv)
 {
   const Counters &c = priv->counters;
-  return gst_structure_new ("application/x-stereodepth-stats",          //
-      "frames", G_TYPE_UINT64, c.frames,                                //
-      "restricted-frames", G_TYPE_UINT64, c.restricted_frames,          //
-      "third-frames", G_TYPE_UINT64, c.third_frames,                    //
-      "dropped-left", G_TYPE_UINT64, priv->matcher->dropped_first (),   //
-      "dropped-right", G_TYPE_UINT64, priv->matcher->dropped_second (), //
-      "dropped-third", G_TYPE_UINT64, c.dropped_third,                  //
-      "dropped-late", G_TYPE_UINT64, c.dropped_late,                    //
+  return gst_structure_new ("application/x-stereodepth-stats",         //
+      "frames", G_TYPE_UINT64, c.frames,                               //
+      "restricted-frames", G_TYPE_UINT64, c.restricted_frames,         //
+      "third-frames", G_TYPE_UINT64, c.third_frames,                   //
+      "dropped-left", G_TYPE_UINT64, priv->matcher->dropped (kLeft),   //
+      "dropped-right", G_TYPE_UINT64, priv->matcher->dropped (kRight), //
+      "dropped-third", G_TYPE_UINT64, priv->matcher->dropped (kThird), //
+      "dropped-late", G_TYPE_UINT64, c.dropped_late,                   //
       "match-time", G_TYPE_UINT64, c.match_time, nullptr);
 }
 
@@ -778,7 +631,7 @@ gst_stereo_depth_init (GstStereoDepth *self)
   auto priv = self->priv = new GstStereoDepthPrivate;
   priv->left = add_sink_pad (GST_ELEMENT (self), kPadNames[kLeft]);
   priv->right = add_sink_pad (GST_ELEMENT (self), kPadNames[kRight]);
-  priv->matcher.emplace (priv->left, priv->right, GST_CAT_DEFAULT);
+  priv->matcher.emplace (GST_ELEMENT (self), GST_CAT_DEFAULT, kPadNames);
   priv->packed.watch (GST_ELEMENT (self), GST_PAD (priv->left), GST_PAD (priv->right));
 }
 

@@ -70,25 +70,42 @@ ClockPublisher::close ()
   gst_clear_object (&clock_);
 }
 
-Status
-ClockPublisher::start (int port, GstClock *clock)
+static bool
+report (GstElement *element, const Status &status)
 {
-  std::lock_guard guard (lock_);
-  if (port == kOff)
-    return {};
-  const Status status = open (port, clock);
-  started_ = status.ok ();
-  return status;
+  if (!status.ok ())
+    GST_ELEMENT_ERROR (element, RESOURCE, BUSY, ("%s", status.message ().c_str ()), (nullptr));
+  return status.ok ();
 }
 
-Status
-ClockPublisher::set_clock (GstClock *clock)
+bool
+ClockPublisher::start (GstElement *element, int port)
 {
-  std::lock_guard guard (lock_);
-  if (!started_ || clock == clock_)
-    return {};
-  close (); /* a provider keeps the clock that it was made with; the port stays the same */
-  return open (port_, clock);
+  if (port == kOff)
+    return true;
+  GstClock *clock = gst_element_get_clock (element);
+  Status status;
+  {
+    std::lock_guard guard (lock_);
+    status = open (port, clock);
+    started_ = status.ok ();
+  }
+  gst_clear_object (&clock);
+  return report (element, status);
+}
+
+void
+ClockPublisher::set_clock (GstElement *element, GstClock *clock)
+{
+  Status status;
+  {
+    std::lock_guard guard (lock_);
+    if (!started_ || clock == clock_)
+      return;
+    close (); /* a provider keeps the clock that it was made with; the port stays the same */
+    status = open (port_, clock);
+  }
+  report (element, status);
 }
 
 void

@@ -18,13 +18,14 @@ public:
   ClockPublisher (const ClockPublisher &) = delete;
   ClockPublisher &operator= (const ClockPublisher &) = delete;
 
-  /** Binds the port. Requests are answered as soon as there is a clock.
+  /** Binds the port. Requests are answered as soon as the element has a clock. Posts an error that
+   *  names the port if another program has it.
    *  @param port  1 .. 65535 or kAnyPort; kOff: nothing happens
-   *  @param clock  may be null
-   *  @return kBadValue naming the port if another program has it */
-  rangecast::Status start (int port, GstClock *clock);
-  /** Answers with this clock from now on; null: does not answer. Does nothing before start(). */
-  rangecast::Status set_clock (GstClock *clock);
+   *  @return false after an error */
+  bool start (GstElement *element, int port);
+  /** Answers with this clock from now on; null: does not answer. Does nothing before start(). Posts
+   *  an error if that fails. */
+  void set_clock (GstElement *element, GstClock *clock);
   void stop ();
   /** The port in use, else kOff. */
   [[nodiscard]] int port () const { return port_; }

@@ -33,9 +33,7 @@
 #include <vector>
 
 #include "codedviews.hpp"
-#include "common/capserrors.hpp"
 #include "common/properties.hpp"
-#include "common/requirecaps.hpp"
 #include "common/statsreporter.hpp"
 
 using gstrange::RangeInfo;
@@ -76,7 +74,6 @@ struct GstRangeDemuxPrivate {
   bool coded = false;
   bool had_pads = false; /* since start */
   CodedViews units;      /* of the current frame set, if coded */
-  CapsErrors caps_errors;
   guint group_id = GST_GROUP_ID_INVALID;
 
   ~GstRangeDemuxPrivate () { gst_flow_combiner_free (combiner); }
@@ -218,12 +215,11 @@ push_views (GstRangeDemux *self, GstBuffer *frame_set)
 }
 
 static GstFlowReturn
-gst_range_demux_chain (GstPad *sink, GstObject *parent, GstBuffer *buffer)
+gst_range_demux_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
 {
   auto self = GST_RANGE_DEMUX (parent);
   GstRangeDemuxPrivate *priv = self->priv;
-  const bool has_caps = require_caps (GST_ELEMENT (self), sink) && priv->info.views () > 0;
-  GstFlowReturn flow = has_caps ? GST_FLOW_OK : GST_FLOW_NOT_NEGOTIATED;
+  GstFlowReturn flow = priv->info.views () > 0 ? GST_FLOW_OK : GST_FLOW_NOT_NEGOTIATED;
   if (flow == GST_FLOW_OK && priv->coded) {
     flow = gst_range_flow_return (GST_ELEMENT (self), priv->units.read (buffer));
     if (priv->units.dropped () > 0)
@@ -344,42 +340,6 @@ update_pads (GstRangeDemux *self, GstPad *sink)
     gst_element_no_more_pads (GST_ELEMENT (self));
 }
 
-/* What gst_parse_launch() says of a pad that it waited for, which names that pad, and the pads that
- * there are. It posts that during gst_element_no_more_pads(). */
-static GstMessage *
-name_pads (GstRangeDemuxPrivate *priv, GstMessage *message)
-{
-  GError *error = nullptr;
-  gchar *debug = nullptr;
-  gst_message_parse_warning (message, &error, &debug);
-  if (g_error_matches (error, GST_PARSE_ERROR, GST_PARSE_ERROR_DELAYED_LINK)) {
-    const gchar *line = debug ? g_strrstr (debug, "\n") : nullptr;
-    std::string text = line ? line + 1 : error->message;
-    const auto views = priv->info.views ();
-    text += "; the stream has " + std::to_string (views) + (views == 1 ? " view:" : " views:");
-    for (const DemuxPad &entry : priv->pads)
-      if (entry.pad)
-        text += std::string (" ") + GST_PAD_NAME (entry.pad);
-    g_free (error->message);
-    error->message = g_strdup (text.c_str ());
-    GstMessage *named = gst_message_new_warning (GST_MESSAGE_SRC (message), error, debug);
-    gst_message_set_seqnum (named, gst_message_get_seqnum (message));
-    gst_message_unref (message);
-    message = named;
-  }
-  g_error_free (error);
-  g_free (debug);
-  return message;
-}
-
-static gboolean
-gst_range_demux_post_message (GstElement *element, GstMessage *message)
-{
-  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_WARNING)
-    message = name_pads (GST_RANGE_DEMUX (element)->priv, message);
-  return GST_ELEMENT_CLASS (gst_range_demux_parent_class)->post_message (element, message);
-}
-
 /* ---- events ---- */
 
 static gboolean
@@ -392,7 +352,7 @@ handle_caps (GstRangeDemux *self, GstPad *sink, GstEvent *event)
       gst_structure_has_name (gst_caps_get_structure (caps, 0), GST_NEIGHBOUR_CODE_MEDIA_TYPE);
   const Status status = gstrange::parse_caps (caps, priv->info);
   gst_event_unref (event);
-  if (!priv->caps_errors.accept (GST_ELEMENT (self), status))
+  if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
   priv->coded = coded;
   priv->reporter.set_views (priv->info.rig);
@@ -468,7 +428,6 @@ gst_range_demux_change_state (GstElement *element, GstStateChange transition)
         remove_pad (self, entry);
     gst_flow_combiner_reset (priv->combiner);
     priv->info = {};
-    priv->caps_errors.reset ();
     priv->had_pads = false;
     priv->group_id = GST_GROUP_ID_INVALID;
     priv->last_seek = GST_SEQNUM_INVALID;
@@ -542,7 +501,6 @@ gst_range_demux_class_init (GstRangeDemuxClass *klass)
       "Splits a stream of range frame sets into one stream per view", "gst-rangecast");
 
   element_class->change_state = GST_DEBUG_FUNCPTR (gst_range_demux_change_state);
-  element_class->post_message = GST_DEBUG_FUNCPTR (gst_range_demux_post_message);
 
   GST_DEBUG_CATEGORY_INIT (gst_range_demux_debug, "rangedemux", 0, "Range demultiplexer");
 }

@@ -8,7 +8,7 @@
  * that are gone and includes them again when they return. Frame sets of up to 16 memories share
  * them without copying; of more, the first 15 are shared and the others copied once.
  *
- * Recordings that begin at different times are aligned by capture time, independently of their PTS.
+ * Recordings are aligned by capture time, independently of their PTS.
  *
  * With #GstRangeMux:clock-port it publishes the pipeline clock, so that all camera hosts can
  * trigger simultaneously.
@@ -23,15 +23,12 @@
  */
 /* What happens to a buffer, in the order of this file; all of it in aggregate(), in the streaming
  * thread:
- *  1. It waits at its pad: WaitingBuffers.
- *  2. Its stream is chosen for frame sets, or left out: update_streams(), negotiate().
- *  3. Its capture time is compared with those of the other streams: compare_clocks() if live,
- *     compare_recordings() if not. Of recordings that have begun again, it waits for the others.
- *  4. It is dropped if no frame set can contain it, because it is late, out of sync or of a stream
- *     that is left out: drop_unusable().
- *  5. It waits for buffers of the other streams, until the deadline; then it is joined with those
- *     within max-skew of the oldest one, and pushed: join_matching(), push_frame_set().
- * make_frame_set() does these steps in order, and decides whether to wait.
+ *  1. It waits at its pad: StreamTimes::peek().
+ *  2. Its stream is chosen for frame sets, or left out: find_silent(), negotiate().
+ *  3. It is dropped if no frame set can contain it, because it is late, of another clock or of a
+ *     stream that is left out: drop_unusable().
+ *  4. It waits for buffers of the other streams, until the deadline; then it is joined with those
+ *     within max-skew of the oldest one, and pushed: match_streams(), push_frame_set().
  *
  * Locking: the private lock guards what application threads read; it is never held across a push,
  * message or call into GstAggregator. The clock publisher and the statistics have their own. */
@@ -46,18 +43,15 @@
 #include <mutex>
 #include <rangecast/rigfile/rig_file.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "clockconsensus.hpp"
 #include "clockpublisher.hpp"
-#include "common/downstream.hpp"
-#include "common/properties.hpp"
-#include "common/statsreporter.hpp"
+#include "common/capsadvice.hpp"
+#include "common/elementproperties.hpp"
 #include "frameset.hpp"
-#include "recordings.hpp"
 #include "rigcheck.hpp"
-#include "streams.hpp"
-#include "waitingbuffers.hpp"
+#include "streamtimes.hpp"
 
 using rangecast::Status;
 using rangecast::StatusCode;
@@ -65,14 +59,16 @@ using rangecast::StatusCode;
 GST_DEBUG_CATEGORY_STATIC (gst_range_mux_debug);
 #define GST_CAT_DEFAULT gst_range_mux_debug
 
-enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
-
 namespace {
+
+using Head = MatchStream::Head;
 
 /* States that last as long are reported; the backlog of a host that paused is not. */
 constexpr GstClockTime kMinReportTime = GST_SECOND;
 /* Of the capture times in a frame set, if the frame rate is unknown. */
 constexpr GstClockTime kDefaultTolerance = 5 * GST_MSECOND;
+/* Recordings: a frame whose capture time goes back by no more was reordered. */
+constexpr GstClockTime kMaxReordered = GST_SECOND;
 
 struct Settings {
   GstClockTime max_skew = 0; /* 0: half a frame period */
@@ -98,19 +94,16 @@ struct GstRangeMuxPrivate {
   StatsReporter reporter;
   std::atomic<bool> caps_dirty = true; /* choose_streams() is to run again */
 
+  int configured_port = ClockPublisher::kOff; /* between start and stop */
+
   /* streaming thread only; vectors are kept for their memory */
   bool live = false;
-  rangecast::Rig rig;         /* of settings.rig_file; empty: any */
-  MuxStreams current_streams; /* see CurrentStreams */
-  WaitingBuffers waiting;
-  ClockConsensus consensus;
-  std::vector<ClockConsensus::Stream> clock_offsets;
-  std::vector<MuxStream *> offset_streams; /* in the order of clock_offsets */
-  Recordings recordings;
+  rangecast::Rig rig;               /* of settings.rig_file; empty: any */
+  MuxStreams current_streams;       /* see CurrentStreams */
+  std::vector<MatchStream *> order; /* the same, for match_streams() */
+  StreamTimes times;
   FrameSetJoiner joiner;
-  GstClockTime oldest_running = GST_CLOCK_TIME_NONE; /* of the buffers that wait */
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
-  FrameTimes last; /* of the last frame set */
 };
 
 struct _GstRangeMux {
@@ -152,50 +145,18 @@ private:
 
 } // namespace
 
-/* Removes the next buffer of a stream: priv->waiting has a reference. */
+/* Removes the next buffer of a stream, whose `buffer` stays a reference. */
 static void
 drop_buffer (GstRangeMuxPrivate *priv, MuxStream &stream)
 {
-  if (stream.held) {
-    gst_clear_buffer (&stream.held); /* was counted */
-    return;
-  }
   gst_aggregator_pad_drop_buffer (stream.pad);
+  if (stream.head == Head::kGap)
+    return;
   std::lock_guard guard (priv->lock);
   stream.received++;
 }
 
-/* Takes buffers from their pads that may have a damaged capture time: the next ones will tell.
- * @return whether any */
-static bool
-hold_unsure (GstRangeMuxPrivate *priv)
-{
-  bool any = false;
-  for (const WaitingBuffer &w : priv->waiting.next_round) {
-    MuxStream &stream = *w.stream;
-    if (!stream.round.unsure || stream.held)
-      continue;
-    drop_buffer (priv, stream);
-    stream.held = gst_buffer_ref (w.buffer);
-    stream.held_capture = w.capture;
-    stream.held_running = w.running;
-    any = true;
-  }
-  return any;
-}
-
 /* ---- 2. which streams make up frame sets; caps with the union of their rigs ---- */
-
-static void
-report (GstRangeMux *self, MuxStream &stream, StreamState state)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  GST_INFO_OBJECT (self, "%s is %s", stream.title ().c_str (), name_of (state));
-  GstClockTimeDiff offset = stream.ahead;
-  if (priv->live)
-    offset = stream.offset_known ? stream.offset - priv->consensus.reference () : 0;
-  report_state (GST_ELEMENT (self), stream, state, offset, priv->live);
-}
 
 /* Sets a stream's state, and reports it when it changes: kLate and kOutOfSync once they have lasted
  * kMinReportTime.
@@ -215,136 +176,35 @@ set_state (GstRangeMux *self, MuxStream &stream, StreamState state, GstClockTime
                      running >= stream.since + kMinReportTime;
   if (!lasts && (state == StreamState::kLate || state == StreamState::kOutOfSync))
     return;
-  report (self, stream, state);
-}
-
-/* Reports streams that have ended and of which all buffers were dropped, in less than
- * kMinReportTime. */
-static void
-report_all_dropped (GstRangeMux *self, const MuxStreams &streams)
-{
-  for (const auto &stream : streams)
-    if (stream->received > 0 && stream->late + stream->out_of_sync == stream->received &&
-        stream->reported == StreamState::kIn && gst_aggregator_pad_is_eos (stream->pad))
-      report (self, *stream, stream->state);
-}
-
-/* Finds which streams are silent: those without a buffer whose last one is much older than the
- * oldest buffer that waits, so that a stream whose times jump silences no other. The streams are
- * chosen again when one becomes silent or returns: one that clashed with it may take its place. */
-static void
-update_streams (GstRangeMux *self, const MuxStreams &streams)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  GstClockTime now = GST_CLOCK_TIME_NONE; /* the greatest number there is */
-  for (const auto &stream : streams)
-    stream->waits = false;
-  for (const auto *buffers : {&priv->waiting.list, &priv->waiting.gaps, &priv->waiting.next_round})
-    for (const WaitingBuffer &w : *buffers) {
-      w.stream->waits = true;
-      if (!GST_CLOCK_TIME_IS_VALID (w.running))
-        continue;
-      w.stream->seen = w.running;
-      now = std::min (now, w.running);
-    }
-  priv->oldest_running = now;
-  if (!GST_CLOCK_TIME_IS_VALID (now))
-    return;
-  for (const auto &stream : streams) {
-    if (!GST_CLOCK_TIME_IS_VALID (stream->seen))
-      stream->seen = now; /* it has not begun yet */
-    const bool alive = stream->waits || now <= stream->seen || now - stream->seen <= kSilentAfter;
-    if (alive != stream->alive)
-      priv->caps_dirty = true;
-    stream->alive = alive;
-    if (!alive && priv->live && !gst_aggregator_pad_is_eos (stream->pad))
-      set_state (self, *stream, StreamState::kSilent, now);
-  }
+  GST_INFO_OBJECT (self, "%s is %s", stream.title ().c_str (), name_of (state));
+  report_state (GST_ELEMENT (self), stream, state, priv->times.ahead (stream));
 }
 
 static GstFlowReturn
 negotiate (GstRangeMux *self, const MuxStreams &streams)
 {
   GstRangeMuxPrivate *priv = self->priv;
-  MuxFormat format;
-  const Status status = choose_streams (streams, !priv->live, format);
+  gstrange::RangeInfo info;
+  GstCaps *caps = nullptr;
+  const Status status = choose_streams (streams, !priv->live, info, caps);
   if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
       flow != GST_FLOW_OK)
     return flow;
   for (const auto &stream : streams)
     if (stream->alive && (!stream->other_rig.ok () || !stream->clash.ok ()))
       set_state (self, *stream, stream->clash.ok () ? StreamState::kOtherRig : StreamState::kClash,
-          priv->oldest_running);
-  if (format.info.views () == 0)
+          priv->times.oldest ());
+  if (!caps)
     return GST_FLOW_OK; /* no stream is left */
-  GstCaps *caps = format.coded ? gstrange::make_neighbour_code_caps (format.info, "access-unit")
-                               : gstrange::make_range_caps (format.info);
-  GST_INFO_OBJECT (self, "%d views: %" GST_PTR_FORMAT, format.info.views (), caps);
+  GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT, caps);
   gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
   gst_caps_unref (caps);
-  priv->frame_duration = format.info.frame_duration ();
-  priv->reporter.set_views (format.info.rig);
+  priv->frame_duration = info.frame_duration ();
+  priv->reporter.set_views (info.rig);
   return GST_FLOW_OK;
 }
 
-/* ---- 3. streams with capture times of the same clock, recordings of the same time ---- */
-
-/* Live: compares offsets of capture times from the pipeline clock, which takes no buffers of other
- * streams to wait for. */
-static void
-compare_clocks (GstRangeMux *self, const MuxStreams &streams)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  const GstClockTime base = gst_element_get_base_time (GST_ELEMENT (self));
-  for (const WaitingBuffer &w : priv->waiting.list)
-    if (GST_CLOCK_TIME_IS_VALID (w.running)) {
-      std::lock_guard guard (priv->lock);
-      w.stream->offset = ClockConsensus::offset_of (w.capture, base + w.running);
-      w.stream->offset_known = true;
-    }
-  priv->clock_offsets.clear ();
-  priv->offset_streams.clear ();
-  for (const auto &stream : streams)
-    if (stream->chosen && stream->alive && stream->offset_known) {
-      priv->clock_offsets.push_back ({stream->offset});
-      priv->offset_streams.push_back (stream.get ());
-    }
-  if (priv->consensus.update (priv->clock_offsets)) {
-    GST_DEBUG_OBJECT (self, "most streams have another clock now: its offset is %" GST_STIME_FORMAT,
-        GST_STIME_ARGS (priv->consensus.reference ()));
-    priv->last.capture = GST_CLOCK_TIME_NONE; /* a time of the other clock */
-  }
-  for (std::size_t i = 0; i < priv->offset_streams.size (); i++)
-    priv->offset_streams[i]->in_sync = priv->clock_offsets[i].in_sync;
-}
-
-/* Not live: compares capture times. */
-static void
-compare_recordings (GstRangeMux *self)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  if (priv->recordings.compare (priv->waiting, priv->last.capture)) {
-    GST_DEBUG_OBJECT (self, "the recordings have begun again");
-    priv->last.capture = GST_CLOCK_TIME_NONE;
-  }
-  if (const WaitingBuffer *w = Recordings::find_different_time (priv->waiting)) {
-    w->stream->different_time_reported = true;
-    set_state (self, *w->stream, StreamState::kDifferentTime, w->running);
-  }
-}
-
-/* Not live: reports recordings that have ended without a frame set in common with another. */
-static void
-report_unmatched (GstRangeMux *self, const MuxStreams &streams)
-{
-  while (MuxStream *unmatched = Recordings::find_unmatched (streams)) {
-    unmatched->different_time_reported = true;
-    unmatched->ahead = 0;
-    set_state (self, *unmatched, StreamState::kDifferentTime, GST_CLOCK_TIME_NONE);
-  }
-}
-
-/* ---- 4. buffers that no frame set can contain ---- */
+/* ---- 3. buffers that no frame set can contain ---- */
 
 /* Maximum difference of the capture times of a frame set, ns. */
 static GstClockTime
@@ -357,220 +217,179 @@ matching_tolerance (GstRangeMuxPrivate *priv)
                                                         : kDefaultTolerance;
 }
 
-/* Drops gaps that end before the other streams' buffers; until then their streams are not waited
- * for. Without the running times of live streams the end of a gap in capture time is computed from
- * the stream's last buffer.
+/* Whether a frame set can contain the frame at the head of a stream, and why not. */
+static StreamState
+classify_frame (const MuxStream &stream)
+{
+  if (!stream.chosen)
+    return stream.other_rig.ok () ? StreamState::kClash : StreamState::kOtherRig;
+  if (!stream.in_sync)
+    return StreamState::kOutOfSync;
+  return stream.late ? StreamState::kLate : StreamState::kIn;
+}
+
+static void
+drop_frame (GstRangeMux *self, MuxStream &stream, StreamState state)
+{
+  GstRangeMuxPrivate *priv = self->priv;
+  GST_DEBUG_OBJECT (stream.pad,
+      "dropping a buffer: %s; capture time %" GST_TIME_FORMAT ", last frame set %" GST_TIME_FORMAT,
+      name_of (state), GST_TIME_ARGS (stream.time), GST_TIME_ARGS (priv->times.last_capture ()));
+  drop_buffer (priv, stream);
+  {
+    std::lock_guard guard (priv->lock);
+    (state == StreamState::kLate           ? stream.dropped_late
+        : state == StreamState::kOutOfSync ? stream.out_of_sync
+                                           : stream.left_out)++;
+  }
+  set_state (self, stream, state, stream.running);
+}
+
+/* Drops late frames of recordings. @return whether any was dropped */
+static bool
+drop_late (GstRangeMux *self, const MuxStreams &streams)
+{
+  bool any = false;
+  for (const auto &stream : streams)
+    if (stream->late) {
+      drop_frame (self, *stream, StreamState::kLate);
+      any = true;
+    }
+  return any;
+}
+
+/* Here late views are dropped. One of a recording that goes back far is dropped with the next frame
+ * set: if those of all others go back, too, the recordings have begun again.
  * @return whether any was dropped */
 static bool
-drop_past_gaps (GstRangeMux *self, GstClockTime tolerance, bool timeout)
-{
-  GstRangeMuxPrivate *priv = self->priv;
-  const WaitingBuffers &waiting = priv->waiting;
-  if (waiting.list.empty () && waiting.missing > 0 && !timeout)
-    return false;
-  GstClockTime running = GST_CLOCK_TIME_NONE, capture = GST_CLOCK_TIME_NONE;
-  for (const WaitingBuffer &w : waiting.list) {
-    running = std::min (running, w.running);
-    capture = std::min (capture, w.capture);
-  }
-  bool any = false;
-  for (const WaitingBuffer &gap : waiting.gaps) {
-    const GstClockTime end = gstrange::gap_end (gap.running, gap.buffer, tolerance);
-    const bool by_capture = !priv->live && gap.stream->shift_known && GST_CLOCK_TIME_IS_VALID (end);
-    const bool past =
-        by_capture ? GST_CLOCK_DIFF (end, capture) > gap.stream->shift : running > end;
-    if (!waiting.list.empty () && !past)
-      continue;
-    GST_LOG_OBJECT (gap.stream->pad, "gap until %" GST_TIME_FORMAT, GST_TIME_ARGS (end));
-    gst_aggregator_pad_drop_buffer (gap.stream->pad);
-    any = true;
-  }
-  return any;
-}
-
-/* Whether a frame set can contain a buffer, and why not. */
-static StreamState
-classify_buffer (const GstRangeMuxPrivate *priv, const WaitingBuffer &w, GstClockTime tolerance)
-{
-  if (!w.stream->chosen)
-    return w.stream->other_rig.ok () ? StreamState::kClash : StreamState::kOtherRig;
-  if (!w.stream->in_sync)
-    return StreamState::kOutOfSync;
-  const bool late =
-      GST_CLOCK_TIME_IS_VALID (priv->last.capture) && w.capture <= priv->last.capture + tolerance;
-  if (!priv->live && late && w.stream->round.went_back && priv->waiting.missing > 0)
-    return StreamState::kIn; /* recordings begin again if the others' next buffers went back, too */
-  return late ? StreamState::kLate : StreamState::kIn;
-}
-
-/* Here late views are dropped. @return whether any was dropped */
-static bool
-drop_unusable (GstRangeMux *self, GstClockTime tolerance)
+drop_unusable (GstRangeMux *self, const MuxStreams &streams)
 {
   GstRangeMuxPrivate *priv = self->priv;
   bool any = false;
-  for (const WaitingBuffer &w : priv->waiting.list) {
-    MuxStream &stream = *w.stream;
-    const StreamState state = classify_buffer (priv, w, tolerance);
-    if (state == StreamState::kIn)
+  for (const auto &stream : streams) {
+    if (stream->head != Head::kFrame)
       continue;
-    GST_DEBUG_OBJECT (stream.pad,
-        "dropping a buffer: %s; capture time %" GST_TIME_FORMAT
-        ", last frame set %" GST_TIME_FORMAT,
-        name_of (state), GST_TIME_ARGS (w.capture), GST_TIME_ARGS (priv->last.capture));
-    any = true;
-    if (state == StreamState::kLate && !priv->live)
-      stream.ahead = GST_CLOCK_DIFF (priv->last.capture, w.capture);
-    drop_buffer (priv, stream);
-    {
-      std::lock_guard guard (priv->lock);
-      switch (state) {
-        case StreamState::kLate:
-          stream.late++;
-          break;
-        case StreamState::kOutOfSync:
-          stream.out_of_sync++;
-          break;
-        default:
-          stream.left_out++;
-      }
+    const StreamState state = classify_frame (*stream);
+    if (state == StreamState::kLate && !priv->live &&
+        stream->time + kMaxReordered < priv->times.last_capture ()) {
+      stream->head = Head::kEnded; /* see drop_late() */
+    } else if (state != StreamState::kIn) {
+      stream->late = false;
+      drop_frame (self, *stream, state);
+      any = true;
     }
-    set_state (self, stream, state, w.running);
   }
   return any;
 }
 
-/* ---- 5. one frame set: buffers are joined and pushed ---- */
+/* ---- 4. one frame set: buffers are joined and pushed ---- */
 
-namespace {
-/* The buffers of one frame set. */
-struct Match {
-  std::size_t streams = 0;
-  FrameTimes times; /* running time: of the oldest buffer by that */
-  double speed = 1; /* of that one, see speed_of() */
-};
-} // namespace
-
-/* Takes the buffers from their pads whose capture time is within the tolerance of the oldest one,
- * `first`, and gives them to the joiner. */
-static Match
-join_matching (GstRangeMux *self, GstClockTime first, GstClockTime tolerance)
+/* Takes the buffers that match from their pads, and gives them to the joiner.
+ * @return how many streams they are of */
+static std::size_t
+join_matching (GstRangeMux *self, const MuxStreams &streams, FrameTimes &times)
 {
   GstRangeMuxPrivate *priv = self->priv;
-  const auto matches = [&] (const WaitingBuffer &w) { return w.capture <= first + tolerance; };
   guint memories = 0;
-  Match match;
-  match.times.capture = first;
-  for (const WaitingBuffer &w : priv->waiting.list)
-    if (matches (w)) {
-      memories += gst_buffer_n_memory (w.buffer);
-      match.streams++;
+  bool coded = false;
+  std::size_t number = 0;
+  for (const auto &stream : streams)
+    if (stream->in_set) {
+      memories += gst_buffer_n_memory (stream->buffer);
+      coded = stream->coded;
+      number++;
+      times.capture = std::min (times.capture, stream->time); /* NONE is the maximum */
     }
-  priv->joiner.begin (memories, priv->waiting.list.front ().stream->coded);
-  for (const WaitingBuffer &w : priv->waiting.list) {
-    if (!matches (w))
+  priv->joiner.begin (memories, coded);
+  for (const auto &stream : streams) {
+    if (!stream->in_set)
       continue;
-    MuxStream &stream = *w.stream;
-    if (w.running < match.times.running) { /* NONE is the greatest number there is */
-      match.times.running = w.running;
-      match.speed = speed_of (w);
+    if (stream->running < times.running) {
+      times.running = stream->running;
+      times.speed = speed_of (*stream);
     }
-    drop_buffer (priv, stream);
-    if (!priv->joiner.add (w.buffer)) {
-      GST_DEBUG_OBJECT (stream.pad, "dropping a buffer with the view-id of another pad");
-      if (!stream.clash_reported)
-        gst_range_post_warning (GST_ELEMENT (self),
-            {StatusCode::kBadValue, "pad " + std::string (GST_PAD_NAME (stream.pad)) +
-                                        ": its buffers have view-ids of another pad; dropped"});
-      stream.clash_reported = true;
-    }
-    stream.round.add (w);
-    stream.matched_others = stream.matched_others || match.streams > 1;
-    set_state (self, stream, StreamState::kIn, w.running);
+    drop_buffer (priv, *stream);
+    if (!priv->joiner.add (stream->buffer))
+      GST_WARNING_OBJECT (stream->pad, "dropping a buffer with the view-id of another pad");
+    set_state (self, *stream, StreamState::kIn, stream->running);
     std::lock_guard guard (priv->lock);
-    stream.matched++;
-    stream.last_skew = GST_CLOCK_DIFF (first, w.capture);
+    stream->matched++;
+    stream->skew = GST_CLOCK_DIFF (times.capture, stream->time);
   }
-  return match;
+  return number;
 }
 
-/* Running times of live streams can be compared; those of recordings follow the capture times. */
-static GstClockTime
-output_running_time (const GstRangeMuxPrivate *priv, const Match &match)
-{
-  if (!priv->live)
-    return running_time_after (priv->last, match.times, match.speed);
-  if (GST_CLOCK_TIME_IS_VALID (match.times.running) && GST_CLOCK_TIME_IS_VALID (priv->last.running))
-    return std::max (match.times.running, priv->last.running); /* never backwards */
-  return match.times.running;
-}
-
-/* @param streams  of a complete frame set */
 static GstFlowReturn
-push_frame_set (GstRangeMux *self, std::size_t streams, GstClockTime tolerance)
+push_frame_set (GstRangeMux *self, const MuxStreams &streams, GstClockTime tolerance)
 {
   GstRangeMuxPrivate *priv = self->priv;
-  GstClockTime first = GST_CLOCK_TIME_NONE; /* the greatest number there is */
-  for (const WaitingBuffer &w : priv->waiting.list)
-    first = std::min (first, w.capture);
-  const Match match = join_matching (self, first, tolerance);
+  FrameTimes times;
+  const std::size_t number = join_matching (self, streams, times);
   GstBuffer *frame_set = nullptr;
   const Status status = priv->joiner.finish (frame_set);
   if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
       flow != GST_FLOW_OK)
     return flow;
-  const GstClockTime period =
-      GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration : 2 * tolerance;
-  priv->last = {first, output_running_time (priv, match), period};
-  gstrange::stamp (
-      GST_AGGREGATOR (self), frame_set, priv->last.running, priv->frame_duration, first);
-  GST_LOG_OBJECT (
-      self, "frame set of %zu of %zu streams: %" GST_PTR_FORMAT, match.streams, streams, frame_set);
+  drop_late (self, streams);
+  const GstClockTime running = priv->times.add_frame_set (
+      times, GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration : 2 * tolerance);
+  gstrange::stamp (GST_AGGREGATOR (self), frame_set, running, priv->frame_duration, times.capture);
+  GST_LOG_OBJECT (self, "frame set of %zu of %zu streams: %" GST_PTR_FORMAT, number,
+      streams.size (), frame_set);
   {
     std::lock_guard guard (priv->lock);
     priv->counters.frames++;
-    priv->counters.complete += match.streams == streams;
+    priv->counters.complete += number == streams.size ();
   }
   priv->reporter.passed (GST_ELEMENT (self), frame_set);
   return gst_aggregator_finish_buffer (GST_AGGREGATOR (self), frame_set);
 }
 
-/* ---- all steps in order; wait or go ---- */
+/* ---- all steps in order ---- */
 
 static GstFlowReturn
 make_frame_set (GstRangeMux *self, const MuxStreams &streams, bool timeout)
 {
   GstRangeMuxPrivate *priv = self->priv;
-  const WaitingBuffers &waiting = priv->waiting;
-  if (waiting.ended > 0)
-    report_all_dropped (self, streams);
-  if (waiting.ended > 0 && !priv->live)
-    report_unmatched (self, streams);
-  if (waiting.list.empty () && waiting.gaps.empty ()) {
-    if (waiting.missing > 0 || waiting.ended == 0)
-      return GST_AGGREGATOR_FLOW_NEED_DATA;
-    priv->reporter.finish ();
-    return GST_FLOW_EOS;
-  }
-  update_streams (self, streams);
-  if (priv->caps_dirty.exchange (false))
+  if (streams.empty ())
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  const GstClockTime base = gst_element_get_base_time (GST_ELEMENT (self));
+  StreamTimes &times = priv->times;
+  times.peek (streams, priv->live, base, matching_tolerance (priv));
+  const bool changed = times.find_silent (streams);
+  for (const auto &stream : streams)
+    if (changed && priv->live && !stream->alive && stream->head != Head::kEnded)
+      set_state (self, *stream, StreamState::kSilent, times.oldest ());
+  /* One that clashed with a stream that is silent now may take its place. */
+  if (priv->caps_dirty.exchange (false) || changed)
     if (const GstFlowReturn flow = negotiate (self, streams); flow != GST_FLOW_OK)
       return flow;
-  if (priv->live)
-    compare_clocks (self, streams);
-  else
-    compare_recordings (self);
-  if (!priv->live && hold_unsure (priv))
-    return GST_AGGREGATOR_FLOW_NEED_DATA;
   const GstClockTime tolerance = matching_tolerance (priv);
-  if (drop_past_gaps (self, tolerance, timeout) || drop_unusable (self, tolerance))
+  if (priv->live)
+    times.compare_clocks (streams, base);
+  times.find_late (streams, tolerance);
+  if (drop_unusable (self, streams))
     return GST_AGGREGATOR_FLOW_NEED_DATA; /* GstAggregator looks at the pads again: the next buffers
                                              may be there already */
-  if (waiting.list.empty () || (waiting.missing > 0 && !timeout)) {
-    GST_LOG_OBJECT (self, "waiting for %d streams", waiting.missing);
-    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  priv->order.clear ();
+  for (const auto &stream : streams)
+    priv->order.push_back (stream.get ());
+  MatchStream *dropped = nullptr;
+  switch (match_streams (priv->order, tolerance, timeout, dropped)) {
+    case MatchStep::kDrop:
+      GST_LOG_OBJECT (static_cast<MuxStream *> (dropped)->pad, "end of a gap");
+      drop_buffer (priv, *static_cast<MuxStream *> (dropped));
+      return GST_AGGREGATOR_FLOW_NEED_DATA;
+    case MatchStep::kEnd:
+      if (!priv->live && drop_late (self, streams))
+        return GST_AGGREGATOR_FLOW_NEED_DATA;
+      priv->reporter.finish ();
+      return GST_FLOW_EOS;
+    case MatchStep::kSet:
+      return push_frame_set (self, streams, tolerance);
+    default:
+      return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
-  return push_frame_set (self, streams.size (), tolerance);
 }
 
 static GstFlowReturn
@@ -579,14 +398,10 @@ gst_range_mux_aggregate (GstAggregator *aggregator, gboolean timeout)
   auto self = GST_RANGE_MUX (aggregator);
   GstRangeMuxPrivate *priv = self->priv;
   const CurrentStreams streams (priv);
-  const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
-  if (live != priv->live)
-    for (const auto &stream : *streams)
-      stream->round = {};
-  priv->live = live;
-  priv->waiting.collect (*streams, priv->live);
+  priv->live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
   const GstFlowReturn flow = make_frame_set (self, *streams, timeout);
-  priv->waiting.release ();
+  for (const auto &stream : *streams)
+    stream->release ();
   return flow;
 }
 
@@ -630,19 +445,11 @@ handle_caps (GstRangeMux *self, MuxStream &stream, GstCaps *caps)
       gst_structure_has_name (gst_caps_get_structure (caps, 0), GST_NEIGHBOUR_CODE_MEDIA_TYPE);
   stream.info = std::move (info);
   stream.has_caps = true;
+  stream.chosen = false; /* displaces no other */
   self->priv->caps_dirty = true;
   std::lock_guard guard (self->priv->lock);
   stream.views = view_bits (stream.info.rig);
   return TRUE;
-}
-
-static std::shared_ptr<MuxStream>
-find_stream (GstRangeMuxPrivate *priv, GstAggregatorPad *pad)
-{
-  std::lock_guard guard (priv->lock);
-  const auto found =
-      std::ranges::find (priv->streams, pad, [] (const auto &stream) { return stream->pad; });
-  return found == priv->streams.end () ? nullptr : *found;
 }
 
 static gboolean
@@ -652,8 +459,10 @@ gst_range_mux_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstE
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
     GstCaps *caps;
     gst_event_parse_caps (event, &caps);
-    const auto stream = find_stream (self->priv, pad);
-    if (stream && !handle_caps (self, *stream, caps)) {
+    const CurrentStreams streams (self->priv);
+    const auto stream =
+        std::ranges::find (*streams, pad, [] (const auto &one) { return one->pad; });
+    if (stream != (*streams).end () && !handle_caps (self, **stream, caps)) {
       gst_event_unref (event);
       return FALSE;
     }
@@ -671,15 +480,11 @@ static GstFlowReturn
 gst_range_mux_flush (GstAggregator *aggregator)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
-  priv->last = {};
-  priv->oldest_running = GST_CLOCK_TIME_NONE;
-  priv->consensus.reset ();
+  priv->times.flush ();
   std::lock_guard guard (priv->lock);
   for (const auto &stream : priv->streams) {
-    stream->offset_known = stream->shift_known = false;
+    stream->shift_known = false;
     stream->seen = GST_CLOCK_TIME_NONE;
-    stream->round = {};
-    gst_clear_buffer (&stream->held);
   }
   return GST_FLOW_OK;
 }
@@ -717,31 +522,22 @@ gst_range_mux_release_pad (GstElement *element, GstPad *pad)
 
 /* ---- the clock for other hosts ---- */
 
-static bool
-report_clock_error (GstRangeMux *self, const Status &status)
+/* While it is published, the property reads the actual port. */
+static void
+set_port (GstRangeMux *self, int port)
 {
-  if (!status.ok ())
-    GST_ELEMENT_ERROR (self, RESOURCE, BUSY, ("%s", status.message ().c_str ()), (nullptr));
-  return status.ok ();
-}
-
-static bool
-publish_clock (GstRangeMux *self, int port)
-{
-  GstClock *clock = gst_element_get_clock (GST_ELEMENT (self));
-  const Status status = self->priv->clock.start (port, clock);
-  gst_clear_object (&clock);
-  if (self->priv->clock.port () != ClockPublisher::kOff)
-    g_object_notify (G_OBJECT (self), "clock-port"); /* 0 has become a number */
-  return report_clock_error (self, status);
+  {
+    std::lock_guard guard (self->priv->lock);
+    self->priv->settings.clock_port = port;
+  }
+  g_object_notify (G_OBJECT (self), "clock-port");
 }
 
 /* The pipeline selects its clock on the way to PLAYING, and may select another one later. */
 static gboolean
 gst_range_mux_set_clock (GstElement *element, GstClock *clock)
 {
-  auto self = GST_RANGE_MUX (element);
-  report_clock_error (self, self->priv->clock.set_clock (clock));
+  GST_RANGE_MUX (element)->priv->clock.set_clock (element, clock);
   return GST_ELEMENT_CLASS (gst_range_mux_parent_class)->set_clock (element, clock);
 }
 
@@ -753,28 +549,22 @@ make_stats (const GstRangeMuxPrivate *priv)
   const Counters &counters = priv->counters;
   guint64 late = 0, out_of_sync = 0, left_out = 0;
   for (const auto &stream : priv->streams) {
-    late += stream->late;
+    late += stream->dropped_late;
     left_out += stream->left_out;
     out_of_sync += stream->out_of_sync;
   }
   GstStructure *stats = gst_structure_new ("application/x-rangemux-stats", "frames", G_TYPE_UINT64,
       counters.frames, "complete", G_TYPE_UINT64, counters.complete, "incomplete", G_TYPE_UINT64,
-      counters.frames - counters.complete, "dropped-late", G_TYPE_UINT64, late, "out-of-step",
+      counters.frames - counters.complete, "dropped-late", G_TYPE_UINT64, late, "out-of-sync",
       G_TYPE_UINT64, out_of_sync, "left-out", G_TYPE_UINT64, left_out, nullptr);
-  for (const auto &s : priv->streams) {
-    GstStructure *of_pad = gst_structure_new ("pad", "received", G_TYPE_UINT64, s->received,
-        "matched", G_TYPE_UINT64, s->matched, "late", G_TYPE_UINT64, s->late, "out-of-step",
-        G_TYPE_UINT64, s->out_of_sync, "left-out", G_TYPE_UINT64, s->left_out, "skew", G_TYPE_INT64,
-        gint64 (s->last_skew), "state", G_TYPE_STRING, name_of (s->state), "offset", G_TYPE_INT64,
-        gint64 (s->offset), nullptr);
-    gst_structure_set (stats, GST_PAD_NAME (s->pad), GST_TYPE_STRUCTURE, of_pad, nullptr);
+  for (const auto &stream : priv->streams) {
+    GstStructure *of_pad = stream->stats ();
+    gst_structure_set (stats, GST_PAD_NAME (stream->pad), GST_TYPE_STRUCTURE, of_pad, nullptr);
     gst_structure_free (of_pad);
   }
   return stats;
 }
 
-/* A pad's `lost` counts the frame sets that its stream is missing from, also those before its first
- * buffer. */
 static std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
@@ -784,12 +574,8 @@ collect_stats (GstElement *element)
   std::vector<StatsRow> rows (1);
   guint64 late = 0;
   for (const auto &stream : priv->streams) {
-    late += stream->late + stream->out_of_sync;
-    rows.push_back ({.pad = GST_PAD_NAME (stream->pad),
-        .counters = {.frames = stream->received,
-            .lost = counters.frames - std::min (counters.frames, stream->matched),
-            .late = stream->late + stream->out_of_sync},
-        .views = stream->views});
+    rows.push_back (stream->row (counters.frames));
+    late += stream->dropped_late + stream->out_of_sync;
   }
   rows[0].counters = {
       .frames = counters.frames, .lost = counters.frames - counters.complete, .late = late};
@@ -809,16 +595,18 @@ gst_range_mux_start (GstAggregator *aggregator)
     settings = priv->settings;
   }
   priv->caps_dirty = true;
-  priv->frame_duration = priv->oldest_running = GST_CLOCK_TIME_NONE;
-  priv->last = {};
-  priv->consensus.reset ();
+  priv->frame_duration = GST_CLOCK_TIME_NONE;
+  priv->times.flush ();
   priv->rig = {};
   if (!settings.rig_file.empty ())
     if (Status s = rangecast::load_rig (settings.rig_file, priv->rig);
         gst_range_flow_return (GST_ELEMENT (self), s) != GST_FLOW_OK)
       return FALSE;
-  if (!publish_clock (self, settings.clock_port))
+  if (!priv->clock.start (GST_ELEMENT (self), settings.clock_port))
     return FALSE;
+  priv->configured_port = settings.clock_port;
+  if (settings.clock_port != ClockPublisher::kOff)
+    set_port (self, priv->clock.port ());
   priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->counters = {};
@@ -833,10 +621,9 @@ gst_range_mux_stop (GstAggregator *aggregator)
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
   priv->reporter.stop ();
   priv->clock.stop ();
+  if (priv->configured_port != ClockPublisher::kOff)
+    set_port (GST_RANGE_MUX (aggregator), priv->configured_port);
   priv->joiner.drop ();
-  std::lock_guard guard (priv->lock);
-  for (const auto &stream : priv->streams)
-    gst_clear_buffer (&stream->held);
   return TRUE;
 }
 
@@ -862,33 +649,6 @@ mux_properties ()
 }
 
 static void
-gst_range_mux_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  GstRangeMuxPrivate *priv = GST_RANGE_MUX (object)->priv;
-  if (id == PROP_STATS_INTERVAL) /* without our lock: the reporter sets a timer */
-    return priv->reporter.set_interval (g_value_get_uint (value));
-  std::lock_guard guard (priv->lock);
-  if (!mux_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_range_mux_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  GstRangeMuxPrivate *priv = GST_RANGE_MUX (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (id == PROP_STATS)
-    return g_value_take_boxed (value, make_stats (priv));
-  if (id == PROP_STATS_INTERVAL)
-    return g_value_set_uint (value, priv->reporter.interval ());
-  Settings settings = priv->settings;
-  if (priv->clock.port () != ClockPublisher::kOff)
-    settings.clock_port = priv->clock.port ();
-  if (!mux_properties ().get (settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
 gst_range_mux_finalize (GObject *object)
 {
   delete GST_RANGE_MUX (object)->priv;
@@ -908,15 +668,10 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto aggregator_class = GST_AGGREGATOR_CLASS (klass);
 
-  object_class->set_property = gst_range_mux_set_property;
-  object_class->get_property = gst_range_mux_get_property;
   object_class->finalize = gst_range_mux_finalize;
-
-  mux_properties ().install (object_class, PROP_SETTINGS);
-  install_stats (object_class, PROP_STATS,
+  install_properties<GstRangeMux, mux_properties, make_stats> (object_class,
       "Counters since the element was started: frames, complete, incomplete, dropped-late, "
-      "out-of-step, left-out, and a structure for each sink pad");
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+      "out-of-sync, left-out, and a structure for each sink pad");
 
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &sink_template, GST_TYPE_AGGREGATOR_PAD);

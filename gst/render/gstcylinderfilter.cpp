@@ -27,10 +27,8 @@
 #include <optional>
 #include <rangecast/base/guarded.hpp>
 
-#include "common/capserrors.hpp"
 #include "common/controlledvalues.hpp"
 #include "common/elementproperties.hpp"
-#include "common/requirecaps.hpp"
 #include "common/streamlock.hpp"
 #include "cylindersettings.hpp"
 
@@ -66,7 +64,6 @@ struct GstCylinderFilterPrivate {
   rangecast::ViewAgreement agreement;
   rangecast::ColourMatch colours;
   rangecast::CylinderFilter core;
-  CapsErrors caps_errors;
   bool has_rig = false;     /* set_caps gave agreement, core and colours one */
   bool rig_pending = false; /* the source pad's caps may have another rig than agreement */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
@@ -294,7 +291,7 @@ gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
     priv->has_rig = result.ok ();
     return result;
   });
-  return priv->caps_errors.accept (GST_ELEMENT (self), status);
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
 static gboolean
@@ -340,7 +337,8 @@ gst_cylinder_filter_submit_input_buffer (
         GST_TIME_ARGS (last), GST_TIME_ARGS (now));
     reset_scene (priv);
   }
-  return submit_with_caps (base, is_discont, buffer);
+  return GST_BASE_TRANSFORM_CLASS (gst_cylinder_filter_parent_class)
+      ->submit_input_buffer (base, is_discont, buffer);
 }
 
 /* Controlled properties take their values of this buffer's time; the mode may be one of them. */
@@ -406,7 +404,6 @@ gst_cylinder_filter_start (GstBaseTransform *base)
 {
   auto priv = GST_CYLINDER_FILTER (base)->priv;
   reset_stream (priv);
-  priv->caps_errors.reset ();
   priv->last_pts = GST_CLOCK_TIME_NONE;
   priv->was_off = false;
   priv->left_out = 0;

@@ -69,7 +69,6 @@ handle_input_caps (GstStripRender *self, GstCaps *caps)
 {
   GstStripRenderPrivate *priv = self->priv;
   if (priv->input && gst_caps_is_equal (caps, priv->input)) {
-    priv->caps_errors.reset ();
     return true;
   }
   const Status status = rangecast::guarded ("striprender", [&] {
@@ -86,7 +85,7 @@ handle_input_caps (GstStripRender *self, GstCaps *caps)
     gst_caps_replace (&priv->input, caps);
     return parsed;
   });
-  return priv->caps_errors.accept (GST_ELEMENT (self), status);
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
 struct PoolSizes {
@@ -338,7 +337,6 @@ gst_strip_render_start (GstBaseTransform *base)
   GstStripRenderPrivate *priv = self->priv;
   priv->first_running = GST_CLOCK_TIME_NONE;
   priv->gl_error_posted = priv->no_context = false;
-  priv->caps_errors.reset ();
   priv->live = false;
   priv->stats_text = {};
   priv->fit.reset ();

@@ -25,7 +25,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/requirecaps.hpp"
 #include "striprenderprivate.hpp"
 
 namespace {
@@ -237,7 +236,7 @@ gst_strip_render_submit_input_buffer (GstBaseTransform *base, gboolean, GstBuffe
   GstStripRenderPrivate *priv = self->priv;
   const GstClockTime pts = GST_BUFFER_PTS (in), duration = GST_BUFFER_DURATION (in);
   GST_LOG_OBJECT (self, "%" GST_PTR_FORMAT, in);
-  if (!require_caps (GST_ELEMENT (self), base->sinkpad) || !negotiate (self)) {
+  if (!gst_pad_has_current_caps (base->sinkpad) || !negotiate (self)) {
     const bool flushing = GST_PAD_IS_FLUSHING (base->srcpad);
     GST_DEBUG_OBJECT (self, "dropping frame set: %s", flushing ? "flushing" : "not negotiated");
     gst_buffer_unref (in);

@@ -13,7 +13,6 @@
 #include <rangecast/surface/view_fit.hpp>
 
 #include "category.hpp"
-#include "common/capserrors.hpp"
 #include "common/statsreporter.hpp"
 #include "gststriprender.h"
 #include "outputschedule.hpp"
@@ -48,7 +47,6 @@ struct GstStripRenderPrivate {
   gstrange::RangeInfo info; /* of these */
   GstVideoInfo out;
   bool live = false, live_known = false;
-  CapsErrors caps_errors;
 
   /* Of drawing: with the source pad's stream lock, or on the streaming thread if that draws;
    * or on the OpenGL thread while that thread waits for it. */

@@ -3,7 +3,7 @@
  * and state changes. */
 #include "stream.hpp"
 
-#include "common/downstream.hpp"
+#include "common/capsadvice.hpp"
 
 #include <algorithm>
 #include <gstrange/gstrange.h>

@@ -37,7 +37,6 @@
 #include <utility>
 #include <vector>
 
-#include "common/capserrors.hpp"
 #include "common/capturetime.hpp"
 #include "common/elementproperties.hpp"
 #include "server.hpp"
@@ -58,7 +57,6 @@ struct GstRangeWebSinkPrivate {
   GstSegment audio_segment{}; /* streaming thread of the audio pad only */
 
   /* streaming thread only */
-  CapsErrors caps_errors;
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
 };
 
@@ -93,7 +91,7 @@ gst_range_web_sink_set_caps (GstBaseSink *base, GstCaps *caps)
 {
   GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (base)->priv;
   gstrange::RangeInfo info;
-  if (!priv->caps_errors.accept (GST_ELEMENT (base), gstrange::parse_caps (caps, info)))
+  if (gst_range_flow_return (GST_ELEMENT (base), gstrange::parse_caps (caps, info)) != GST_FLOW_OK)
     return FALSE;
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
   priv->reporter.set_views (info.rig);
@@ -288,7 +286,6 @@ gst_range_web_sink_start (GstElement *element)
   }
   if (settings.root.empty ())
     settings.root = default_root (element);
-  priv->caps_errors.reset ();
   priv->last_pts = GST_CLOCK_TIME_NONE;
   auto server = std::make_shared<web::Server> (GST_OBJECT (element), settings, request_key);
   if (const Status status = server->start ();

@@ -47,25 +47,23 @@ test_left_and_right_of_different_size_are_named () {
 }
 
 test_media_types_that_do_not_fit_are_named () {
-  local scene=(avatartestsrc name=a num-buffers=2) drawn="; striprender draws it"
-  expect_error "a makes video/x-range, and autovideosink0 takes video/x-raw$drawn" run "${scene[@]}" ! autovideosink
-  expect_error "a makes video/x-range, and autovideosink0 takes video/x-raw$drawn" run "${scene[@]}" ! queue ! tee ! identity ! autovideosink
-  expect_error "neighbourcodeenc0 makes video/x-neighbour-code, and autovideosink0 takes video/x-raw; neighbourcodedec ! striprender draw it" \
+  local scene=(avatartestsrc name=a num-buffers=2) draw="add striprender before autovideosink0"
+  expect_error "a outputs video/x-range, but autovideosink0 accepts only video/x-raw; $draw" run "${scene[@]}" ! autovideosink
+  expect_error "a outputs video/x-range, but queue0 accepts only video/x-raw" run "${scene[@]}" ! queue ! tee ! identity ! autovideosink
+  expect_error "a outputs video/x-range, but neighbourcodeenc0 and what it is linked to have no format in common" \
     run "${scene[@]}" ! neighbourcodeenc ! autovideosink
-  expect_error "depth makes video/x-range, and autovideosink0 takes video/x-raw$drawn" \
+  expect_error "depth outputs video/x-range, but autovideosink0 accepts only video/x-raw; $draw" \
     run "${scene[@]}" a.left ! depth.left a.right ! depth.right stereodepth name=depth focal-length=300 baseline=0.1 ! autovideosink
-  expect_error "m makes video/x-range, video/x-neighbour-code, and autovideosink0 takes video/x-raw$drawn" run "${scene[@]}" ! rangemux name=m ! autovideosink
-  expect_error "c makes video/x-range, and autovideosink0 takes video/x-raw$drawn" \
+  expect_error "c outputs video/x-range, but autovideosink0 accepts only video/x-raw; $draw" \
     run videotestsrc num-buffers=2 ! c.colour videotestsrc num-buffers=2 ! video/x-raw,format=GRAY16_LE ! c.depth rangecombine name=c ! autovideosink
   run "${scene[@]}" ! neighbourcodeenc ! filesink location=scene.rcnc
-  expect_error "neighbourcodedec0 makes video/x-range, and autovideosink0 takes video/x-raw$drawn" \
+  expect_error "neighbourcodedec0 outputs video/x-range, but autovideosink0 accepts only video/x-raw; $draw" \
     run filesrc location=scene.rcnc ! neighbourcodeparse ! neighbourcodedec ! autovideosink
-  expect_error "neighbourcodeparse0 makes video/x-neighbour-code, and autovideosink0 takes video/x-raw; neighbourcodedec ! striprender draw it" \
+  expect_error "neighbourcodeparse0 outputs video/x-neighbour-code, but autovideosink0 accepts only video/x-raw; add neighbourcodedec ! striprender" \
     run filesrc location=scene.rcnc ! neighbourcodeparse ! autovideosink
-  expect_error "neighbourcodedec0: pad sink: alignment=byte-stream; expected neighbourcodeparse before this element" \
+  expect_error "neighbourcodedec0: pad sink: alignment=byte-stream; add neighbourcodeparse before this element" \
     run filesrc location=scene.rcnc ! typefind ! neighbourcodedec ! fakesink
-  ! run multifilesrc location=scene.rcnc num-buffers=9 caps=video/x-neighbour-code ! neighbourcodedec ! fakesink 2>said.txt || fail "no error"
-  [ "$(grep -c 'no field "rig"' said.txt)" = 1 ] || fail "$(cat said.txt)"
+  expect_error 'no field "rig"' run multifilesrc location=scene.rcnc num-buffers=9 caps=video/x-neighbour-code ! neighbourcodedec ! fakesink
   expect_error "the peers of the pads have no size and frame rate in common" \
     run "${scene[@]}" a.left ! video/x-raw,width=320 ! fakesink a.right ! video/x-raw,width=640 ! fakesink
 }

@@ -117,62 +117,22 @@ GST_START_TEST (test_rig_of_more_than_2_27_pixels_is_one_error_of_its_caps)
 }
 GST_END_TEST;
 
-/* Runs fakesrc ! `caps` element ! fakesink twice. The element must post one error each time, which
- * contains `what`. */
-static void
-expect_one_error (const std::string &caps, const std::string &name, const char *what)
+GST_START_TEST (test_caps_without_a_rig_are_an_error_that_says_so)
 {
-  const std::string launch = "fakesrc num-buffers=3 sizetype=fixed sizemax=100 ! " + caps + name +
-                             " name=refuses ! fakesink";
-  GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
-  GstBus *bus = gst_element_get_bus (pipeline);
-  for (int run = 0; run < 2; run++) { /* started again, it says so again */
-    int errors = 0;
+  for (const char *name : {"roiextract", "cylinderfilter", "neighbourcodeenc", "plyenc",
+           "rangesplit", "rangedemux", "striprender"}) {
+    const std::string launch =
+        std::string ("fakesrc num-buffers=3 sizetype=fixed sizemax=100 ! video/x-range,format="
+                     "Z16_RGBx,views=1,width=320,height=240,framerate=15/1 ! ") +
+        name + " ! fakesink";
+    GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
+    GstBus *bus = gst_element_get_bus (pipeline);
     gst_element_set_state (pipeline, GST_STATE_PLAYING);
-    for (bool source_failed = false; !source_failed;) {
-      GstMessage *message = gst_bus_timed_pop_filtered (bus, 30 * GST_SECOND, GST_MESSAGE_ERROR);
-      fail_unless (message != nullptr, "%s", name.c_str ());
-      source_failed = g_str_has_prefix (GST_OBJECT_NAME (message->src), "fakesrc");
-      GError *error = nullptr;
-      gst_message_parse_error (message, &error, nullptr);
-      fail_unless (
-          source_failed || strstr (error->message, what), "%s: %s", name.c_str (), error->message);
-      errors += !source_failed;
-      g_error_free (error);
-      gst_message_unref (message);
-    }
-    gst_element_set_state (pipeline, GST_STATE_READY); /* after EOS */
-    while (GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR)) {
-      GError *error = nullptr;
-      gst_message_parse_error (message, &error, nullptr);
-      errors += strstr (error->message, what) != nullptr;
-      g_error_free (error);
-      gst_message_unref (message);
-    }
-    fail_unless_equals_int (errors, 1);
+    fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR), "no field \"rig\"");
+    gst_element_set_state (pipeline, GST_STATE_NULL);
+    gst_object_unref (bus);
+    gst_object_unref (pipeline);
   }
-  gst_element_set_state (pipeline, GST_STATE_NULL);
-  gst_object_unref (bus);
-  gst_object_unref (pipeline);
-}
-
-GST_START_TEST (test_data_without_caps_are_one_error_that_names_them)
-{
-  for (const char *name : {"roiextract", "cylinderfilter", "neighbourcodeenc", "plyenc",
-           "rangesplit", "rangedemux", "striprender"})
-    expect_one_error ("", name, "expected video/x-range (");
-  expect_one_error ("", "neighbourcodedec", "expected video/x-neighbour-code (");
-}
-GST_END_TEST;
-
-/* A source sends refused caps again with each buffer, and with EOS after its own error. */
-GST_START_TEST (test_caps_without_a_rig_are_one_error)
-{
-  for (const char *name : {"roiextract", "cylinderfilter", "neighbourcodeenc", "plyenc",
-           "rangesplit", "rangedemux", "striprender"})
-    expect_one_error (
-        "video/x-range,format=Z16_RGBx,views=1,width=320,height=240,framerate=15/1 ! ", name,
-        "no field \"rig\"");
 }
 GST_END_TEST;
 
@@ -430,8 +390,7 @@ limits_suite ()
   tcase_add_test (tc, test_image_side_of_16385_is_refused);
   tcase_add_test (tc, test_name_of_256_bytes_is_refused);
   tcase_add_test (tc, test_rig_of_more_than_2_27_pixels_is_one_error_of_its_caps);
-  tcase_add_test (tc, test_data_without_caps_are_one_error_that_names_them);
-  tcase_add_test (tc, test_caps_without_a_rig_are_one_error);
+  tcase_add_test (tc, test_caps_without_a_rig_are_an_error_that_says_so);
   tcase_add_test (tc, test_rig_file_beyond_4_MiB_is_refused_unread);
   tcase_add_test (tc, test_caps_beyond_the_templates_are_not_accepted);
   tcase_add_test (tc, test_slices_beyond_131072_are_left_out_and_counted);

@@ -214,80 +214,6 @@ GST_START_TEST (test_gap_costs_its_frame_and_nothing_else)
 }
 GST_END_TEST;
 
-/* The next GAP that comes out, which must be behind a segment, and no later than any frame. */
-static void
-expect_gap (Combine &c, GstClockTime begin, GstClockTime length)
-{
-  for (bool segment = false;;) {
-    GstEvent *event = gst_harness_try_pull_event (c.colour);
-    for (int i = 0; !event && i < 500; i++) { /* the element has a thread of its own */
-      g_usleep (10000);
-      event = gst_harness_try_pull_event (c.colour);
-    }
-    fail_unless (event != nullptr, "no GAP");
-    const GstEventType type = GST_EVENT_TYPE (event);
-    GstClockTime time = 0, duration = 0;
-    if (type == GST_EVENT_GAP)
-      gst_event_parse_gap (event, &time, &duration);
-    gst_event_unref (event);
-    segment |= type == GST_EVENT_SEGMENT;
-    if (type != GST_EVENT_GAP)
-      continue;
-    fail_unless (segment, "a GAP before the segment");
-    fail_unless_equals_uint64 (time, begin);
-    fail_unless_equals_uint64 (duration, length);
-    return;
-  }
-}
-
-GST_START_TEST (test_gap_on_one_pad_is_a_gap_of_what_it_took_with_it)
-{
-  Combine c;
-  c.push_colour (0, 1);
-  gst_harness_push_event (c.depth, gst_event_new_gap (0, GST_SECOND / 10));
-  expect_gap (c, 0, GST_SECOND / 10);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_gap_on_both_pads_is_a_gap_up_to_the_next_pair)
-{
-  Combine c;
-  for (GstHarness *h : {c.colour, c.depth})
-    gst_harness_push_event (h, gst_event_new_gap (0, GST_SECOND));
-  expect_gap (c, 0, GST_SECOND);
-  c.push_colour (GST_SECOND, 2);
-  c.push_depth (GST_SECOND, 1000);
-  GstBuffer *output = gst_harness_pull (c.colour);
-  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), GST_SECOND);
-  gst_buffer_unref (output);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_gap_after_a_flush_follows_a_segment)
-{
-  Combine c;
-  c.push_colour (0, 1);
-  c.push_depth (0, 1000);
-  gst_buffer_unref (gst_harness_pull (c.colour));
-  const guint32 seek = gst_util_seqnum_next (); /* the same for both: one flush of the element */
-  for (const bool start : {true, false})
-    for (GstHarness *h : {c.colour, c.depth}) {
-      GstEvent *event = start ? gst_event_new_flush_start () : gst_event_new_flush_stop (TRUE);
-      gst_event_set_seqnum (event, seek);
-      gst_harness_push_event (h, event);
-    }
-  while (GstEvent *event = gst_harness_try_pull_event (c.colour))
-    gst_event_unref (event);
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  for (GstHarness *h : {c.colour, c.depth}) {
-    gst_harness_push_event (h, gst_event_new_segment (&segment));
-    gst_harness_push_event (h, gst_event_new_gap (0, GST_SECOND / 10));
-  }
-  expect_gap (c, 0, GST_SECOND / 10);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_capture_time_comes_from_the_colour_camera)
 {
   Combine c;
@@ -722,9 +648,6 @@ rangecombine_suite ()
   tcase_add_test (tc, test_empty_frames_and_later_depth_give_no_warning);
   tcase_add_test (tc, test_pairs_by_pts_and_drops_what_has_no_partner);
   tcase_add_test (tc, test_gap_costs_its_frame_and_nothing_else);
-  tcase_add_test (tc, test_gap_on_one_pad_is_a_gap_of_what_it_took_with_it);
-  tcase_add_test (tc, test_gap_on_both_pads_is_a_gap_up_to_the_next_pair);
-  tcase_add_test (tc, test_gap_after_a_flush_follows_a_segment);
   tcase_add_test (tc, test_capture_time_comes_from_the_colour_camera);
   tcase_add_test (tc, test_pictures_of_different_size_are_one_error);
   tcase_add_test (tc, test_colour_of_more_pixels_comes_out_at_either_size);

@@ -387,7 +387,7 @@ GST_END_TEST;
 static void
 expect_gap (Stereo &s, GstClockTime begin, GstClockTime length)
 {
-  for (bool segment = false;;) {
+  for (;;) {
     GstEvent *event = gst_harness_pull_event (s.left);
     fail_unless (event != nullptr, "no GAP");
     const GstEventType type = GST_EVENT_TYPE (event);
@@ -395,34 +395,33 @@ expect_gap (Stereo &s, GstClockTime begin, GstClockTime length)
     if (type == GST_EVENT_GAP)
       gst_event_parse_gap (event, &time, &duration);
     gst_event_unref (event);
-    segment |= type == GST_EVENT_SEGMENT;
     if (type != GST_EVENT_GAP)
       continue;
-    fail_unless (segment, "a GAP before the segment");
+    GstEvent *segment = gst_pad_get_sticky_event (s.left->sinkpad, GST_EVENT_SEGMENT, 0);
+    fail_unless (segment != nullptr, "a GAP before the segment");
+    gst_event_unref (segment);
     fail_unless_equals_uint64 (time, begin);
     fail_unless_equals_uint64 (duration, length);
     return;
   }
 }
 
-GST_START_TEST (test_gap_on_both_pads_is_a_gap)
+GST_START_TEST (test_gaps_are_gaps_of_the_output)
 {
   Stereo s;
+  const auto push_pair = [&s] (GstClockTime time) {
+    s.push (s.left, time);
+    s.push (s.right, time);
+    gst_buffer_unref (gst_harness_pull (s.left));
+  };
+  push_pair (0);
   for (GstHarness *h : {s.left, s.right})
-    gst_harness_push_event (h, gst_event_new_gap (0, 10 * kFrame));
-  expect_gap (s, 0, 10 * kFrame);
-  s.push (s.left, 10 * kFrame);
-  s.push (s.right, 10 * kFrame);
-  gst_buffer_unref (gst_harness_pull (s.left));
-}
-GST_END_TEST;
-
-GST_START_TEST (test_gap_that_takes_a_picture_with_it_is_a_gap)
-{
-  Stereo s;
-  s.push (s.left, 0);
-  gst_harness_push_event (s.right, gst_event_new_gap (0, kFrame));
-  expect_gap (s, 0, kFrame);
+    gst_harness_push_event (h, gst_event_new_gap (kFrame, 9 * kFrame));
+  expect_gap (s, kFrame, 9 * kFrame);
+  push_pair (10 * kFrame);
+  s.push (s.left, 11 * kFrame); /* the GAP takes it with it */
+  gst_harness_push_event (s.right, gst_event_new_gap (11 * kFrame, kFrame));
+  expect_gap (s, 11 * kFrame, kFrame);
 }
 GST_END_TEST;
 
@@ -570,9 +569,7 @@ GST_START_TEST (test_log_says_why_nothing_comes)
     s.push (s.left, 0);
     fail_unless (log.says ("right: waiting for a frame"));
     s.push (s.right, 3 * kFrame / 4);
-    fail_unless (
-        log.says ("left: dropping frame at 0:00:00.000000000: no partner, pad right is 30.0 "
-                  "ms ahead, tolerance 20.0 ms"));
+    fail_unless (log.says ("left: dropping frame at 0:00:00.000000000: no partner"));
     s.push (s.left, kFrame);
     gst_buffer_unref (gst_harness_pull (s.left));
     gst_harness_push_upstream_event (
@@ -617,8 +614,7 @@ stereodepth_suite ()
   tcase_add_test (tc, test_end_of_one_pad_ends_the_stream);
   tcase_add_test (tc, test_changes_states_twice);
   tcase_add_test (tc, test_wanted_part_outlives_caps_of_the_same_size);
-  tcase_add_test (tc, test_gap_on_both_pads_is_a_gap);
-  tcase_add_test (tc, test_gap_that_takes_a_picture_with_it_is_a_gap);
+  tcase_add_test (tc, test_gaps_are_gaps_of_the_output);
   tcase_add_test (tc, test_gap_after_a_flush_follows_a_segment);
   tcase_add_test (tc, test_late_frames_are_dropped_before_matching_and_said);
   tcase_add_test (tc, test_sources_with_padded_rows_need_not_copy);

@@ -201,28 +201,6 @@ GST_START_TEST (test_third_camera_of_another_size_is_one_error)
 }
 GST_END_TEST;
 
-/* Left and right change from grey to colour, whose pictures are larger, while a grey pair waits for
- * its third picture. */
-GST_START_TEST (test_pair_that_waits_for_the_third_is_read_as_it_came)
-{
-  Trio t;
-  t.s.push (t.third, 0);
-  for (GstHarness *h : {t.s.left, t.s.right}) {
-    gst_harness_set_src_caps_str (
-        h, "video/x-raw,format=GRAY8,width=160,height=120,framerate=25/1");
-    Trio::push_noise (h, 160, 120, 1, kFrame);
-  }
-  for (GstHarness *h : {t.s.left, t.s.right})
-    gst_harness_set_src_caps_str (h, kSmall);
-  t.push_pair (2 * kFrame);
-  t.s.push (t.third, kFrame);
-  t.pull (kFrame);
-  t.s.push (t.third, 2 * kFrame);
-  t.pull (2 * kFrame);
-  fail_unless_equals_uint64 (t.s.stat ("third-frames"), 2);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_all_three_cameras_may_change_their_size_one_after_the_other)
 {
   static const char *kLarge = "video/x-raw,format=GRAY8,width=320,height=240,framerate=25/1";
@@ -326,7 +304,6 @@ stereodepththird_suite ()
   tcase_add_test (tc, test_exchanged_cameras_are_one_warning_that_names_the_cure);
   tcase_add_test (tc, test_third_camera_without_calibration_is_one_error);
   tcase_add_test (tc, test_third_camera_of_another_size_is_one_error);
-  tcase_add_test (tc, test_pair_that_waits_for_the_third_is_read_as_it_came);
   tcase_add_test (tc, test_all_three_cameras_may_change_their_size_one_after_the_other);
   tcase_add_test (tc, test_third_pad_that_is_released_is_forgotten);
   tcase_add_test (tc, test_live_a_silent_third_camera_costs_the_latency_and_no_frame);

@@ -267,23 +267,6 @@ GST_START_TEST (test_nothing_linked_is_told_upstream)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_pad_that_a_launch_string_asks_for_in_vain_is_named_with_those_that_there_are)
-{
-  GstElement *pipeline =
-      gst_parse_launch ("avatartestsrc views=2 num-buffers=1 ! rangedemux name=d "
-                        "d.src_1 ! fakesink  d.src_9 ! fakesink async=false",
-          nullptr);
-  GstBus *bus = gst_element_get_bus (pipeline);
-  gst_element_set_state (pipeline, GST_STATE_PAUSED);
-  const std::string text = next_message_text (bus, GST_MESSAGE_WARNING);
-  fail_unless_contains (text, "src_9");
-  fail_unless_contains (text, "the stream has 2 views: src_0 src_1");
-  gst_element_set_state (pipeline, GST_STATE_NULL);
-  gst_object_unref (bus);
-  gst_object_unref (pipeline);
-}
-GST_END_TEST;
-
 static int
 upstream_events (GstHarness *h, GstEventType type)
 {
@@ -391,8 +374,6 @@ rangedemuxpads_suite ()
   tcase_add_test (tc, test_unlinked_pad_does_not_stop_the_others);
   tcase_add_test (tc, test_a_pad_that_is_linked_late_is_linked_though_a_gap_comes_first);
   tcase_add_test (tc, test_nothing_linked_is_told_upstream);
-  tcase_add_test (
-      tc, test_pad_that_a_launch_string_asks_for_in_vain_is_named_with_those_that_there_are);
   tcase_add_test (tc, test_seek_of_all_sinks_goes_upstream_once_and_others_each);
   tcase_add_test (tc, test_latency_is_that_of_upstream);
   tcase_add_test (tc, test_buffers_go_back_to_their_pool);
