@@ -36,7 +36,7 @@ usage: camera-host.sh --view N --to HOST:PORT --rig FILE [options]
   --threads N     maximum number of CPU cores to use (default: all); lower it where several hosts share a
                   machine
   --learn N       number of frames from which the background is learnt (default 20)
-  --depth WHAT    properties of stereodepth, e.g. "algorithm=bm refine=0", which is faster
+  --depth WHAT    properties of stereodepth, e.g. "refresh-interval=60"
   --encoder WHAT  properties of neighbourcodeenc, e.g. "profile=entropy temporal=true" (default:
                   the element's: profile=packed)
   --audio SOURCE  send speech, too: a source in gst-launch-1.0 syntax, e.g. pulsesrc or "alsasrc device=hw:1"
@@ -113,7 +113,7 @@ rtp_check sender
 [[ ! "${encoder,,}" =~ adaptive-bitrate\ *=\ *[\"\']?(true|t|yes|1)([^a-z0-9]|$) ]] || rtp_adaptive=yes
 [ -z "$rtp_adaptive" ] || { [ -n "$rtp_feedback" ] && one_receiver "$to"; } ||
   echo "camera-host.sh: --encoder: adaptive-bitrate has no effect; set --feedback, and one receiver in --to" >&2
-split_properties "$depth" algorithm=bm --depth stereodepth
+split_properties "$depth" near=0.4 --depth stereodepth
 depth=("${words[@]}")
 split_properties "$encoder" profile=entropy --encoder neighbourcodeenc
 encoder=("${words[@]}")

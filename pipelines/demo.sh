@@ -32,7 +32,7 @@ usage: demo.sh [options]
   --mtu BYTES   maximum packet size (default 1400); larger packets take less CPU time
   --threads N   maximum number of CPU cores for each camera host (default: the machine's cores divided by
                 the number of views, at least 1)
-  --depth WHAT  properties of stereodepth, e.g. "algorithm=bm refine=0"
+  --depth WHAT  properties of stereodepth, e.g. "refresh-interval=60"
   --render WHAT  properties of striprender, e.g. "mode=strips", which is faster
   --latency MS  how long the parent waits for a late view (default: see parent-host.sh)
 With RANGECAST_STATS=udp://HOST:PORT (or a file) the hosts send their statistics there.

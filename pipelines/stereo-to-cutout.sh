@@ -43,7 +43,7 @@ done
 need_number "$view" --view 0 63
 need_number "$settle" --settle 0 100000
 need_number "$learn" --learn 1 10000
-split_properties "$stereo" algorithm=bm --stereo stereodepth
+split_properties "$stereo" near=0.4 --stereo stereodepth
 stereo=("${words[@]}")
 split_properties "$roi" margin=8 --roi roiextract
 roi=("${words[@]}")

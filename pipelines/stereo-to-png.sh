@@ -15,11 +15,10 @@ usage: stereo-to-png.sh LEFT RIGHT PNG --rig FILE [options]
   --near M --far M   depth range, metres (with --rig: default the rig's)
   --turn DEG         azimuth of the rendered view from the camera's (default 20)
   --size WxH         size of the rendered picture (default 960x720)
-  --algorithm NAME   bm, sgbm, sgbm-3way, sgm (default: stereodepth's)
 END
 }
 
-files=() rig= view=0 focal= baseline= near= far= turn=20 size=960x720 algorithm=()
+files=() rig= view=0 focal= baseline= near= far= turn=20 size=960x720
 while [ $# -gt 0 ]; do
   option=$1
   case "$1" in
@@ -31,7 +30,6 @@ while [ $# -gt 0 ]; do
     --far) far=${2:-}; shift ;;
     --turn) turn=${2:-}; shift ;;
     --size) size=${2:-}; shift ;;
-    --algorithm) algorithm=("algorithm=${2:-}"); shift ;;
     -h | --help) usage; exit 0 ;;
     -*) usage >&2; die "unknown option '$1'" ;;
     *) files+=("$1") ;;
@@ -58,6 +56,6 @@ need_size "$size" --size
 
 launch filesrc "location=${files[0]}" ! decodebin ! videoconvert ! depth.left \
   filesrc "location=${files[1]}" ! decodebin ! videoconvert ! depth.right \
-  stereodepth name=depth "${calibration[@]}" "${algorithm[@]}" \
+  stereodepth name=depth "${calibration[@]}" \
   ! striprender "azimuth=$turn" ! "video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}" \
   ! gldownload ! videoconvert ! pngenc ! filesink "location=${files[2]}"

@@ -64,8 +64,9 @@ using rangecast::View;
 GST_DEBUG_CATEGORY_STATIC (gst_stereo_depth_debug);
 #define GST_CAT_DEFAULT gst_stereo_depth_debug
 
-/* Data flow, in the order of this file. PackedInput divides images at pad left that contain both
- * views, in that pad's streaming thread. All else runs on GstAggregator's, the source pad's task:
+/* Data flow, in the order of this file. PackedInput passes images at pad left that contain both
+ * views on to pad right, in that pad's streaming thread. All else runs on GstAggregator's, the
+ * source pad's task:
  *
  *   sink_event       records the caps of each pad
  *   aggregate
@@ -120,7 +121,6 @@ struct GstStereoDepthPrivate {
   bool discont = false;                        /* images were dropped since the last pair */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE; /* of the last left image that was matched */
   GstClockTime processing_time = 0;            /* mean time to match a pair, at most `latency` */
-  bool warned_mirrored = false;
 };
 
 struct _GstStereoDepth {
@@ -176,23 +176,6 @@ gst_stereo_depth_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, G
   return GST_AGGREGATOR_CLASS (gst_stereo_depth_parent_class)->sink_event (aggregator, pad, event);
 }
 
-/* Only logs refused caps, which GStreamer itself logs in other categories. */
-static gboolean
-gst_stereo_depth_sink_query (GstAggregator *aggregator, GstAggregatorPad *pad, GstQuery *query)
-{
-  const gboolean handled =
-      GST_AGGREGATOR_CLASS (gst_stereo_depth_parent_class)->sink_query (aggregator, pad, query);
-  if (GST_QUERY_TYPE (query) == GST_QUERY_ACCEPT_CAPS) {
-    GstCaps *caps;
-    gboolean accepted = FALSE;
-    gst_query_parse_accept_caps (query, &caps);
-    gst_query_parse_accept_caps_result (query, &accepted);
-    if (!accepted)
-      GST_DEBUG_OBJECT (pad, "refused caps %" GST_PTR_FORMAT, caps);
-  }
-  return handled;
-}
-
 /* ---- pairs of images ---- */
 
 /* Drops the pair if a sink would discard its depth, and posts a QOS message. */
@@ -232,12 +215,6 @@ drop_if_late (GstStereoDepth *self)
 
 /* ---- negotiation ---- */
 
-static bool
-same_size (const GstVideoInfo &a, const GstVideoInfo &b)
-{
-  return a.width == b.width && a.height == b.height;
-}
-
 /* Configures matcher and readers for the caps of all inputs. The third camera may change its size
  * somewhat earlier or later than the others; until then pairs are matched without it.
  * @param has_third  the pair has a third image, whose size must match */
@@ -246,15 +223,24 @@ configure_core (GstStereoDepthPrivate *priv, bool has_third)
 {
   Input *inputs = priv->inputs;
   const GstVideoInfo &left = *inputs[kLeft].info;
+  int width, height; /* of a view */
+  if (!priv->packed.view_size (left, width, height))
+    return {StatusCode::kBadSize, "pad left: images of " + size_text (left.width, left.height) +
+                                      " do not divide into two views; use an even size"};
+  const auto differs = [&] (Side side) {
+    const auto &info = inputs[side].info;
+    return info && (info->width != (side == kThird ? width : left.width) ||
+                       info->height != (side == kThird ? height : left.height));
+  };
   for (const Side side : {kRight, kThird})
-    if (const auto &other = inputs[side].info;
-        other && !same_size (left, *other) && (side == kRight || has_third))
-      return {StatusCode::kBadSize, std::string ("pad ") + kPadNames[side] + " is " +
-                                        size_text (other->width, other->height) +
-                                        " but pad left is " + size_text (left.width, left.height) +
-                                        "; expected the same size"};
+    if (differs (side) && (side == kRight || has_third)) {
+      const GstVideoInfo &other = *inputs[side].info;
+      return {StatusCode::kBadSize,
+          std::string ("pad ") + kPadNames[side] + " is " + size_text (other.width, other.height) +
+              " but pad left is " + size_text (width, height) + "; use images of one size"};
+    }
   const View &before = priv->core.range_view ();
-  if (before.width != left.width || before.height != left.height)
+  if (before.width != width || before.height != height)
     priv->rois.reset (); /* downstream requests a region again only if the output caps change */
   StereoDepthSettings settings;
   {
@@ -262,20 +248,19 @@ configure_core (GstStereoDepthPrivate *priv, bool has_third)
     settings = priv->settings;
   }
   View view;
-  if (Status s = make_stereo_view (settings, left.width, left.height, view); !s.ok ())
+  if (Status s = make_stereo_view (settings, width, height, view); !s.ok ())
     return s;
   if (inputs[kThird].info && !view.third)
     return {StatusCode::kNotFound, "pad third: no calibration of a third camera; expected property "
                                    "rig with a file that has one in view " +
                                        std::to_string (view.id)};
-  const bool with_third = inputs[kThird].info && same_size (left, *inputs[kThird].info);
-  if (Status s = priv->core.set (view, settings.core, with_third); !s.ok ())
+  const bool with_third = inputs[kThird].info && !differs (kThird);
+  if (Status s = priv->core.set (view, settings.n_threads, with_third); !s.ok ())
     return s;
   for (int side = kLeft; side <= (with_third ? kThird : kRight); side++)
     if (!inputs[side].reader.set (*inputs[side].info))
       return {StatusCode::kUnsupported, "cannot convert the images to RGBx"};
   priv->negotiate_third = inputs[kThird].info && !with_third;
-  priv->warned_mirrored = false;
   return {};
 }
 
@@ -330,7 +315,9 @@ match_images (GstStereoDepth *self, bool with_third, GstBuffer *output)
   GstStereoDepthPrivate *priv = self->priv;
   Input *inputs = priv->inputs;
   const GstClockTime begin = gst_util_get_timestamp ();
-  if (Status s = priv->core.rectify (inputs[kLeft].reader.view (), inputs[kRight].reader.view (),
+  const bool packed = priv->packed.is_packed ();
+  if (Status s = priv->core.rectify (priv->packed.view (inputs[kLeft].reader.view (), false),
+          priv->packed.view (inputs[packed ? kLeft : kRight].reader.view (), true),
           with_third ? inputs[kThird].reader.view () : ImageView<const Rgbx>{});
       !s.ok ())
     return s;
@@ -369,7 +356,7 @@ match_pair (GstStereoDepth *self, GstBuffer *third, GstBuffer *output)
   GstStereoDepthPrivate *priv = self->priv;
   GstBuffer *buffers[] = {priv->matcher->buffer (kLeft), priv->matcher->buffer (kRight), third};
   for (int i = 0; i < 3 && buffers[i]; i++)
-    if (!priv->inputs[i].reader.open (buffers[i]))
+    if ((i != kRight || !priv->packed.is_packed ()) && !priv->inputs[i].reader.open (buffers[i]))
       return {StatusCode::kBadData,
           std::string ("pad ") + kPadNames[i] + ": a buffer is smaller than its caps require"};
   return match_images (self, third != nullptr, output);
@@ -408,13 +395,6 @@ push_pair (GstStereoDepth *self, GstBuffer *third)
   if (flow != GST_FLOW_OK) {
     gst_buffer_unref (output);
     return flow;
-  }
-  if (!priv->warned_mirrored && priv->core.looks_mirrored ()) {
-    priv->warned_mirrored = true;
-    GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-        ("The left and right cameras seem to be exchanged: swap what is linked to pads left and "
-         "right"),
-        ("hardly anything matches; with the images exchanged, much does"));
   }
   const GstClockTime duration = GST_BUFFER_DURATION_IS_VALID (left)
                                     ? GST_BUFFER_DURATION (left)
@@ -663,7 +643,6 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_stereo_depth_stop);
   aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_stereo_depth_flush);
   aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_stereo_depth_sink_event);
-  aggregator_class->sink_query = GST_DEBUG_FUNCPTR (gst_stereo_depth_sink_query);
   aggregator_class->src_event = GST_DEBUG_FUNCPTR (gst_stereo_depth_src_event);
   aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_stereo_depth_update_src_caps);
   aggregator_class->negotiate = GST_DEBUG_FUNCPTR (negotiate_downstream);

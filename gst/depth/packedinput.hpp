@@ -4,39 +4,49 @@
 #include <gst/video/video.h>
 
 #include <atomic>
-#include <string>
+#include <rangecast/geometry/image_view.hpp>
 
 /** How a stereo camera packs its two views into one image. */
 enum class Packing { kAuto, kNone, kSideBySide, kTopBottom };
 
-/** Lets one sink pad take images that contain both views of a stereo camera: half of each image,
- * and all events, go on to another sink pad, which is not linked. Images are not copied. */
+/** Lets pad left take images that contain both views of a stereo camera: all that comes there goes
+ *  on to pad right, too, which is not linked, so that pairs form as usual. */
 class PackedInput {
 public:
-  /** Watches both pads. For instance_init, once; both pads are the element's. */
-  void watch (GstElement *element, GstPad *first, GstPad *second);
+  /** Watches pad left. For instance_init, once; both pads are the element's. */
+  void watch (GstElement *element, GstPad *left, GstPad *right);
   /** Before the pads are activated. kAuto: as field multiview-mode of the caps says. */
   void start (Packing packing);
-  /** Before the pads are deactivated: the first pad's thread may wait at the second. */
+  /** Before the pads are deactivated: pad left's thread may wait at pad right. */
   void stop ();
 
+  /** @name Any thread, after the first caps: the packing of a stream does not change @{ */
+  [[nodiscard]] bool is_packed () const
+  {
+    return packing_ == Packing::kSideBySide || packing_ == Packing::kTopBottom;
+  }
+  /** The size of one view, pixels. @return false if the image cannot be divided */
+  bool view_size (const GstVideoInfo &image, int &width, int &height) const;
+  /** One view of an image, or the image if it contains one view. */
+  template <typename Pixel>
+  rangecast::ImageView<Pixel> view (const rangecast::ImageView<Pixel> &image, bool right) const
+  {
+    const int width = packing_ == Packing::kSideBySide ? image.width / 2 : image.width,
+              height = packing_ == Packing::kTopBottom ? image.height / 2 : image.height;
+    const bool second = right != right_first_;
+    return image.crop (
+        second ? image.width - width : 0, second ? image.height - height : 0, width, height);
+  }
+  /** @} */
+
 private:
+  const char *choose_packing (GstEvent *caps);
   GstPadProbeReturn handle (GstPadProbeInfo *info);
-  GstPadProbeReturn handle_caps (GstPadProbeInfo *info);
-  GstPadProbeReturn handle_buffer (GstPadProbeInfo *info);
-  void post (const std::string &what, const std::string &expected);
-  GstPadProbeReturn refuse (
-      GstPadProbeInfo *info, const std::string &what, const std::string &expected);
-  GstBuffer *make_view (GstBuffer *packed, bool first) const;
 
   GstElement *element_ = nullptr;
-  GstPad *first_ = nullptr, *second_ = nullptr;
-  Packing packing_ = Packing::kAuto;
-
-  std::atomic<bool> is_packed_ = false; /* written by the streaming thread of the first pad */
-
-  /* that thread only */
-  bool is_refused_ = false, saw_one_view_ = false, second_view_first_ = false;
-  GstVideoInfo packed_{};           /* of the caps */
-  int offset_x_ = 0, offset_y_ = 0; /* of the later view, pixels */
+  GstPad *left_ = nullptr, *right_ = nullptr;
+  Packing setting_ = Packing::kAuto;
+  std::atomic<Packing> packing_ = Packing::kAuto; /* kAuto: no caps yet */
+  std::atomic<bool> right_first_ = false;
+  bool refused_ = false; /* pad left's streaming thread: after an error */
 };

@@ -3,25 +3,9 @@
 
 #include <rangecast/geometry/range_image.hpp>
 
-using rangecast::MatchAlgorithm;
 using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::View;
-
-#define GST_TYPE_STEREO_DEPTH_ALGORITHM (gst_stereo_depth_algorithm_get_type ())
-static GType
-gst_stereo_depth_algorithm_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {{int (MatchAlgorithm::kBm), "OpenCV block matching", "bm"},
-        {int (MatchAlgorithm::kSgbm), "OpenCV semi-global block matching, five directions", "sgbm"},
-        {int (MatchAlgorithm::kSgbm3Way), "OpenCV semi-global block matching, three directions",
-            "sgbm-3way"},
-        {int (MatchAlgorithm::kSgm), "Semi-global matching of census-like descriptors", "sgm"}, {}};
-    return g_enum_register_static ("GstStereoDepthAlgorithm", values);
-  }();
-  return type;
-}
 
 #define GST_TYPE_STEREO_DEPTH_PACKING (gst_stereo_depth_packing_get_type ())
 static GType
@@ -43,8 +27,6 @@ stereo_properties ()
 {
   using S = StereoDepthSettings;
   using V = ViewSettings;
-  using Core = rangecast::StereoSettings;
-  using Match = rangecast::MatchSettings;
   using P = PropertyTable<S>;
   static P table = {
       P::number<&S::view, &V::focal_length> ("focal-length", "Focal length",
@@ -53,85 +35,21 @@ stereo_properties ()
       P::number<&S::baseline> ("baseline", "Baseline",
           "Distance of the left and right cameras in metres, without a rig (0 = unset)", 0, 1e4,
           kMutableReady),
-      P::number<&S::view, &V::principal_x> ("principal-x", "Principal point x",
-          "Horizontal principal point of the left camera in pixels, without a rig (-1 = centre)",
-          -1, 1e6, kMutableReady),
-      P::number<&S::view, &V::principal_y> ("principal-y", "Principal point y",
-          "Vertical principal point of both cameras in pixels, without a rig (-1 = centre)", -1,
-          1e6, kMutableReady),
-      P::number<&S::principal_offset> ("principal-offset", "Principal point offset",
-          "Horizontal principal point of the right camera minus that of the left in pixels, "
-          "without a rig (Middlebury's doffs)",
-          -1e5, 1e5, kMutableReady),
       P::number<&S::view, &V::near> ("near", "Near",
           "Minimum depth to match in metres (0 = from the rig, or 0.3)", 0, 1e4, kMutableReady),
       P::number<&S::view, &V::far> ("far", "Far",
           "Maximum depth to output in metres (0 = from the rig, or 3)", 0, 1e4, kMutableReady),
-      P::number<&S::view, &V::depth_unit> ("depth-unit", "Depth unit",
-          "Metres per depth unit of the output (0 = from the rig, or 0.0001, larger if far "
-          "requires it)",
-          0, 1, kMutableReady),
-      P::number<&S::core, &Core::flying_pixel_step> ("flying-pixel-step", "Flying pixel step",
-          "Clear points that fewer than 4 of their 8 neighbours support within this fraction of "
-          "their depth (0 = off)",
-          0, 1, kMutableReady),
-      P::number<&S::core, &Core::patch_tolerance> ("patch-tolerance", "Patch tolerance",
-          "Clear points around which the two images differ by more than this fraction of the local "
-          "contrast (0 = off)",
-          0, 10, kMutableReady),
-      P::number<&S::core, &Core::search_far_m> ("search-far", "Maximum search depth",
-          "Match out to this depth in metres so that background is not mistaken for foreground; "
-          "results beyond far are discarded (0 = to infinity)",
-          0, 1e4, kMutableReady),
-      P::number<&S::core, &Core::steady> ("steady", "Temporal smoothing",
-          "Temporal smoothing of depth where nothing moves (0 = off, 1 = strongest)", 0, 1,
-          kMutableReady),
       P::number<&S::view, &V::view_id> ("view-id", "View ID",
           "View of the rig, and view-id of the output", 0, rangecast::kMaxViews - 1, kMutableReady),
-      P::number<&S::core, &Core::match, &Match::block_size> ("block-size", "Block size",
-          "Width of the matching block in pixels, odd (0 = 15 for bm, 3 for sgbm and sgbm-3way; "
-          "ignored by sgm)",
-          0, 51, kMutableReady),
-      P::number<&S::core, &Core::match, &Match::uniqueness_ratio> ("uniqueness-ratio",
-          "Uniqueness ratio",
-          "Margin in percent by which the best match must be better than the second best", 0, 100,
-          kMutableReady),
-      P::number<&S::core, &Core::match, &Match::speckle_window_size> ("speckle-window-size",
-          "Speckle window size",
-          "Minimum size in pixels of a region of similar disparity; smaller regions are cleared (0 "
-          "= off)",
-          0, 100000, kMutableReady),
-      P::number<&S::core, &Core::match, &Match::speckle_range> ("speckle-range", "Speckle range",
-          "Maximum disparity difference within a region in pixels, for speckle-window-size", 0,
-          1000, kMutableReady),
-      P::number<&S::core, &Core::match, &Match::left_right_max_difference> (
-          "left-right-max-difference", "Left-right check",
-          "Maximum difference in pixels between left-to-right and right-to-left disparities (-1 = "
-          "no check)",
-          -1, 1000, kMutableReady),
-      P::number<&S::core, &Core::silhouette_radius> ("silhouette-radius", "Silhouette radius",
-          "Radius in pixels around depth edges in which points with the colour of the surface "
-          "behind are cleared (0 = off)",
-          0, 64, kMutableReady),
-      P::number<&S::core, &Core::gap_width> ("gap-width", "Gap width",
-          "Maximum width in pixels of gaps within one surface that are filled (0 = off)", 0, 1000,
-          kMutableReady),
-      P::number<&S::core, &Core::refine> ("refine", "Refinement iterations",
-          "Disparity refinement iterations (0 = off)", 0, 20, kMutableReady),
-      P::number<&S::core, &Core::average> ("average", "Temporal averaging",
-          "Maximum number of frames averaged before matching where nothing moves (1 = off)", 1, 64,
-          kMutableReady),
       P::number<&S::refresh_interval> ("refresh-interval", "Refresh interval",
           "Interval in frames between full images when downstream requests only a region (0 = "
           "always match full images)",
           0, 100000, kMutableReady),
-      P::number<&S::core, &Core::n_threads> ("n-threads", "Threads",
+      P::number<&S::n_threads> ("n-threads", "Threads",
           "Number of matching threads (0 = one per CPU core)", 0, 64, kMutableReady),
       P::text<&S::view, &V::rig> ("rig", "Rig",
           "Rig file with the stereo pair view-id (unset = focal-length and baseline)",
           kMutableReady),
-      P::enumeration<&S::core, &Core::match, &Match::algorithm> ("algorithm", "Algorithm",
-          "Stereo matching algorithm", GST_TYPE_STEREO_DEPTH_ALGORITHM, kMutableReady),
       P::enumeration<&S::packing> ("packing", "Packing",
           "Whether images at pad left contain both views; pad right is then not linked",
           GST_TYPE_STEREO_DEPTH_PACKING, kMutableReady),
@@ -179,11 +97,10 @@ make_stereo_view (const StereoDepthSettings &settings, int width, int height, Vi
     view = make_pinhole_view (v, v.focal_length, width, height);
     view.right.emplace ();
     view.right->intrinsics = view.intrinsics;
-    view.right->intrinsics.cx += settings.principal_offset;
     view.right->partner_from_left.translation.x = -settings.baseline;
   }
   set_depth_range (v, view);
-  if (view.far_m >= 65535 * view.depth_unit_m && v.depth_unit <= 0)
+  if (view.far_m >= 65535 * view.depth_unit_m)
     view.depth_unit_m = view.far_m / 65000; /* make far fit 16 bits */
   return rangecast::validate ({{view}});
 }

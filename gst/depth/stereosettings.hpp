@@ -4,7 +4,6 @@
 #include <gst/gst.h>
 
 #include <rangecast/geometry/rig.hpp>
-#include <rangecast/stereo/disparity_finder.hpp>
 
 #include "common/properties.hpp"
 #include "packedinput.hpp"
@@ -13,9 +12,8 @@
 /** stereodepth's properties. Guarded by the element's lock. */
 struct StereoDepthSettings {
   ViewSettings view;
-  double baseline = 0;         ///< metres, without a rig; 0: unset
-  double principal_offset = 0; ///< pixels, without a rig
-  rangecast::StereoSettings core;
+  double baseline = 0;       ///< metres, without a rig; 0: unset
+  int n_threads = 0;         ///< 0: one per core
   int refresh_interval = 30; ///< frames
   Packing packing = Packing::kAuto;
   bool qos = true;

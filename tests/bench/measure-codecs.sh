@@ -44,7 +44,7 @@ side () { # file, pad
 }
 # shellcheck disable=SC2046
 gst-launch-1.0 -q $(side "$people/left.mp4" depth.left) $(side "$people/right.mp4" depth.right) \
-  stereodepth name=depth "rig=$out/rig.yaml" algorithm=sgbm-3way block-size=7 uniqueness-ratio=5 flying-pixel-step=0.05 \
+  stereodepth name=depth "rig=$out/rig.yaml" \
   ! roiextract settle-frames=34 background-frames=16 cue=depth depth-threshold=0.3 min-area=1000 max-hole=400 \
   ! identity eos-after=90 ! neighbourcodeenc depth-bits=16 depth-threshold=0 colour-threshold=0 \
   ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink "location=$out/people.rcnc"

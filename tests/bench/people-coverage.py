@@ -3,8 +3,7 @@
 """How much of each person stereodepth ! roiextract keeps of the recording luxonis_people_stereo, and how much beside them,
 against the outlines in tests/data/people.
 
-usage: people-coverage.py [--size WIDTHxHEIGHT] [--fps N] [--stereo PROPERTIES] [--roi PROPERTIES] [--pictures FOLDER]
-                          [--min-covered PERCENT] [--max-beside PERCENT]   (after: source pipelines/env.sh)
+usage: people-coverage.py [--min-covered PERCENT] [--max-beside PERCENT]   (after: source pipelines/env.sh)
 
 The recording runs through the elements with their default properties, a rig made by rig-convert, and a background learnt
 from the frames 120 to 183, which show nobody. Covered: share of the person's pixels that have depth. Beside: pixels with
@@ -15,7 +14,6 @@ missing, 1 if a limit is missed.
 import argparse
 import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -32,6 +30,8 @@ except ImportError as error:
 TESTS = Path(__file__).resolve().parent.parent
 RECORDED_FPS = 30
 BACKGROUND_FRAMES = (120, 186)  # from, to, of the recording
+SIZE = WIDTH, HEIGHT = 640, 400
+STEP = 3  # every third frame is matched
 
 
 def node_matrix(node, name, rows):
@@ -44,7 +44,7 @@ def camera_matrix(node):
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
 
 
-def rectified_view(rig_path, size):
+def rectified_view(rig_path):
     """Focal length, cx and cy of what stereodepth puts out: as lib/rangecast/stereo/rectification.cpp makes them."""
     storage = cv2.FileStorage(str(rig_path), cv2.FILE_STORAGE_READ)
     left = storage.getNode("views").at(0)
@@ -52,15 +52,15 @@ def rectified_view(rig_path, size):
     pose = right.getNode("partner_from_left")
     projection = cv2.stereoRectify(
         camera_matrix(left), node_matrix(left, "distortion", 1), camera_matrix(right), node_matrix(right, "distortion", 1),
-        size, node_matrix(pose, "rotation", 3), node_matrix(pose, "translation", 3),
+        SIZE, node_matrix(pose, "rotation", 3), node_matrix(pose, "translation", 3),
         flags=cv2.CALIB_ZERO_DISPARITY, alpha=0)[2]
     return projection[0, 0], projection[0, 2], projection[1, 2]
 
 
-def fill(outlines, labelled, view, size):
-    """A mask of polygons, whose points are moved from the labelled view's pixels to those of this size."""
+def fill(outlines, labelled, view):
+    """A mask of polygons, whose points are moved from the labelled view's pixels to this one's."""
     focal, cx, cy = view
-    mask = np.zeros(size[::-1], np.uint8)
+    mask = np.zeros((HEIGHT, WIDTH), np.uint8)
     for outline in outlines:
         points = np.array(outline, float).reshape(-1, 2)
         points = (points - [labelled["cx"], labelled["cy"]]) / labelled["focal_length"] * focal + [cx, cy]
@@ -70,91 +70,53 @@ def fill(outlines, labelled, view, size):
     return mask > 0
 
 
-def run_pipeline(recording, folder, size, fps, stereo, roi):
+def run_pipeline(recording, folder):
     subprocess.run(["rig-convert", "luxonis", recording / "calib.json", folder / "rig.yaml", "--near", "0.7", "--far", "4",
-                    "--scale", str(size[0] / 1280)], check=True)
-    step = RECORDED_FPS // fps
+                    "--scale", str(WIDTH / 1280)], check=True)
     first, last = BACKGROUND_FRAMES
-    width, height = size
 
     def side(name):
         return (f"filesrc location={recording}/{name}.mp4 ! decodebin ! videoconvert ! videorate drop-only=true"
-                f" ! video/x-raw,framerate={fps}/1 ! videoscale method=bilinear2 ! video/x-raw,width={width},height={height}"
-                f" ! videoconvert ! queue ! depth.{name}").split()
+                f" ! video/x-raw,framerate={RECORDED_FPS // STEP}/1 ! videoscale method=bilinear2"
+                f" ! video/x-raw,width={WIDTH},height={HEIGHT} ! videoconvert ! queue ! depth.{name}").split()
 
-    whole = "video/x-raw,format={} ! filesink location=" + str(folder)
+    def depth_to(name):
+        return f"! queue ! rangesplit name={name} {name}.depth ! queue ! video/x-raw,format=GRAY16_LE ! filesink location={folder}/{name}.raw"
+
     subprocess.run(
         ["gst-launch-1.0", "-q", *side("left"), *side("right")]
-        + f"stereodepth name=depth rig={folder}/rig.yaml {stereo} ! tee name=matched".split()
-        + f"! queue ! roiextract settle-frames={first // step} background-frames={(last - first) // step} {roi}".split()
-        + f"! rangesplit name=person person.depth ! queue ! {whole.format('GRAY16_LE')}/person.raw".split()
-        + f"matched. ! queue ! rangesplit name=all all.depth ! queue ! {whole.format('GRAY16_LE')}/matched.raw".split()
-        + f"all.colour ! queue ! videoconvert ! {whole.format('GRAY8')}/left.raw".split(),
+        + f"stereodepth name=depth rig={folder}/rig.yaml ! tee name=t ! queue ! roiextract settle-frames={first // STEP}".split()
+        + f"background-frames={(last - first) // STEP} {depth_to('person')} t. {depth_to('matched')}".split(),
         check=True)
-    pixels = (-1, height, width)
-    return (np.memmap(folder / "person.raw", "<u2", "r").reshape(pixels),
-            np.memmap(folder / "matched.raw", "<u2", "r").reshape(pixels),
-            np.memmap(folder / "left.raw", np.uint8, "r").reshape(pixels))
-
-
-def picture(left, person, unsure, kept, matched):
-    """The left picture with the outline; green: covered, red: missing, blue: beside; depth before roiextract."""
-    shown = cv2.cvtColor(left, cv2.COLOR_GRAY2BGR)
-    tint = shown // 2
-    for where, colour in ((person & kept, (0, 120, 0)), (person & ~kept, (0, 0, 120)), (~person & kept, (120, 0, 0))):
-        tint[where] += np.array(colour, np.uint8)
-    for mask, colour in ((person, (0, 255, 255)), (unsure, (255, 0, 255))):
-        outline, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-        cv2.drawContours(shown, outline, -1, colour, 1)
-    scaled = np.where(matched > 0, np.clip(7000 / np.maximum(matched, 1) * 220, 20, 255), 0).astype(np.uint8)
-    return np.hstack([shown, tint, cv2.applyColorMap(scaled, cv2.COLORMAP_JET) * (matched > 0)[..., None]])
-
-
-def parse_arguments():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("--size", default="640x400", help="of the pictures that are matched (default: %(default)s)")
-    parser.add_argument("--fps", type=int, default=10, choices=(5, 10, 15, 30), help="frames a second (default: %(default)s)")
-    parser.add_argument("--stereo", default="", help="properties of stereodepth")
-    parser.add_argument("--roi", default="", help="properties of roiextract")
-    parser.add_argument("--pictures", type=Path, help="write a picture of each frame there")
-    parser.add_argument("--min-covered", type=float, default=0, help="limit of the mean, per cent")
-    parser.add_argument("--max-beside", type=float, default=float("inf"), help="limit of the mean, per cent")
-    arguments = parser.parse_args()
-    if not re.fullmatch(r"[1-9]\d*x[1-9]\d*", arguments.size):
-        parser.error(f"--size: expected WIDTHxHEIGHT, got '{arguments.size}'")
-    arguments.size = tuple(map(int, arguments.size.split("x")))
-    return arguments
+    return [np.memmap(folder / f"{name}.raw", "<u2", "r").reshape(-1, HEIGHT, WIDTH) for name in ("person", "matched")]
 
 
 def main():
-    arguments = parse_arguments()
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--min-covered", type=float, default=0, help="limit of the mean, per cent")
+    parser.add_argument("--max-beside", type=float, default=float("inf"), help="limit of the mean, per cent")
+    arguments = parser.parse_args()
     data = Path(os.environ.get("RANGECAST_DATA") or TESTS.parent.parent / "shared" / "data")
     recording = data / "luxonis_people_stereo"
     if not (recording / "left.mp4").exists():
         print(f"skipped: no test data {recording}")
         return SKIP
     labels = json.loads((TESTS / "data/people/outlines.json").read_text())
-    if arguments.pictures:
-        arguments.pictures.mkdir(parents=True, exist_ok=True)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
-        people, matched, left = run_pipeline(
-            recording, folder, arguments.size, arguments.fps, arguments.stereo, arguments.roi)
-        view = rectified_view(folder / "rig.yaml", arguments.size)
+        people, matched = run_pipeline(recording, folder)
+        view = rectified_view(folder / "rig.yaml")
         print("frame   person   matched   covered   beside")
         for frame, outlines in labels["frames"].items():
-            masks = [fill(outlines.get(kind, []), labels["view"], view, arguments.size) for kind in ("person", "unsure")]
+            masks = [fill(outlines.get(kind, []), labels["view"], view) for kind in ("person", "unsure")]
             person, unsure = masks[0] & ~masks[1], masks[1]
-            index = int(frame) * arguments.fps // RECORDED_FPS
+            index = int(frame) // STEP
             kept = (people[index] > 0) & ~unsure
             area = person.sum()
             rows.append([100 * share / area for share in (
                 (person & (matched[index] > 0)).sum(), (person & kept).sum(), (~person & kept).sum())])
             print(f"{frame:>5} {area:>8} px " + " ".join(f"{value:>7.1f} %" for value in rows[-1]))
-            if arguments.pictures:
-                cv2.imwrite(str(arguments.pictures / f"{frame}.png"),
-                            picture(left[index], person, unsure, kept, matched[index]))
     rows = np.array(rows)
     mean = rows.mean(0)
     print(f" mean {'':>8}    " + " ".join(f"{value:>7.1f} %" for value in mean))

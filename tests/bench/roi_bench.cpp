@@ -3,7 +3,6 @@
  * rooms, beside the truth. --help lists the options. */
 #include <cstdio>
 #include <cstdlib>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,12 +18,10 @@ using rangecast::testing::RoiTrial;
 namespace {
 
 const char *const kUsage =
-    "usage: roi_bench [--frames N] [--room NAME] [--depth range|stereo] [--pictures FOLDER]\n"
+    "usage: roi_bench [--frames N] [--room NAME] [--depth range|stereo]\n"
     "  --frames N         with the person, 1.7 seconds apart (default 12)\n"
     "  --room NAME        only this one (default: all)\n"
     "  --depth WHICH      range (exact with noise) or stereo (default: both)\n"
-    "  --fringe N         that property of roiextract, pixels (default 9)\n"
-    "  --pictures FOLDER  the last frame of each: picture, truth, what is kept, shadow\n"
     "columns: IoU of the valid pixels that are kept with the true mask (worst frame, mean), mean\n"
     "IoU of the decision, share of shadow pixels kept, pixels kept beside the person a frame,\n"
     "pixels a frame missed deeper than 1 pixel inside the silhouette, deepest of them\n";
@@ -60,30 +57,9 @@ rooms ()
   return all;
 }
 
-void
-write_pictures (const std::string &path, const RoiStage &stage)
-{
-  cv::Mat bgr, sheet, column;
-  cv::cvtColor (stage.colour (), bgr, cv::COLOR_RGBA2BGR);
-  cv::Mat cut = cv::Mat::zeros (bgr.size (), CV_8UC3);
-  bgr.copyTo (cut, stage.kept ());
-  /* Wrong decisions: kept beside the person red, missed blue. */
-  cv::Mat truth = stage.truth () != 0, marked;
-  cv::cvtColor (truth, marked, cv::COLOR_GRAY2BGR);
-  marked.setTo (cv::Scalar (0, 0, 255), stage.kept () & ~truth);
-  marked.setTo (cv::Scalar (255, 0, 0), truth & ~stage.kept ());
-  cv::Mat shadow;
-  cv::cvtColor (stage.shadow (), shadow, cv::COLOR_GRAY2BGR);
-  const cv::Mat parts[] = {bgr, cut, marked, shadow};
-  cv::hconcat (parts, 4, sheet);
-  if (!cv::imwrite (path, sheet))
-    std::fprintf (stderr, "roi_bench: %s: cannot be written\n", path.c_str ());
-}
-
 struct Job {
   int frames = 12;
-  int fringe = SegmentationSettings ().fringe;
-  std::string pictures, room, depth;
+  std::string room, depth;
 };
 
 void
@@ -93,7 +69,6 @@ measure (const Room &room, bool stereo, Cue cue, const Job &job)
   RoiTrial trial = room.trial;
   trial.stereo = stereo;
   trial.settings.cue = cue;
-  trial.settings.fringe = job.fringe;
   trial.frames = job.frames;
   RoiStage stage (trial);
   RoiScore score;
@@ -106,10 +81,6 @@ measure (const Room &room, bool stereo, Cue cue, const Job &job)
       score.mean_mask_iou, 100.0 * double (score.shadow_kept) / double (score.shadow_pixels + 1),
       double (score.outside_kept) / job.frames, double (score.eaten_deep) / job.frames,
       score.eaten);
-  if (!job.pictures.empty ())
-    write_pictures (job.pictures + "/" + room.name + (stereo ? "-stereo-" : "-range-") +
-                        kCues[int (cue)] + ".png",
-        stage);
 }
 
 } // namespace
@@ -120,10 +91,8 @@ main (int argc, char **argv)
   Job job;
   Options options ("roi_bench", kUsage);
   options.number ("--frames", job.frames, 1, 1000);
-  options.text ("--pictures", job.pictures);
   options.text ("--room", job.room);
   options.text ("--depth", job.depth);
-  options.number ("--fringe", job.fringe, 0, 99);
   if (const auto status = options.parse (argc, argv))
     return *status;
   std::printf ("%-18s %-7s %-7s %6s %6s %6s %9s %7s %7s %5s\n", "room", "depth", "cue", "worst",

@@ -11,12 +11,3 @@ test_persons_of_a_real_recording_are_covered () {
   [ $status != 77 ] || skip "no Python module cv2 or numpy"
   [ $status = 0 ] || fail "people-coverage.py: $status"
 }
-
-test_wrong_arguments_of_people_coverage_are_told () {
-  local python
-  for python in python3 /usr/bin/python3; do
-    ! "$python" -c "import cv2, numpy" 2>/dev/null || break
-  done
-  "$python" -c "import cv2, numpy" 2>/dev/null || skip "no Python module cv2 or numpy"
-  expect_error "expected WIDTHxHEIGHT" "$python" "$source_dir/tests/bench/people-coverage.py" --size 640
-}

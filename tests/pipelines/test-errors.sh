@@ -244,7 +244,7 @@ test_properties_in_options_are_named () {
   expect_error "--render: a quote is not closed in 'a \"'" "${viewer[@]}" --render 'a "'
   expect_error "--depth: a quote is not closed in 'a \"'" "${camera[@]}" --depth 'a "'
   expect_error "--render: expected properties of striprender, e.g. mode=strips, got 'strips'" "${viewer[@]}" --render strips
-  expect_error "--depth: expected properties of stereodepth, e.g. algorithm=bm, got '!'" "${camera[@]}" --depth 'near=1 ! fakesink'
+  expect_error "--depth: expected properties of stereodepth, e.g. near=0.4, got '!'" "${camera[@]}" --depth 'near=1 ! fakesink'
   expect_error "--encoder: n-threads=1000: expected 0 to 64" "${camera[@]}" --encoder "profile=entropy n-threads=1000"
   expect_error "--depth: near=-1: expected 0" "${camera[@]}" --depth near=-1
   expect_error "--talk: expected an element before and after each '!'" "${viewer[@]}" --talk 'pulsesrc !' --talk-to 127.0.0.1:7000

@@ -79,20 +79,9 @@ test_aloe_pair_is_rendered () {
   folder=$(dirname "$(dpkg -L opencv-doc 2>/dev/null | grep -m 1 'aloeL.jpg')" 2>/dev/null) || folder=
   [ -f "$folder/aloeL.jpg" ] || skip "no aloeL.jpg (Debian package opencv-doc)"
   "$pipelines/stereo-to-png.sh" "$folder/aloeL.jpg" "$folder/aloeR.jpg" aloe.png \
-    --focal-length 3740 --baseline 0.16 --near 2.6 --far 20
-  expect_file aloe.png 100000
-}
-
-test_warnings_reach_stderr_and_nothing_else_does () {
-  need_gl
-  local folder
-  folder=$(dirname "$(dpkg -L opencv-doc 2>/dev/null | grep -m 1 'aloeL.jpg')" 2>/dev/null) || folder=
-  [ -f "$folder/aloeL.jpg" ] || skip "no aloeL.jpg (Debian package opencv-doc)"
-  local pair=(--focal-length 1200 --baseline 0.16 --near 0.6 --far 3)
-  "$pipelines/stereo-to-png.sh" "$folder/aloeL.jpg" "$folder/aloeR.jpg" right.png "${pair[@]}" >said.txt 2>&1
+    --focal-length 3740 --baseline 0.16 --near 2.6 --far 20 >said.txt 2>&1
   [ ! -s said.txt ] || fail "$(cat said.txt)"
-  [ "$("$pipelines/stereo-to-png.sh" "$folder/aloeR.jpg" "$folder/aloeL.jpg" wrong.png "${pair[@]}" 2>&1 >/dev/null |
-    grep -c "cameras seem to be exchanged")" = 1 ] || fail "no warning"
+  expect_file aloe.png 100000
 }
 
 test_bunny_scans_go_through_everything () {
@@ -119,7 +108,7 @@ test_people_are_cut_out_of_a_real_recording_without_their_shadows () {
   local input=$data/luxonis_people_stereo empty n
   rig-convert luxonis "$input/calib.json" rig.yaml --near 0.7 --far 4 --scale 0.5
   "$pipelines/stereo-to-cutout.sh" "$input/left.mp4" "$input/right.mp4" out --rig rig.yaml --size 640x400 \
-    --fps 5 --settle 17 --learn 8 --stereo "algorithm=sgbm-3way block-size=7 uniqueness-ratio=5 flying-pixel-step=0.05" \
+    --fps 5 --settle 17 --learn 8 \
     --roi "shadow=0.1 highlight=8 depth-threshold=0.3 min-area=1000 max-hole=400"
   empty=$(stat -c %s out/00001.png) # learning: all black
   for n in 00020 00027 00100; do

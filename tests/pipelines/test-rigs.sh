@@ -184,32 +184,3 @@ test_cameras_of_a_rig_with_many_pixels_are_drawn () {
   "$pipelines/rig-check.sh" rig.yaml --png rig.png --width 320 --height 240 >/dev/null
   expect_file rig.png 1000
 }
-
-# usage: exchanged LEFT RIGHT RIG: how often the cameras are called exchanged.
-exchanged () {
-  gst-launch-1.0 filesrc "location=$1" ! decodebin ! videoconvert ! d.left filesrc "location=$2" ! decodebin ! videoconvert ! d.right \
-    stereodepth name=d "rig=$3" ! fakesink 2>&1 | grep -c "cameras seem to be exchanged"
-}
-
-test_exchanged_cameras_of_real_pairs_are_noticed_and_right_ones_are_not () {
-  local pair=$data/stereo_motorcycle/motorcycle near
-  need_data stereo_motorcycle/motorcycle_left.png
-  middlebury 994.978
-  for near in 2.1 1.5; do
-    rig-convert middlebury calib.txt rig.yaml --near $near --far 5
-    [ "$(exchanged "${pair}_left.png" "${pair}_right.png" rig.yaml || true)" = 0 ] || fail "near $near: a false alarm"
-    [ "$(exchanged "${pair}_right.png" "${pair}_left.png" rig.yaml)" = 1 ] || fail "near $near: not noticed"
-  done
-}
-
-test_exchanged_cameras_that_need_rectification_are_noticed () {
-  need_data luxonis_people_stereo/left.mp4
-  local recording=$data/luxonis_people_stereo camera
-  rig-convert luxonis "$recording/calib.json" rig.yaml --near 0.7 --far 4 --scale 0.5
-  for camera in left right; do
-    gst-launch-1.0 -q filesrc "location=$recording/$camera.mp4" ! decodebin ! videoconvert ! videoscale method=bilinear2 \
-      ! video/x-raw,width=640,height=400 ! identity eos-after=40 ! pngenc compression-level=1 ! multifilesink "location=$camera-%02d.png"
-  done
-  [ "$(exchanged left-38.png right-38.png rig.yaml || true)" = 0 ] || fail "a false alarm"
-  [ "$(exchanged right-38.png left-38.png rig.yaml)" = 1 ] || fail "not noticed"
-}

@@ -1,12 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* clear_flying() uses OpenCV's vectors for saturating 16-bit arithmetic, because Lanes
- * (base/simd.hpp) have 32-bit elements, half as many. */
 #include "disparity_filter.hpp"
 
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
-#include <opencv2/core/hal/intrin.hpp>
 
 namespace rangecast {
 namespace {
@@ -15,6 +12,10 @@ namespace {
 constexpr int kPatchRadius = 3, kPatchArea = 49;
 /* Difference between two images of a patch due to noise and interpolation, grey levels. */
 constexpr int kNoise = 4;
+constexpr int kSupport = 4;    /* of eight neighbours; at a straight edge there are five */
+constexpr int kSpeck = 100;    /* pixels; smaller surfaces are mostly wrong matches */
+constexpr int kSpeckStep = 32; /* 1/16 pixel */
+constexpr int kGap = 12;       /* pixels */
 
 /* Grey level at 1/16 pixel positions, interpolated linearly. */
 int
@@ -24,21 +25,32 @@ grey_at (const std::uint8_t *row, int x16, int width)
   return (row[x] * (16 - f) + row[std::min (x + 1, width - 1)] * f + 8) >> 4;
 }
 
-/* Copies a tile with a border of one pixel, and `more` columns for vectors that end beyond it. */
+/* Copies a tile with a border of one pixel. */
 void
-copy_with_border (
-    const cv::Mat &disparity, const cv::Rect &tile, int more, std::int16_t none, Plane &to)
+copy_with_border (const cv::Mat &disparity, const cv::Rect &tile, std::int16_t none, Plane &to)
 {
-  const cv::Rect all (0, 0, disparity.cols, disparity.rows);
-  const cv::Rect there (tile.x - 1, tile.y - 1, tile.width + 2, tile.height + 2);
-  const cv::Rect inside = there & all;
-  to.set_size (there.width + more, there.height);
+  const cv::Rect there (tile.x - 1, tile.y - 1, tile.width + 2, tile.height + 2),
+      inside = there & cv::Rect ({}, disparity.size ());
+  to.set_size (there.width, there.height);
   for (int y = 0; y < to.height (); y++) {
     std::int16_t *row = to.row (y);
     std::fill_n (row, to.width (), none);
-    if (const int v = there.y + y; v >= 0 && v < all.height)
+    if (const int v = there.y + y; v >= 0 && v < disparity.rows)
       std::copy_n (
           disparity.ptr<std::int16_t> (v) + inside.x, inside.width, row + (inside.x - there.x));
+  }
+}
+
+/* Adds one to the counts of a row's pixels whose neighbours' disparities are within `max`. */
+void
+count_support (const std::int16_t *__restrict d, const std::int16_t *__restrict other,
+    const std::uint16_t *__restrict max, int min, int n, std::uint16_t *__restrict counts)
+{
+  const auto lowest = std::int16_t (min);
+  for (int x = 0; x < n; x++) {
+    const auto difference = std::uint16_t (
+        std::uint16_t (std::max (d[x], other[x])) - std::uint16_t (std::min (d[x], other[x])));
+    counts[x] = std::uint16_t (counts[x] + ((other[x] >= lowest) & (difference <= max[x])));
   }
 }
 
@@ -60,10 +72,9 @@ struct PatchSums {
   const std::int16_t *counts, *differences, *sizes, *contrasts;
 };
 
-/* @param share  maximum difference relative to contrast, 1/256 */
 void
-clear_unlike_of_row (const std::int16_t *__restrict from, const PatchSums &sums, int share,
-    std::int16_t none, int n, std::int16_t *__restrict to)
+clear_unlike_of_row (const std::int16_t *__restrict from, const PatchSums &sums, std::int16_t none,
+    int n, std::int16_t *__restrict to)
 {
   const std::int16_t *__restrict counts = sums.counts, *__restrict differences = sums.differences,
                                  *__restrict sizes = sums.sizes,
@@ -71,7 +82,7 @@ clear_unlike_of_row (const std::int16_t *__restrict from, const PatchSums &sums,
   for (int x = 0; x < n; x++) {
     const std::int16_t d = from[x]; /* not loaded by condition, so that vectors are */
     const int unlike = kPatchArea * (sizes[x] - std::abs (int (differences[x])) / 2),
-              max = (share * contrasts[x] / 256 + kNoise * kPatchArea) * counts[x];
+              max = (contrasts[x] + kNoise * kPatchArea) * counts[x];
     to[x] = unlike > max ? none : d;
   }
 }
@@ -115,17 +126,16 @@ DisparityFilter::compare_patches (const cv::Mat &left, const cv::Mat &right, int
 }
 
 void
-DisparityFilter::clear_unlike (const cv::Mat &left, const cv::Mat &right, int right_x,
-    double tolerance, int min, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to)
+DisparityFilter::clear_unlike (const cv::Mat &left, const cv::Mat &right, int right_x, int min,
+    const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to)
 {
-  const int share = int (256 * tolerance);
   memory_.reserve (tiles.workers ());
   tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
     Memory &m = memory_.of (worker);
     compare_patches (left, right, right_x, min, tile, disparity, m);
     for (int y = 0; y < tile.height; y++) {
       clear_unlike_of_row (disparity.ptr<std::int16_t> (tile.y + y) + tile.x,
-          {m.counts.row (y), m.differences.row (y), m.sizes.row (y), m.contrasts.row (y)}, share,
+          {m.counts.row (y), m.differences.row (y), m.sizes.row (y), m.contrasts.row (y)},
           std::int16_t (min - 16), tile.width, to.ptr<std::int16_t> (tile.y + y) + tile.x);
     }
   });
@@ -162,43 +172,29 @@ DisparityFilter::clear_hidden (int min, const Tiles &tiles, cv::Mat &disparity)
 }
 
 void
-DisparityFilter::clear_flying (double step, int support, int offset, int min, const Tiles &tiles,
-    const cv::Mat &disparity, cv::Mat &to)
+DisparityFilter::clear_flying (
+    int offset, int min, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to)
 {
-  const auto share = static_cast<std::uint16_t> (std::min (65535.0, 65536 * step));
+  constexpr int kShare = int (65536 * kSurfaceStep);
   const auto none = static_cast<std::int16_t> (min - 16);
   memory_.reserve (tiles.workers ());
   tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
-    Plane &copy = memory_.of (worker).grey;
-    constexpr int kLanes = cv::v_int16x8::nlanes;
-    copy_with_border (disparity, tile, kLanes, none, copy);
-    const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (min)),
-                        zero = cv::v_setzero_s16 (), nothing = cv::v_setall_s16 (none),
-                        shift = cv::v_setall_s16 (static_cast<short> (offset)),
-                        /* counts are negative and include the pixel itself */
-        enough = cv::v_setall_s16 (static_cast<short> (-support));
+    Memory &m = memory_.of (worker);
+    const auto n = std::size_t (tile.width);
+    copy_with_border (disparity, tile, none, m.grey);
+    m.max.resize (n);
     for (int y = 0; y < tile.height; y++) {
+      const std::int16_t *d = m.grey.row (y + 1) + 1;
+      for (std::size_t x = 0; x < n; x++)
+        m.max[x] = std::uint16_t (std::max (8, std::max (d[x] + offset, 0) * kShare >> 16));
+      m.support.assign (n, 0);
+      for (int v = 0; v < 3; v++)
+        for (int u = 0; u < 3; u++)
+          count_support (
+              d, m.grey.row (y + v) + u, m.max.data (), min, tile.width, m.support.data ());
       auto out = to.ptr<std::int16_t> (tile.y + y) + tile.x;
-      for (int x = 0; x < tile.width; x += kLanes) {
-        const cv::v_int16x8 d = cv::v_load (copy.row (y + 1) + x + 1);
-        const cv::v_uint16x8 max = cv::v_max (cv::v_setall_u16 (8),
-            cv::v_mul_hi (
-                cv::v_reinterpret_as_u16 (cv::v_max (d + shift, zero)), cv::v_setall_u16 (share)));
-        cv::v_int16x8 n = zero;
-        for (int v = y; v < y + 3; v++)
-          for (int u = x; u < x + 3; u++) {
-            const cv::v_int16x8 other = cv::v_load (copy.row (v) + u);
-            n = n + ((other >= valid) & cv::v_reinterpret_as_s16 (cv::v_absdiff (other, d) <= max));
-          }
-        const cv::v_int16x8 result = cv::v_select (n < enough, d, nothing);
-        if (x + kLanes <= tile.width)
-          cv::v_store (out + x, result);
-        else {
-          std::int16_t last[kLanes];
-          cv::v_store (last, result);
-          std::copy_n (last, tile.width - x, out + x);
-        }
-      }
+      for (std::size_t x = 0; x < n; x++)
+        out[x] = m.support[x] > kSupport ? d[x] : none; /* the pixel itself counts, too */
     }
   });
 }
@@ -254,8 +250,7 @@ DisparityFilter::clear_doubled (const cv::Mat &left, const cv::Mat &right, int r
 /* ---- specks ---- */
 
 void
-DisparityFilter::clear_specks (
-    int window, int range, int min, int nearest, const Tiles &tiles, cv::Mat &disparity)
+DisparityFilter::clear_specks (int min, int nearest, const Tiles &tiles, cv::Mat &disparity)
 {
   components_.clear ();
   int next = 0;
@@ -265,13 +260,13 @@ DisparityFilter::clear_specks (
     for (; next < part.br ().y; next++)
       components_.add_level_row (disparity.ptr<std::int16_t> (next),
           disparity.ptr<std::int16_t> (std::max (0, next - 1)), part.x, part.br ().x, nearest,
-          range);
+          kSpeckStep);
   }
   for (const cv::Rect &part : tiles.parts ())
     for (int y = part.y; y < part.br ().y; y++) {
       auto row = disparity.ptr<std::int16_t> (y);
       for (const ConnectedComponents::Run &run : components_.row (y))
-        if (components_.size_of (run) <= window)
+        if (components_.size_of (run) <= kSpeck)
           std::fill (row + run.x0, row + run.x1, std::int16_t (min - 16));
     }
 }
@@ -294,10 +289,10 @@ is_between (const cv::Vec4b &p, const cv::Vec4b &a, const cv::Vec4b &b)
 /* Whether row y ends a gap, by column.
  *  @param last  rows with a disparity before, or INT16_MIN */
 void
-find_ends (const std::int16_t *__restrict d, int n, int min, int y, int width,
+find_ends (const std::int16_t *__restrict d, int n, int min, int y,
     const std::int16_t *__restrict last, std::uint8_t *__restrict ends)
 {
-  const auto first = std::int16_t (std::max (0, y - 1 - width)), end = std::int16_t (y - 1),
+  const auto first = std::int16_t (std::max (0, y - 1 - kGap)), end = std::int16_t (y - 1),
              lowest = std::int16_t (min);
   for (int i = 0; i < n; i++)
     ends[i] = (d[i] >= lowest) & (last[i] >= first) & (last[i] < end);
@@ -330,8 +325,7 @@ fill_gap (const cv::Vec4b *colour, std::ptrdiff_t colour_step, std::int16_t *dis
 } // namespace
 
 void
-DisparityFilter::fill_gaps (
-    const cv::Mat &colour, int width, int min, const Tiles &tiles, cv::Mat &disparity)
+DisparityFilter::fill_gaps (const cv::Mat &colour, int min, const Tiles &tiles, cv::Mat &disparity)
 {
   memory_.reserve (tiles.workers ());
   tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
@@ -348,18 +342,18 @@ DisparityFilter::fill_gaps (
       };
       for (int end, begin = find (find (0, 1), 0); begin < tile.width; begin = find (end, 0)) {
         end = find (begin, 1);
-        if (end < tile.width && end - begin <= width)
+        if (end < tile.width && end - begin <= kGap)
           fill_gap (colour.ptr<cv::Vec4b> (y), 1, d, 1, tile.x + begin - 1, tile.x + end);
       }
     }
   });
-  fill_gaps_of_columns (colour, width, min, tiles, disparity);
+  fill_gaps_of_columns (colour, min, tiles, disparity);
 }
 
 /* Columns are processed in groups, in memory order; threads share the groups. */
 void
 DisparityFilter::fill_gaps_of_columns (
-    const cv::Mat &colour, int width, int min, const Tiles &tiles, cv::Mat &disparity)
+    const cv::Mat &colour, int min, const Tiles &tiles, cv::Mat &disparity)
 {
   constexpr int kColumns = 64;
   const cv::Rect hull = tiles.hull ();
@@ -381,7 +375,7 @@ DisparityFilter::fill_gaps_of_columns (
             bottom = part.br ().y;
             for (int y = part.y; begin < end && y < bottom; y++) {
               const auto d = disparity.ptr<std::int16_t> (y) + x0;
-              find_ends (d + begin, end - begin, min, y, width, last + begin, ends + begin);
+              find_ends (d + begin, end - begin, min, y, last + begin, ends + begin);
               const std::uint8_t *at = ends + begin;
               while (const void *found = std::memchr (at, 1, std::size_t (ends + end - at))) {
                 at = static_cast<const std::uint8_t *> (found);

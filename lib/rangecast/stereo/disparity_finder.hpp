@@ -3,33 +3,16 @@
 
 #include <opencv2/core.hpp>
 
+#include "../base/status.hpp"
 #include "../geometry/range_image.hpp"
 #include "background_disparity.hpp"
 #include "disparity_filter.hpp"
 #include "disparity_refiner.hpp"
-#include "matching.hpp"
+#include "semi_global_matcher.hpp"
 #include "silhouette_filter.hpp"
 #include "tiles.hpp"
 
 namespace rangecast {
-
-struct StereoSettings {
-  MatchSettings match;
-  double patch_tolerance = 1; ///< maximum difference of a patch relative to its contrast; 0 = off
-  double flying_pixel_step = 0.03; ///< maximum relative depth difference of neighbours; 0 = off
-  int silhouette_radius = 8;       ///< radius of SilhouetteFilter, pixels; 0 = off
-  int gap_width = 12;              ///< maximum width of gaps that are filled, pixels; 0 = off
-  int refine = 2;                  ///< refinement iterations; 0 = off
-  /** Maximum depth to match, metres; 0 = infinity. Depth beyond far is cleared, but must be matched
-   * so that it is not mistaken for something nearer. */
-  double search_far_m = 0;
-  /** Maximum number of frames averaged before matching where nothing moves; 1 = off. */
-  int average = 10;
-  double steady = 0; ///< 0 (off) to 1: temporal smoothing of depth where nothing moves
-  int n_threads = 0; ///< 0 = one per core
-
-  friend bool operator== (const StereoSettings &, const StereoSettings &) = default;
-};
 
 /** Geometry of a rectified pair. */
 struct PairGeometry {
@@ -42,9 +25,9 @@ struct PairGeometry {
  * of it in a range of depths. Reuses its memory between images. */
 class DisparityFinder {
 public:
-  /** @return kBadValue if near needs a disparity beyond the image width, or the error of Matcher */
-  Status set (
-      const PairGeometry &pair, const StereoSettings &settings, double near_m, double far_m);
+  /** @param n_threads  0 = one per core
+   *  @return kBadValue if near needs a disparity beyond the image width or 2000 pixels */
+  Status set (const PairGeometry &pair, double near_m, double far_m, int n_threads);
 
   /** Forgets the background that was seen in earlier images. */
   void reset () { background_.reset (); }
@@ -54,10 +37,9 @@ public:
    *  @param roi          inside the image, not empty
    *  @param parts        rectangles one below the other in which to match; null = the whole ROI
    *  @param near_m, far_m  depth range, 0 = unlimited; with limits, background that was seen beyond
-   * them in earlier images is still recognized
-   *  @return kNoSpace if OpenCV failed */
-  Status find (const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m,
-      double far_m, const std::vector<cv::Rect> *parts = nullptr);
+   * them in earlier images is still recognized */
+  void find (const cv::Mat &left, const cv::Mat &right, const Roi &roi, double near_m, double far_m,
+      const std::vector<cv::Rect> *parts = nullptr);
 
   /** The part of the left (0) or right (1) image that find() may need for a ROI. */
   [[nodiscard]] cv::Rect needed (const Roi &roi, int camera) const;
@@ -71,21 +53,29 @@ public:
     return 16 * pair_.focal_baseline / depth_m;
   }
 
-  /** Maximum disparity in the images, pixels. */
-  [[nodiscard]] int max_disparity () const { return max_disparity_; }
-
 private:
-  Status choose_range (double near_m, double far_m);
+  /* Disparities to search, pixels. */
+  struct Range {
+    int min = 0, count = 0;
+
+    /* Numbers of columns left and right of a pixel that its match may need. */
+    [[nodiscard]] int reach () const { return min + count > 0 ? min + count : 0; }
+    [[nodiscard]] int reach_right () const { return min < 0 ? -min : 0; }
+  };
+  static Range range_of (int min, int max);
+  [[nodiscard]] Range choose_range (double near_m, double far_m) const;
   void place_window (const Roi &roi);
   void choose_parts (const std::vector<cv::Rect> *parts);
-  Status match ();
+  void match ();
   void filter (const cv::Mat &left);
   void restore_background (const cv::Mat &grey, int right_x);
   void write_disparity (const Roi &roi);
 
   PairGeometry pair_;
-  StereoSettings settings_;
-  Matcher all_, some_, *matcher_ = &all_;
+  SemiGlobalMatcher matcher_;
+  Range range_; /* of this image; a part of that of all depths if limited_ */
+  bool limited_ = false;
+  int n_threads_ = 0;
   int min_disparity_ = 0, max_disparity_ = 0; /* disparity range of all depths, pixels */
   int far_ = 0; /* disparity, 1/16 pixel, of the farthest depth of interest */
   DisparityFilter filter_;

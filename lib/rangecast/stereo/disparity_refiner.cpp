@@ -29,6 +29,9 @@ constexpr float kUnlike = 20;
 /* Maximum change of a disparity in one iteration, and in total, pixels. */
 constexpr float kMax = 0.5f, kMaxOfAll = 1;
 
+/* More of them hardly change anything; without any, the median error doubles. */
+constexpr int kIterations = 2;
+
 /* Rows of differences that are kept: a power of two, those of a patch and one more. */
 constexpr int kRows = 16;
 static_assert (kRows > kPatchSide);
@@ -616,7 +619,7 @@ DisparityRefiner::put_back (const Job &job, const cv::Rect &part, cv::Mat &dispa
 void
 DisparityRefiner::apply (const Job &job, const Tiles &tiles, cv::Mat &disparity)
 {
-  if (job.iterations <= 0 || job.right.cols < 4)
+  if (job.right.cols < 4)
     return;
   begin (disparity.size (), tiles);
   const auto each = [&] (const auto &work) {
@@ -636,7 +639,7 @@ DisparityRefiner::apply (const Job &job, const Tiles &tiles, cv::Mat &disparity)
   each (
       [&]<typename Lanes> (Part &part, Memory &m, const Lanes &) { find_edges<Lanes> (part, m); });
   smooth_all ();
-  for (int i = 0; i < job.iterations; i++) {
+  for (int i = 0; i < kIterations; i++) {
     each ([&]<typename Lanes> (
               const Part &part, Memory &m, const Lanes &) { move<Lanes> (job, part, m); });
     smooth_all ();

@@ -10,13 +10,13 @@
 
 namespace rangecast {
 
-/** Refines disparities that are right to about a pixel. In each iteration, each disparity is
- * replaced by that of a plane fitted to its neighbourhood, and shifted to minimize the difference
- * between both images: one step of B. D. Lucas, T. Kanade, "An iterative image registration
- * technique with an application to stereo vision", IJCAI 1981, in which each pixel of the window is
- * sampled at its own disparity, so that slanted and curved surfaces are as precise as those that
- * face the camera, and the images may differ in brightness. Without texture only the plane fit has
- * an effect. Reuses its memory between images. */
+/** Refines disparities that are right to about a pixel. In each of two iterations, each disparity
+ * is replaced by that of a plane fitted to its neighbourhood, and shifted to minimize the
+ * difference between both images: one step of B. D. Lucas, T. Kanade, "An iterative image
+ * registration technique with an application to stereo vision", IJCAI 1981, in which each pixel of
+ * the window is sampled at its own disparity, so that slanted and curved surfaces are as precise as
+ * those that face the camera, and the images may differ in brightness. Without texture only the
+ * plane fit has an effect. Reuses its memory between images. */
 class DisparityRefiner {
 public:
   struct Job {
@@ -24,7 +24,6 @@ public:
     const cv::Mat &colour;       ///< CV_8UC4, the left one's
     int right_x = 0;             ///< column of `right` that corresponds to column 0 of `left`
     int nearest = 1;             ///< 1/16 pixel; farther pixels (or without disparity) are ignored
-    int iterations = 2;          ///< 0 = off
   };
 
   /** Shifts no disparity by more than a pixel before the last plane fit; adds and removes none.

@@ -6,23 +6,10 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "../base/simd.hpp"
-
-/* Functions that return vectors are all inlined, into code for the processor. */
-#pragma GCC diagnostic ignored "-Wpsabi"
+#include "matching_cost.hpp"
 
 namespace rangecast {
 namespace {
-
-/* The neighbours of the descriptor: every second one of 7 x 5 in a chessboard pattern. */
-constexpr int kRadiusX = 3, kRadiusY = 2, kNeighbours = 16;
-/* Clipping of differences to neighbours, grey levels. */
-constexpr int kMaxDifference = 7;
-/* Clipping of the difference of both pixels, grey levels, and its weight. */
-constexpr int kMaxGrey = 15, kGreyWeight = 2;
-constexpr int kCostShift = 2;
-constexpr int kMaxCost = (kNeighbours * 2 * kMaxDifference + kGreyWeight * kMaxGrey) >> kCostShift;
-static_assert (kMaxCost << kCostShift < 256);
 
 /* Penalties for a change of disparity along a path by one pixel, and by more; the latter decreases
  * with the grey level step, because surfaces end at edges. */
@@ -31,14 +18,14 @@ constexpr int kStep = 10, kJump = 60, kMinJump = 15, kEdge = 8;
 constexpr std::uint8_t kNever = 200;
 static_assert (kMaxCost + kJump < kNever && kNever + kStep < 256);
 
-constexpr int kSide = 32;    /* of a tile, pixels */
 constexpr int kOverlap = 16; /* rows in which paths converge */
-/* Costs of a stripe, two bytes each; more only where two bands of tiles have more. */
-constexpr std::size_t kMaxCells = 36 << 20;
+/* Costs of a stripe, two bytes each; up to kMaxCellsOfBands where two bands of tiles have more. */
+constexpr std::size_t kMaxCells = 36 << 20, kMaxCellsOfBands = 4 * kMaxCells;
 constexpr int kMinBands = 2;         /* one has no rows without overlap */
 constexpr int kMaxDisparities = 512; /* of a tile; if there are more, the nearest are searched */
 static_assert (kMinBands * kSide > 2 * kOverlap);
-constexpr std::int16_t kAmbiguous = INT16_MIN;
+/* Maximum difference of the disparities of a pixel and of its right pixel's best match, pixels. */
+constexpr int kMaxInconsistency = 1;
 
 /* Number of disparities from which half the size is searched first; margin around what was found
  * there, disparities; pixels of half the size around a tile from which it is taken. */
@@ -53,158 +40,6 @@ constexpr auto kJumps = [] {
     jumps[std::size_t (step)] = std::uint8_t (std::max (kMinJump, kJump * kEdge / (kEdge + step)));
   return jumps;
 }();
-
-template <typename T>
-constexpr T
-lesser (const T &a, const T &b)
-{
-  return a < b ? a : b;
-}
-
-template <typename T>
-constexpr T
-greater (const T &a, const T &b)
-{
-  return a > b ? a : b;
-}
-
-/* The same for vectors. Types of template arguments lose their alignment, hence not of B. */
-template <typename Lanes>
-inline typename Lanes::B
-min_of (const typename Lanes::B &a, const typename Lanes::B &b)
-{
-  return a < b ? a : b;
-}
-
-template <typename Lanes>
-inline typename Lanes::B
-max_of (const typename Lanes::B &a, const typename Lanes::B &b)
-{
-  return a > b ? a : b;
-}
-
-/* a - b, at least 0. */
-template <typename Lanes>
-inline typename Lanes::B
-subtract_down_to_0 (const typename Lanes::B &a, const typename Lanes::B &b)
-{
-  return a - min_of<Lanes> (a, b);
-}
-
-/* Computes the differences of a row's pixels to one neighbour, offset to start at 0, and adds them
- * up. @param n  a multiple of kSide, as below */
-void
-compare_with (const std::uint8_t *__restrict other, const std::uint8_t *__restrict own, int n,
-    std::uint8_t *__restrict differences, std::uint8_t *__restrict sums)
-{
-  constexpr std::uint8_t kMaxShift = kMaxDifference;
-  for (int begin = 0; begin < n; begin += kSide)
-    for (int x = begin; x < begin + kSide; x++) {
-      const std::uint8_t high = greater (other[x], own[x]);
-      const auto above = std::uint8_t (high - own[x]), below = std::uint8_t (high - other[x]);
-      differences[x] =
-          std::uint8_t (kMaxShift + lesser (above, kMaxShift) - lesser (below, kMaxShift));
-      sums[x] = std::uint8_t (sums[x] + differences[x]);
-    }
-}
-
-/* Describes columns x0 to x1 of a row, which are multiples of kSide.
- * @param[out] planes  by neighbour and column, and a plane of their sums */
-void
-transform_row (const cv::Mat &padded, int y, int x0, int x1, std::vector<std::uint8_t> &planes)
-{
-  const int width = padded.cols - 2 * kRadiusX, n = x1 - x0;
-  planes.resize (std::size_t (kNeighbours + 1) * std::size_t (width));
-  const std::uint8_t *own = padded.ptr<std::uint8_t> (y + kRadiusY) + kRadiusX + x0;
-  std::uint8_t *plane = planes.data () + x0, *sums = plane + std::ptrdiff_t (kNeighbours) * width;
-  std::fill_n (sums, n, std::uint8_t{0});
-  for (int v = -kRadiusY; v <= kRadiusY; v++)
-    for (int u = -kRadiusX; u <= kRadiusX; u++) {
-      if ((u + v) % 2 != 0 || (u == 0 && v == 0))
-        continue;
-      compare_with (
-          padded.ptr<std::uint8_t> (y + kRadiusY + v) + kRadiusX + x0 + u, own, n, plane, sums);
-      plane += width;
-    }
-}
-
-/* Minimum and maximum grey level from half a pixel to the left to half a pixel to the right. */
-void
-range_of_row (const std::uint8_t *__restrict grey, int n, std::uint8_t *__restrict low,
-    std::uint8_t *__restrict high)
-{
-  const auto mean = [] (std::uint8_t a, std::uint8_t b) {
-    return std::uint8_t ((a & b) + std::uint8_t ((a ^ b) >> 1));
-  };
-  for (int begin = 0; begin < n; begin += kSide)
-    for (int x = begin; x < begin + kSide; x++) {
-      const std::uint8_t own = grey[x], left = mean (grey[x - 1], own),
-                         right = mean (grey[x + 1], own);
-      low[x] = lesser (lesser (left, right), own);
-      high[x] = greater (greater (left, right), own);
-    }
-}
-
-/* One row of a picture, described for matching. */
-struct RowView {
-  const std::uint8_t *planes; /* see transform_row() */
-  int stride;
-  const std::uint8_t *low, *high; /* of the right picture: see range_of_row() */
-};
-
-/* Adds up the greater of both descriptors' elements, for half of the neighbours and all
- * disparities. Adding up |a - b| is adding up 2 max (a, b) - a - b. */
-template <typename Lanes, bool kFirst>
-inline void
-add_greater (const std::uint8_t *left, int left_stride, const std::uint8_t *right, int right_stride,
-    int count, std::uint8_t *sums)
-{
-  using B = typename Lanes::B;
-  constexpr int kHalf = kNeighbours / 2;
-  B own[kHalf];
-#pragma GCC unroll 8
-  for (int k = 0; k < kHalf; k++)
-    own[k] = Lanes::at (left + k * left_stride);
-  for (int d = 0; d < count; d++, sums += kSide) {
-    B sum = kFirst ? B{} : Lanes::at (sums);
-#pragma GCC unroll 8
-    for (int k = 0; k < kHalf; k++)
-      sum += max_of<Lanes> (own[k], Lanes::at (right + k * right_stride - d));
-    Lanes::at (sums) = sum;
-  }
-}
-
-/* The costs of a row of a tile.
- * @param x      its first column; @param grey  of the left row from there on
- * @param right  the right row
- * @param[out] costs  by disparity and column */
-template <typename Lanes>
-inline void
-compare (const RowView &left, const std::uint8_t *grey, int x, const RowView &right, int low,
-    int count, std::uint8_t *costs)
-{
-  using B = typename Lanes::B;
-  constexpr int kHalf = kNeighbours / 2;
-  for (int part = 0; part < kSide; part += int (sizeof (B))) {
-    const int from = x + part, to = from - low;
-    const std::uint8_t *l = left.planes + from, *r = right.planes + to;
-    add_greater<Lanes, true> (l, left.stride, r, right.stride, count, costs + part);
-    add_greater<Lanes, false> (l + kHalf * left.stride, left.stride, r + kHalf * right.stride,
-        right.stride, count, costs + part);
-    const B own = Lanes::at (grey + part), sum = Lanes::at (l + kNeighbours * left.stride),
-            most = B{} + std::uint8_t (kMaxGrey);
-    const std::uint8_t *sums = r + kNeighbours * right.stride;
-    for (int d = 0; d < count; d++) {
-      const B high = Lanes::at (right.high + to - d), above = max_of<Lanes> (own, high) - high,
-              below = max_of<Lanes> (own, Lanes::at (right.low + to - d)) - own,
-              differs = min_of<Lanes> (max_of<Lanes> (above, below), most);
-      static_assert (kGreyWeight == 2);
-      B &cost = Lanes::at (costs + part + d * kSide);
-      const B all = (cost + differs) * 2 - sum - Lanes::at (sums - d);
-      cost = all >> kCostShift;
-    }
-  }
-}
 
 /* kJumps at each of `steps`, which are below kSteps. Clang has no shuffle by a variable. */
 template <typename Lanes>
@@ -525,7 +360,7 @@ SemiGlobalMatcher::realign (const Tile &from, const Tile &to, Memory &m)
 }
 
 /* The disparities of a row of a tile with the lowest cost, with subpixel precision by a parabola
- * through it and its neighbours; none if another one is nearly as good.
+ * through it and its neighbours.
  * @param x, y   position in the stripe; @param most  what the lowest costs leave of 255 */
 template <typename Lanes>
 void
@@ -560,34 +395,10 @@ SemiGlobalMatcher::choose (
       best[i] = std::int16_t (found[i] ? begin + place[i] : best[i]);
   }
   const std::size_t at = std::size_t (y) * std::size_t (stripe.across * kSide) + std::size_t (x);
-  std::int16_t *disparity = &matches_.disparity[at];
-  interpolate ({tile.low, n, best, most, farther, nearer}, &matches_.whole[at], disparity);
+  interpolate (
+      {tile.low, n, best, most, farther, nearer}, &matches_.whole[at], &matches_.disparity[at]);
   for (int i = 0; i < kSide; i++)
     matches_.sum[at + std::size_t (i)] = std::uint8_t (255 - most[i]);
-  if (settings_.uniqueness_ratio > 0)
-    clear_rivalled (rests, n, best, most, disparity);
-}
-
-/* Clears matches of a row of a tile if any cost but those next to the best one is nearly as good.
- */
-void
-SemiGlobalMatcher::clear_rivalled (const std::uint8_t *rests, int disparities,
-    const std::int16_t *best, const std::uint8_t *most, std::int16_t *disparity) const
-{
-  const int share = 100 - settings_.uniqueness_ratio;
-  std::int16_t like[kSide], rivals[kSide] = {}; /* like: what rivals leave more than */
-  for (int i = 0; i < kSide; i++)
-    like[i] = std::int16_t (
-        255 - (share > 0 ? std::min ((100 * (255 - most[i]) + share - 1) / share, 256) : 256));
-  for (int d = 0; d < disparities; d++)
-    for (int i = 0; i < kSide; i++)
-      rivals[i] = std::int16_t (rivals[i] + (rests[d * kSide + i] > like[i] ? 1 : 0));
-  for (int i = 0; i < kSide; i++) {
-    for (int d = std::max (best[i] - 1, 0); d <= std::min (best[i] + 1, disparities - 1); d++)
-      rivals[i] = std::int16_t (rivals[i] - (rests[d * kSide + i] > like[i] ? 1 : 0));
-    if (rivals[i] > 0)
-      disparity[i] = kAmbiguous;
-  }
 }
 
 /* Both paths along the columns of a column of tiles: down, then up with the choice of disparities.
@@ -654,7 +465,7 @@ SemiGlobalMatcher::walk_columns (const Stripe &stripe, int column, Memory &m)
 void
 SemiGlobalMatcher::check_row (const Stripe &stripe, int y, Memory &m, cv::Mat &disparity) const
 {
-  const int width = stripe.left.cols, most = settings_.left_right_max_difference;
+  const int width = stripe.left.cols;
   const auto none = static_cast<std::int16_t> (16 * min_disparity_ - 16);
   const std::size_t at = std::size_t (y - stripe.y0) * std::size_t (stripe.across * kSide);
   const std::int16_t *whole = &matches_.whole[at], *exact = &matches_.disparity[at];
@@ -662,9 +473,8 @@ SemiGlobalMatcher::check_row (const Stripe &stripe, int y, Memory &m, cv::Mat &d
   auto out = disparity.ptr<std::int16_t> (y);
   std::fill_n (out, width, none);
   out += stripe.x0;
-  if (most < 0) {
-    for (int x = 0; x < stripe.columns; x++)
-      out[x] = exact[x] != kAmbiguous ? exact[x] : none;
+  if (!checks_right_) {
+    std::copy_n (exact, stripe.columns, out);
     return;
   }
   /* The best match of each right pixel: its cost, then its disparity in 16 bits. */
@@ -676,8 +486,7 @@ SemiGlobalMatcher::check_row (const Stripe &stripe, int y, Memory &m, cv::Mat &d
   }
   for (int x = 0; x < stripe.columns; x++) {
     const int there = int (right[x - whole[x]] & 0xffff) + INT16_MIN;
-    const bool keep = (exact[x] != kAmbiguous) & (std::abs (there - whole[x]) <= most);
-    out[x] = keep ? exact[x] : none;
+    out[x] = std::abs (there - whole[x]) <= kMaxInconsistency ? exact[x] : none;
   }
 }
 
@@ -720,17 +529,20 @@ SemiGlobalMatcher::find_coarse (const cv::Mat &left, const cv::Mat &right, int n
   for (int i = 0; i < 2; i++)
     cv::resize (i ? right : left, half_[i], {left.cols / 2, left.rows / 2}, 0, 0, cv::INTER_AREA);
   const int low = (min_disparity_ - 1) / 2, high = (min_disparity_ + disparities_) / 2;
-  coarse_->set ({.left_right_max_difference = -1});
+  coarse_->checks_right_ = false;
   coarse_->match (half_[0], half_[1], low, high - low + 1, n_threads, coarse_disparity_);
   coarse_min_ = low;
 }
 
-/* @param x, y  position of the tile in the image */
+/* @param x, y    position of the tile in the image
+ * @param across  tiles in a row */
 void
-SemiGlobalMatcher::choose_disparities (int x, int y, Tile &tile) const
+SemiGlobalMatcher::choose_disparities (int x, int y, int across, Tile &tile) const
 {
-  const auto search = [&tile] (int low, int end) {
-    tile.low = std::max (low, end - kMaxDisparities);
+  const auto fits = kMaxCellsOfBands / (kMinBands * kTileArea * std::size_t (across));
+  const int max = int (std::min<std::size_t> (kMaxDisparities, fits));
+  const auto search = [&] (int low, int end) {
+    tile.low = std::max (low, end - max);
     tile.count = end - tile.low;
   };
   search (min_disparity_, min_disparity_ + disparities_);
@@ -767,7 +579,7 @@ SemiGlobalMatcher::add_bands (Stripe &stripe)
   while (stripe.y0 + stripe.rows < stripe.left.rows) {
     for (int i = 0; i < stripe.across; i++) {
       Tile &tile = tiles_.emplace_back ();
-      choose_disparities (stripe.x0 + i * kSide, stripe.y0 + stripe.rows, tile);
+      choose_disparities (stripe.x0 + i * kSide, stripe.y0 + stripe.rows, stripe.across, tile);
       tile.at = at;
       at = end_of (tile);
     }

@@ -23,12 +23,6 @@ namespace rangecast {
  * processor. Reuses its memory between images. */
 class SemiGlobalMatcher {
 public:
-  struct Settings {
-    int uniqueness_ratio = 0;          ///< per cent by which the best match must beat the second
-    int left_right_max_difference = 1; ///< pixels; -1 = no left-right check
-  };
-  void set (const Settings &settings) { settings_ = settings; }
-
   /** @param left, right    CV_8U, the same size, rows agree
    *  @param min_disparity  pixels; left x minus right x
    *  @param disparities    number of disparities, > 0
@@ -62,17 +56,15 @@ private:
   };
   /* The best disparities of all pixels, by row and column of tiles. */
   struct Matches {
-    std::vector<std::int16_t> disparity; /* 1/16 pixel, or kAmbiguous */
+    std::vector<std::int16_t> disparity; /* 1/16 pixel */
     std::vector<std::int16_t> whole;     /* pixels */
     std::vector<std::uint8_t> sum;       /* cost */
   };
   void find_coarse (const cv::Mat &left, const cv::Mat &right, int n_threads);
-  void choose_disparities (int x, int y, Tile &tile) const;
+  void choose_disparities (int x, int y, int across, Tile &tile) const;
   void add_bands (Stripe &stripe);
   void match_stripe (const Stripe &stripe, int y, int end, int n_threads, cv::Mat &disparity);
   static void realign (const Tile &from, const Tile &to, Memory &memory);
-  void clear_rivalled (const std::uint8_t *rests, int disparities, const std::int16_t *best,
-      const std::uint8_t *most, std::int16_t *disparity) const;
   template <typename Lanes> void compare_band (const Stripe &stripe, int band, Memory &memory);
   template <typename Lanes>
   void find_jumps_of_band (const Stripe &stripe, int band, Memory &memory);
@@ -90,7 +82,7 @@ private:
     return tile.at + std::size_t (tile.count) * kTileArea;
   }
 
-  Settings settings_;
+  bool checks_right_ = true; /* whether matches must be those of their right pixels, too */
   int min_disparity_ = 0, disparities_ = 0, coarse_min_ = 0;
   cv::Mat padded_[2]; /* CV_8U: left and right */
   std::vector<Tile> tiles_;

@@ -21,6 +21,8 @@ constexpr int kLike = 60;
 constexpr int kEnough = 160;
 /* Samples of a row that are processed together. */
 constexpr int kLanes = 8;
+/* kSurfaceStep in 1/65536. */
+constexpr int kShare = int (65536 * kSurfaceStep);
 
 /* Minimum or maximum of each window of `side` x `side` pixels.
  * @param[out] to  smaller by side - 1; @param memory  scratch */
@@ -98,7 +100,7 @@ void
 SilhouetteFilter::sample (
     const Settings &settings, const cv::Mat &colour, const cv::Mat &disparity, int n_threads)
 {
-  const bool sample_colour = !settings.same_picture;
+  const bool sample_colour = !settings.same_image;
   pad_ = settings.radius / 2 + 1; /* windows stay inside */
   const int cols = (disparity.cols + 1) / 2, rows = (disparity.rows + 1) / 2;
   samples_.set_size (cols + 2 * pad_ + kLanes, rows + 2 * pad_);
@@ -224,11 +226,11 @@ SilhouetteFilter::mark_row (const Settings &settings, const std::int16_t *__rest
     const std::int16_t *__restrict lowest, const std::int16_t *__restrict highest, int n,
     std::uint8_t *__restrict marks)
 {
-  const int share = share_of (settings), offset = settings.offset, min = settings.min,
-            nearest = settings.nearest, limit = std::max (min, nearest),
+  const int offset = settings.offset, min = settings.min, nearest = settings.nearest,
+            limit = std::max (min, nearest),
             look_near = settings.only_beyond ? settings.look_near : INT16_MAX;
   for (int x = 0; x < n; x++) {
-    const int d = disparity[x], tolerance = std::max (16, (d + offset) * share >> 16);
+    const int d = disparity[x], tolerance = std::max (16, (d + offset) * kShare >> 16);
     const bool inside = (d < nearest) | (lowest[x] >= d - tolerance) | (lowest[x] > look_near);
     marks[x] = (highest[x] >= limit) & ((d < min) | !inside);
   }
@@ -262,7 +264,7 @@ SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, con
       const int d = valid ? from[x] : likely (settings, own, at_x, at_y);
       if (d < std::max (min, settings.nearest))
         continue;
-      const int max = std::max (16, (d + settings.offset) * share_of (settings) >> 16);
+      const int max = std::max (16, (d + settings.offset) * kShare >> 16);
       const Votes votes = valid && !settings.only_beyond
                               ? vote<false> (settings, own, at_x, at_y, d, max)
                               : vote<true> (settings, own, at_x, at_y, d, max);

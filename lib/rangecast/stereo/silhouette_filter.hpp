@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "box_sum.hpp"
+#include "disparity_filter.hpp"
 #include "tiles.hpp"
 
 namespace rangecast {
@@ -17,8 +18,7 @@ namespace rangecast {
 class SilhouetteFilter {
 public:
   struct Settings {
-    int radius = 8;   ///< pixels, > 0
-    double step = 0;  ///< maximum relative depth difference within a surface
+    int radius = 8;   ///< pixels, 1 to 64: beyond, the sums would saturate
     int offset = 0;   ///< 1/16 pixel, to be added to disparities
     int min = 0;      ///< lowest valid disparity, 1/16 pixel; cleared ones become min - 16
     int nearest = -1; ///< farther pixels are not processed, but count as farther
@@ -27,7 +27,7 @@ public:
     /** With only_beyond: 1/16 pixel; skip pixels that have none this far around them. */
     int look_near = 0;
     /** `radius` and `colour` are those of the last call, whose samples are used again. */
-    bool same_picture = false;
+    bool same_image = false;
   };
 
   /** @param colour     CV_8UC4, of the disparities' size
@@ -54,11 +54,6 @@ private:
   [[nodiscard]] Votes vote (
       const Settings &settings, const cv::Vec4b &own, int x, int y, int d, int max) const;
   [[nodiscard]] int likely (const Settings &settings, const cv::Vec4b &own, int x, int y) const;
-  /* For tolerances in units of 1/65536. */
-  static int share_of (const Settings &settings)
-  {
-    return static_cast<int> (65536 * settings.step);
-  }
   static void mark_row (const Settings &settings, const std::int16_t *disparity,
       const std::int16_t *lowest, const std::int16_t *highest, int n, std::uint8_t *marks);
   void apply_to (const Settings &settings, const cv::Mat &colour, const cv::Rect &tile,

@@ -8,37 +8,65 @@
 #include "../base/guarded.hpp"
 #include "../base/simd.hpp"
 #include "../opencv/image.hpp"
-#include "histogram_range.hpp"
 
 namespace rangecast {
+namespace {
+
+/* First and last bin of interest. */
+struct BinRange {
+  int low = 0, high = 0;
+};
+
+/* The range of bins without the lowest and highest 0.5 % of all counts, of which there is one at
+ * least. */
+BinRange
+without_half_a_per_cent (const std::vector<int> &histogram)
+{
+  std::int64_t total = 0; /* 200 times as many pixels may exceed an int */
+  for (int n : histogram)
+    total += n;
+  BinRange range = {0, int (histogram.size ()) - 1};
+  for (std::int64_t n = 0; (n += histogram[std::size_t (range.low)]) * 200 < total;)
+    range.low++;
+  for (std::int64_t n = 0; (n += histogram[std::size_t (range.high)]) * 200 < total;)
+    range.high--;
+  return range;
+}
+
+} // namespace
 
 Status
-StereoDepth::set (const View &view, const StereoSettings &settings, bool with_third)
+StereoDepth::set (const View &view, int n_threads, bool with_third)
 {
   if (Status s = rectifier_.set (view); !s.ok ())
     return s;
   const View &range = rectifier_.range_view ();
   const PairGeometry pair = {view.width, view.height,
       range.intrinsics.fx * rectifier_.baseline_m (), rectifier_.principal_offset ()};
-  if (Status s = finder_.set (pair, settings, range.near_m, range.far_m); !s.ok ())
+  if (Status s = finder_.set (pair, range.near_m, range.far_m, n_threads); !s.ok ())
     return {s.code (), "view " + std::to_string (view.id) + ": " + s.message ()};
   with_third_ = with_third;
   if (with_third)
-    if (Status s = third_.set (view, range, pair.focal_baseline, settings); !s.ok ())
+    if (Status s = third_.set (view, range, pair.focal_baseline, n_threads); !s.ok ())
       return s;
   view_ = view;
-  settings_ = settings;
+  n_threads_ = n_threads;
+  blocks_.set ({view.width, view.height});
   reset ();
-  mirror_.reset ();
-  for (StillAverage &still : still_)
-    still.set (settings.average);
-  if (settings.steady > 0)
-    temporal_.set (
-        view.width, view.height, settings.steady, pair.focal_baseline / range.depth_unit_m);
-  occupancy_.set (view.width, view.height);
   pictures_[0].release ();
-  return to_depth_.set (
-      range.intrinsics.fx, rectifier_.baseline_m (), range.depth_unit_m, range.near_m, range.far_m);
+  map_depths (range, pair.focal_baseline);
+  return {};
+}
+
+void
+StereoDepth::map_depths (const View &range, double focal_baseline)
+{
+  depths_.assign (65536, kInvalidDepth);
+  for (int d = 1; d < 65536; d++) {
+    const double z = focal_baseline / (d / 16.0), units = std::round (z / range.depth_unit_m);
+    if (z >= range.near_m && z <= range.far_m && units >= 1 && units <= 65535)
+      depths_[std::size_t (d)] = static_cast<std::uint16_t> (units);
+  }
 }
 
 ImageView<const std::uint16_t>
@@ -59,15 +87,15 @@ StereoDepth::rectify (
       return {StatusCode::kBadSize, "stereo: an image does not have the view's size"};
   return guarded ("stereo", [&] () -> Status {
     for (int i = 0; i < 2; i++) {
-      raw_[i] = pictures_[i] = opencv_image (i ? right : left);
+      pictures_[i] = opencv_image (i ? right : left);
       if (!rectifier_.is_identity ()) {
-        rectifier_.rectify (i, raw_[i], rectified_[i]);
+        rectifier_.rectify (i, pictures_[i], rectified_[i]);
         pictures_[i] = rectified_[i];
       }
     }
     if (has_third_)
-      third_.rectify (raw_[0], opencv_image (third));
-    changes_.update (pictures_[0]);
+      third_.rectify (opencv_image (left), opencv_image (third));
+    blocks_.update (pictures_[0]);
     return {};
   });
 }
@@ -132,18 +160,15 @@ StereoDepth::is_suspect (const RangeImage &image) const
 void
 StereoDepth::clear_rims_of_third (const Roi &roi)
 {
-  if (settings_.silhouette_radius == 0)
-    return;
   constexpr int kMin = 16; /* disparity, 1/16 pixel; 16 less is none */
   const cv::Rect whole (0, 0, roi.width, roi.height);
-  tiles_.set ({&whole, 1}, settings_.n_threads);
+  tiles_.set ({&whole, 1}, n_threads_);
   cv::Mat &disparity = finder_.disparity ();
   before_fusion_.create (disparity.size (), CV_16U);
   const cv::Mat from (disparity.size (), CV_16S, disparity.data, disparity.step);
   cv::Mat to (disparity.size (), CV_16S, before_fusion_.data, before_fusion_.step);
-  /* These rims are wider; beyond 64 pixels the filter's sums would saturate. */
-  const int radius = std::min (64, settings_.silhouette_radius * 5 / 4);
-  SilhouetteFilter::Settings rims = {radius, settings_.flying_pixel_step, 0, kMin};
+  constexpr int kRadius = 10; /* these rims are wider */
+  SilhouetteFilter::Settings rims = {.radius = kRadius, .min = kMin};
   rims.nearest = static_cast<int> (finder_.disparity_at (rectifier_.range_view ().far_m));
   rims.only_beyond = true;
   rims.look_near = rims.nearest - 1;
@@ -152,43 +177,23 @@ StereoDepth::clear_rims_of_third (const Roi &roi)
   cv::swap (disparity, before_fusion_);
 }
 
-Status
+void
 StereoDepth::find (const RangeImage &image, bool everywhere)
 {
   const double near_m = everywhere ? 0 : near_now_m_, far_m = everywhere ? 0 : far_now_m_;
-  const auto parts = everywhere ? nullptr : occupancy_.find (changes_, image.roi);
-  Status status = finder_.find (matched_[0], matched_[1], image.roi, near_m, far_m, parts);
-  if (status.ok () && has_third_) {
-    status = third_.find (image.roi, near_m, far_m);
-    if (status.ok ()) {
-      fuse_disparities (
-          finder_.disparity (), third_.disparity (), third_.precision (), before_fusion_);
-      clear_rims_of_third (image.roi);
-    }
+  const auto parts = everywhere ? nullptr : blocks_.find (image.roi);
+  finder_.find (matched_[0], matched_[1], image.roi, near_m, far_m, parts);
+  if (has_third_) {
+    third_.find (image.roi, near_m, far_m);
+    fuse_disparities (
+        finder_.disparity (), third_.disparity (), third_.precision (), before_fusion_);
+    clear_rims_of_third (image.roi);
   }
-  if (status.ok ())
-    status = to_depth_.convert (disparity (), image.depth);
-  return status;
-}
-
-/* Exchanges the images before rectification, because lenses and rows are those of the other camera.
- */
-void
-StereoDepth::check_mirror ()
-{
-  if (!mirror_.is_due ())
-    return;
-  try {
-    MirrorCheck::Pair exchanged = {raw_[1], raw_[0]};
-    if (!rectifier_.is_identity ()) {
-      exchanged = {};
-      rectifier_.rectify (0, raw_[1], exchanged.left);
-      rectifier_.rectify (1, raw_[0], exchanged.right);
-    }
-    mirror_.evaluate ({pictures_[0], pictures_[1]}, exchanged, -rectifier_.principal_offset (),
-        finder_.max_disparity ());
-  } catch (const cv::Exception &) {
-    return; /* too small to decide */
+  for (int y = 0; y < image.roi.height; y++) {
+    const std::uint16_t *from = disparity ().row (y);
+    std::uint16_t *to = image.depth.row (y);
+    for (int x = 0; x < image.roi.width; x++)
+      to[x] = depths_[from[x]];
   }
 }
 
@@ -197,13 +202,17 @@ StereoDepth::match (const RangeImage &image)
 {
   const Roi &roi = image.roi;
   if (pictures_[0].empty () || roi.empty () || roi.x < 0 || roi.y < 0 ||
-      roi.x + roi.width > view_.width || roi.y + roi.height > view_.height)
+      roi.x + roi.width > view_.width || roi.y + roi.height > view_.height ||
+      image.depth.width != roi.width || image.depth.height != roi.height)
     return {StatusCode::kBadSize, "stereo: the ROI does not lie in the view"};
-  return guarded ("stereo", [&] { return match_inside (image); });
+  return guarded ("stereo", [&] () -> Status {
+    match_inside (image);
+    return {};
+  });
 }
 
 /* The same, of a ROI that lies in the view. */
-Status
+void
 StereoDepth::match_inside (const RangeImage &image)
 {
   const Roi &roi = image.roi;
@@ -211,24 +220,16 @@ StereoDepth::match_inside (const RangeImage &image)
       static_cast<std::size_t> (image.colour.stride));
   pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)).copyTo (to);
   for (int i = 0; i < 2; i++)
-    matched_[i] = settings_.average > 1 ? still_[i].add (pictures_[i], finder_.needed (roi, i))
-                                        : pictures_[i];
+    matched_[i] = still_[i].add (pictures_[i], finder_.needed (roi, i));
   const bool whole = roi.width == view_.width && roi.height == view_.height;
-  if (whole) {
-    changes_.set_reference ();
-    check_mirror ();
-  }
+  if (whole)
+    blocks_.set_reference ();
   const bool everywhere = whole || near_now_m_ <= 0;
-  Status status = find (image, everywhere);
-  if (status.ok () && !everywhere && is_suspect (image))
-    status = find (image, true);
-  if (!status.ok ())
-    return status;
+  find (image, everywhere);
+  if (!everywhere && is_suspect (image))
+    find (image, true);
   learn_range (image);
-  occupancy_.learn (image);
-  if (settings_.steady > 0)
-    temporal_.apply (image);
-  return status;
+  blocks_.learn (image);
 }
 
 } // namespace rangecast

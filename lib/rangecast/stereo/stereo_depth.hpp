@@ -5,14 +5,9 @@
 
 #include "../geometry/range_image.hpp"
 #include "../geometry/rig.hpp"
-#include "change_detector.hpp"
-#include "depth.hpp"
 #include "disparity_finder.hpp"
-#include "mirror_check.hpp"
-#include "occupancy.hpp"
+#include "moving_blocks.hpp"
 #include "rectification.hpp"
-#include "still_average.hpp"
-#include "temporal_filter.hpp"
 #include "third_pair.hpp"
 
 namespace rangecast {
@@ -22,9 +17,10 @@ namespace rangecast {
 class StereoDepth {
 public:
   /** @param view        a raw view with a right camera; its near and far set the disparity range
+   *  @param n_threads   0 = one per core
    *  @param with_third  use the view's third camera, whose images are passed to rectify()
    *  @return the errors of Rectifier, DisparityFinder and ThirdPair */
-  Status set (const View &view, const StereoSettings &settings, bool with_third = false);
+  Status set (const View &view, int n_threads = 0, bool with_third = false);
 
   /** The view of the range images. */
   [[nodiscard]] const View &range_view () const { return rectifier_.range_view (); }
@@ -40,15 +36,15 @@ public:
       ImageView<const Rgbx> left, ImageView<const Rgbx> right, ImageView<const Rgbx> third = {});
 
   /** Whether the left image has changed outside of the ROI since the last one that was matched
-   * completely (ChangeDetector). */
+   * completely (ChangedBlocks). */
   [[nodiscard]] bool changed_outside (const Roi &roi) const
   {
-    return changes_.changed_outside (roi);
+    return blocks_.changed_outside (roi);
   }
 
   /** @param image  its ROI (not empty, inside the view) is computed; depth and colour are
    * completely written
-   *  @return kBadSize if the ROI is not inside the view */
+   *  @return kBadSize if the ROI is not inside the view, or the image of another size */
   Status match (const RangeImage &image);
 
   Status process (ImageView<const Rgbx> left, ImageView<const Rgbx> right, const RangeImage &image,
@@ -59,19 +55,13 @@ public:
   }
   /** @} */
 
-  /** Whether left and right seem to be exchanged (MirrorCheck); known after the first complete
-   * images. */
-  [[nodiscard]] bool looks_mirrored () const { return mirror_.mirrored (); }
-
   /** After a break in the stream: discards all that was learnt from earlier images, also the
    * background. The next images should be matched completely, as changed_outside() requests. */
   void reset ()
   {
-    changes_.reset ();
-    temporal_.reset ();
+    blocks_.reset ();
     for (StillAverage &still : still_)
       still.reset ();
-    occupancy_.reset ();
     finder_.reset ();
     third_.reset ();
     near_now_m_ = far_now_m_ = seen_share_ = 0;
@@ -83,27 +73,23 @@ public:
   [[nodiscard]] ImageView<const std::uint16_t> disparity () const;
 
 private:
-  Status match_inside (const RangeImage &image);
-  Status find (const RangeImage &image, bool everywhere);
+  void match_inside (const RangeImage &image);
+  void map_depths (const View &range, double focal_baseline);
+  void find (const RangeImage &image, bool everywhere);
   void clear_rims_of_third (const Roi &roi);
-  void check_mirror ();
   void learn_range (const RangeImage &image);
   [[nodiscard]] bool is_suspect (const RangeImage &image) const;
 
   View view_;
-  StereoSettings settings_;
+  int n_threads_ = 0;
   Rectifier rectifier_;
   DisparityFinder finder_;
   ThirdPair third_;
   SilhouetteFilter rims_; /* for the result of both pairs */
   Tiles tiles_;
   bool with_third_ = false, has_third_ = false; /* configured; for this pair */
-  DisparityToDepth to_depth_;
-  ChangeDetector changes_;
-  Occupancy occupancy_;
-  MirrorCheck mirror_;
-  TemporalFilter temporal_;
-  cv::Mat raw_[2];      /* the caller's memory */
+  std::vector<std::uint16_t> depths_;           /* by disparity */
+  ChangedBlocks blocks_;
   cv::Mat pictures_[2]; /* rectified; may be the caller's memory */
   cv::Mat matched_[2];  /* the same with less noise */
   StillAverage still_[2];

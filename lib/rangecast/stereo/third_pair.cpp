@@ -135,8 +135,7 @@ ThirdPair::map_range_view (const View &range_view, double focal_baseline)
 }
 
 Status
-ThirdPair::set (
-    const View &view, const View &range_view, double focal_baseline, const StereoSettings &settings)
+ThirdPair::set (const View &view, const View &range_view, double focal_baseline, int n_threads)
 {
   if (!view.third)
     return {StatusCode::kNotFound,
@@ -151,7 +150,7 @@ ThirdPair::set (
   precision_ = pair_.focal_baseline / focal_baseline;
   const DepthFactors there = depth_factors ({0, 0, range_view.width, range_view.height});
   if (Status s = finder_.set (
-          pair_, settings, range_view.near_m * there.min, range_view.far_m * there.max);
+          pair_, range_view.near_m * there.min, range_view.far_m * there.max, n_threads);
       !s.ok ())
     return bad_third (view, s.message ().c_str ());
   return {};
@@ -190,20 +189,17 @@ ThirdPair::depth_factors (const Roi &roi) const
   return factors;
 }
 
-Status
+void
 ThirdPair::find (const Roi &roi, double near_m, double far_m)
 {
   disparity_.create (roi.height, roi.width, CV_16U);
   const Roi there = bounding_box (roi);
   if (there.empty ()) {
     disparity_.setTo (0);
-    return {};
+    return;
   }
   const DepthFactors factors = depth_factors (roi);
-  const Status status =
-      finder_.find (pictures_[0], pictures_[1], there, near_m * factors.min, far_m * factors.max);
-  if (!status.ok ())
-    return status;
+  finder_.find (pictures_[0], pictures_[1], there, near_m * factors.min, far_m * factors.max);
   for (int y = 0; y < roi.height; y++) {
     const auto where = where_.ptr<cv::Vec2s> (roi.y + y) + roi.x;
     const auto factor = factor_.ptr<float> (roi.y + y) + roi.x;
@@ -215,7 +211,6 @@ ThirdPair::find (const Roi &roi, double near_m, double far_m)
       to[x] = static_cast<std::uint16_t> (std::min (65535L, std::lround (d * factor[x])));
     }
   }
-  return {};
 }
 
 void

@@ -19,8 +19,7 @@ public:
    *  @param focal_baseline  of the first pair, pixels times metres
    *  @return kNotFound without a third camera, kBadValue if its position is that of the left one,
    * or in front of or behind it */
-  Status set (const View &view, const View &range_view, double focal_baseline,
-      const StereoSettings &settings);
+  Status set (const View &view, const View &range_view, double focal_baseline, int n_threads);
 
   /** Forgets the background that was seen in earlier images. */
   void reset () { finder_.reset (); }
@@ -30,7 +29,7 @@ public:
 
   /** @param roi  of the range view
    *  @param near_m, far_m  depths of the range view; else as DisparityFinder::find() */
-  Status find (const Roi &roi, double near_m, double far_m);
+  void find (const Roi &roi, double near_m, double far_m);
 
   /** Of the last ROI, CV_16U, in 1/16 pixel of disparity of the first pair. */
   [[nodiscard]] const cv::Mat &disparity () const { return disparity_; }

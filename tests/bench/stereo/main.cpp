@@ -6,7 +6,6 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
-#include <rangecast/rigfile/rig_file.hpp>
 
 #include "../options.hpp"
 #include "report.hpp"
@@ -20,30 +19,23 @@ namespace {
 
 const char *const kUsage =
     "usage: stereo_bench --left FILE --right FILE [--ground-truth FILE] [--scale S]\n"
-    "                    (--rig FILE --view-id N | --focal-length PX --baseline M [--doffs PX])\n"
-    "                    [--near M] [--far M] [--rounds N] [--tune] [--json FILE]\n"
+    "                    --focal-length PX --baseline M [--doffs PX]\n"
+    "                    [--near M] [--far M] [--rounds N] [--json FILE]\n"
     "       stereo_bench --scene [--model FILE] [--size WxH] [--distance M] [--noise LEVELS]\n"
     "                    [--frames N]\n"
-    "Matches a pair of pictures as stereodepth does by default, and with OpenCV's BM, SGBM and\n"
+    "Matches a pair of pictures as stereodepth does, and with OpenCV's BM, SGBM and\n"
     "3-way SGBM in the same run. Prints, for the pixels whose truth is known: density, the share\n"
     "that has a disparity; and of those bad-1.0 and bad-2.0, the shares further off than 1 and 2\n"
     "pixels, and the median error.\n"
-    "  --ground-truth FILE  true disparities of the (rectified) left picture: PFM, a grey "
-    "picture,\n"
-    "                       NPZ or NPY; 0 and not finite = unknown\n"
+    "  --ground-truth FILE  true disparities of the left picture: PFM, NPZ or a grey picture; 0\n"
+    "                       and not finite = unknown\n"
     "  --scale S            its values per pixel of disparity (default 1)\n"
-    "  --rig FILE           the pair is view --view-id of this rig (default 0), and is rectified\n"
     "  --focal-length PX    of both rectified pictures, pixels\n"
     "  --baseline M         between the cameras, metres\n"
     "  --doffs PX           by how much the right principal point lies further right (default 0)\n"
-    "  --near M, --far M    where to look, metres (default: the rig's; else where the ground "
-    "truth\n"
-    "                       lies, to the next 16 disparities, as benchmarks name it; else\n"
-    "                       disparities up to a quarter of the width)\n"
-    "  --rounds N           times are processor times, the least of so many (default 12: the first "
-    "8\n"
-    "                       include a check whether left and right are exchanged)\n"
-    "  --tune               also run OpenCV's 3-way SGBM at a grid of settings, print its best\n"
+    "  --near M, --far M    where to look, metres (default: where the ground truth lies, to the\n"
+    "                       next 16 disparities; else disparities up to a quarter of the width)\n"
+    "  --rounds N           times are processor times, the least of so many (default 12)\n"
     "  --scene              render pictures instead, of one person in a room, and match them "
     "whole,\n"
     "                       in the person's ROI alone, and with a third camera; prints the share "
@@ -64,10 +56,9 @@ const char *const kUsage =
     "  --json FILE          write rows: matcher, density, bad1, bad2 (0 to 1), median_px, ms\n";
 
 struct Job {
-  std::string left, right, truth, rig, json;
-  int view_id = -1, rounds = 12;
-  double focal = 0, baseline = 0, offset = NAN, scale = 1, near_m = 0, far_m = 0;
-  bool tune = false;
+  std::string left, right, truth, json;
+  int rounds = 12;
+  double focal = 0, baseline = 0, offset = 0, scale = 1, near_m = 0, far_m = 0;
   bool scene = false;
   SceneJob rendered;
   std::optional<unsigned> dress; /* empty: the figure bare and dressed */
@@ -80,15 +71,12 @@ add_options (Options &options, Job &job)
   options.text ("--right", job.right);
   options.text ("--ground-truth", job.truth);
   options.number ("--scale", job.scale, 1e-6, 1e6);
-  options.text ("--rig", job.rig);
-  options.number ("--view-id", job.view_id, 0, kMaxViews - 1);
   options.number ("--focal-length", job.focal, 1.0, 1e6);
   options.number ("--baseline", job.baseline, 1e-4, 1e3);
   options.number ("--doffs", job.offset, -1e4, 1e4);
   options.number ("--near", job.near_m, 1e-3, 1e5);
   options.number ("--far", job.far_m, 1e-3, 1e5);
   options.number ("--rounds", job.rounds, 1, 100000);
-  options.flag ("--tune", job.tune);
   options.flag ("--scene", job.scene);
   SceneSettings &s = job.rendered.scene;
   options.text ("--model", s.model);
@@ -97,7 +85,7 @@ add_options (Options &options, Job &job)
   options.number ("--distance", s.distance_m, 0.5, 1.2);
   options.number ("--noise", s.noise_sigma, 0.0, 20.0);
   options.number ("--frames", job.rendered.frames, 1, 1000);
-  options.number ("--threads", job.rendered.settings.n_threads, 0, 64);
+  options.number ("--threads", job.rendered.n_threads, 0, 64);
   options.text ("--json", job.json);
 }
 
@@ -112,16 +100,10 @@ complaint (const Job &job)
                  "--json";
   if (job.left.empty () || job.right.empty ())
     return "expected --left and --right";
-  if (job.rig.empty () && (job.focal <= 0 || job.baseline <= 0))
-    return "expected --rig, or --focal-length and --baseline";
-  if (!job.rig.empty () && (job.focal > 0 || job.baseline > 0 || !std::isnan (job.offset)))
-    return "--rig says --focal-length, --baseline and --doffs; expected it or them";
-  if (job.rig.empty () && job.view_id >= 0)
-    return "--view-id: expected --rig, too";
+  if (job.focal <= 0 || job.baseline <= 0)
+    return "expected --focal-length and --baseline";
   if (job.near_m > 0 && job.far_m > 0 && job.near_m >= job.far_m)
     return "--far: expected more than --near";
-  if (job.tune && job.truth.empty ())
-    return "--tune: expected --ground-truth, too";
   return {};
 }
 
@@ -152,28 +134,9 @@ read_pictures (const Job &job, Pair &pair)
   return expect_size (job.truth, pair.truth.size ());
 }
 
-Status
-view_from_rig (const Job &job, const Pair &pair, View &view)
-{
-  Rig rig;
-  if (Status s = load_rig (job.rig, rig); !s.ok ())
-    return s;
-  const int id = std::max (0, job.view_id);
-  const View *found = rig.find (id);
-  if (!found || !found->right)
-    return {StatusCode::kNotFound,
-        job.rig + ": has no view " + std::to_string (id) + " with a right camera, see --view-id"};
-  if (found->width != pair.left.cols || found->height != pair.left.rows)
-    return {StatusCode::kBadSize,
-        job.rig + ": view " + std::to_string (id) + " is " + std::to_string (found->width) + "x" +
-            std::to_string (found->height) + ", expected the size of " + job.left};
-  view = *found;
-  return {};
-}
-
-/* Near and far of a rectified pair whose rig does not say them. */
+/* Near and far if the options do not say them. */
 void
-choose_range (const Job &job, const Pair &pair, double offset, View &view)
+choose_range (const Job &job, const Pair &pair, View &view)
 {
   double least = 0, most = pair.left.cols / 4.0 - 1;
   if (!pair.truth.empty ()) {
@@ -182,56 +145,38 @@ choose_range (const Job &job, const Pair &pair, double offset, View &view)
     most = 16 * std::ceil (most / 16) - 1;
   }
   const double focal_baseline = job.focal * job.baseline;
-  view.far_m = focal_baseline / std::max (1.0, least + offset);
-  view.near_m = focal_baseline / std::max (2.0, most + offset);
+  view.far_m = focal_baseline / std::max (1.0, least + job.offset);
+  view.near_m = focal_baseline / std::max (2.0, most + job.offset);
 }
 
 Status
 make_view (const Job &job, const Pair &pair, View &view)
 {
-  if (!job.rig.empty ()) {
-    if (Status s = view_from_rig (job, pair, view); !s.ok ())
-      return s;
-  } else {
-    const double offset = std::isnan (job.offset) ? 0 : job.offset;
-    view.width = pair.left.cols;
-    view.height = pair.left.rows;
-    view.intrinsics = {job.focal, job.focal, (view.width - 1) / 2.0, (view.height - 1) / 2.0};
-    PartnerCamera partner{view.intrinsics, {}, {}};
-    partner.intrinsics.cx += offset;
-    partner.partner_from_left.translation.x = -job.baseline;
-    view.right = partner;
-    choose_range (job, pair, offset, view);
-  }
+  view.width = pair.left.cols;
+  view.height = pair.left.rows;
+  view.intrinsics = {job.focal, job.focal, (view.width - 1) / 2.0, (view.height - 1) / 2.0};
+  PartnerCamera partner{view.intrinsics, {}, {}};
+  partner.intrinsics.cx += job.offset;
+  partner.partner_from_left.translation.x = -job.baseline;
+  view.right = partner;
+  choose_range (job, pair, view);
   if (job.near_m > 0)
     view.near_m = job.near_m;
   if (job.far_m > 0)
     view.far_m = job.far_m;
-  if (view.far_m >= 65000 * view.depth_unit_m || job.rig.empty ())
-    view.depth_unit_m = view.far_m / 65000;
+  view.depth_unit_m = view.far_m / 65000;
   return validate ({{view}});
 }
 
 Status
 measure (const Job &job, const Pair &pair)
 {
-  std::vector<Row> rows (4);
-  StereoSettings settings = job.rendered.settings;
-  const std::pair<MatchAlgorithm, const char *> kOurs[] = {
-      {MatchAlgorithm::kSgm, "stereodepth sgm"},
-      {MatchAlgorithm::kSgbm3Way, "stereodepth sgbm-3way"},
-      {MatchAlgorithm::kSgbm, "stereodepth sgbm"}, {MatchAlgorithm::kBm, "stereodepth bm"}};
-  for (std::size_t i = 0; i < rows.size (); i++) {
-    settings.match.algorithm = kOurs[i].first;
-    if (Status s = run_ours (pair, settings, kOurs[i].second, job.rounds, rows[i]); !s.ok ())
-      return s;
-  }
+  std::vector<Row> rows (1);
+  if (Status s = run_ours (pair, job.rendered.n_threads, job.rounds, rows[0]); !s.ok ())
+    return s;
   for (const Row &row : run_peers (pair, job.rounds))
     rows.push_back (row);
   print_rows (rows, !pair.truth.empty ());
-  if (job.tune)
-    for (bool widened : {false, true})
-      print_best (run_grid (pair, widened), rows[0]);
   return job.json.empty () ? Status{} : write_json (job.json, rows, !pair.truth.empty ());
 }
 

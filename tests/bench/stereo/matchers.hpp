@@ -35,15 +35,9 @@ struct Row {
 rangecast::Status prepare (Pair &pair);
 
 /** stereodepth's way from two pictures to depth, measured as disparities. */
-rangecast::Status run_ours (const Pair &pair, const rangecast::StereoSettings &settings,
-    const std::string &name, int rounds, Row &row);
+rangecast::Status run_ours (const Pair &pair, int n_threads, int rounds, Row &row);
 
-/** OpenCV's matchers as a careful user would set them (see kTuned). */
+/** OpenCV's matchers, well tuned. */
 std::vector<Row> run_peers (const Pair &pair, int rounds);
-
-/** OpenCV's 3-way SGBM at all settings of a grid.
- *  @param widened  widen the pictures to the left, as stereodepth does, so that there is depth
- *  near the left edge */
-std::vector<Row> run_grid (const Pair &pair, bool widened);
 
 } // namespace bench

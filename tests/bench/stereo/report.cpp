@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "report.hpp"
 
-#include <algorithm>
 #include <cstdio>
 
 using rangecast::Status;
@@ -27,27 +26,6 @@ print_rows (const std::vector<Row> &rows, bool has_truth)
       "%-56s %9s %9s %9s %9s %9s\n", "matcher", "density", "bad-1.0", "bad-2.0", "median px", "ms");
   for (const Row &row : rows)
     print_row (row, has_truth);
-}
-
-void
-print_best (std::vector<Row> rows, const Row &ours)
-{
-  std::ranges::sort (rows, {}, &Row::bad2);
-  double densest = -1;
-  std::printf ("grid of %zu settings; those that no other beats in density and bad-2.0 at once:\n",
-      rows.size ());
-  for (const Row &row : rows)
-    if (row.density > densest) {
-      print_row (row, true);
-      densest = row.density;
-    }
-  const auto beats = [&] (const Row &r) { return r.density >= ours.density; };
-  const auto best = std::ranges::find_if (rows, beats);
-  std::printf ("least bad-2.0 at a density of at least %.2f %%:\n", 100 * ours.density);
-  if (best == rows.end ())
-    std::printf ("none is as dense\n");
-  else
-    print_row (*best, true);
 }
 
 Status

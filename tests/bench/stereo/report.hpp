@@ -8,10 +8,6 @@ namespace bench {
 /** Prints a table; shares in per cent. */
 void print_rows (const std::vector<Row> &rows, bool has_truth);
 
-/** Prints the rows of a grid that no other row beats in density and bad-2 at once, and the least
- *  bad-2 of those at least as dense as `ours`. */
-void print_best (std::vector<Row> rows, const Row &ours);
-
 /** Writes an array of objects, one a row: matcher, density, bad1, bad2 (0 to 1), median_px, ms.
  *  What needs a truth is null without one. @return kNotFound if the file cannot be written */
 rangecast::Status write_json (

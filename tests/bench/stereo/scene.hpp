@@ -16,14 +16,13 @@ struct SceneRow {
   double off_5cm = 0;   ///< of the valid pixels: further than 5 cm from the true surface
   double median_mm = 0; ///< of the absolute error, person's pixels
   double rms_px = 0;    ///< of the disparity, person's pixels less than 2 pixels off
-  double ms = 0;        ///< median time of a pair
   double cpu_ms = 0;    ///< least processor time of a pair, of all threads together
 };
 
 struct SceneJob {
   rangecast::SceneSettings scene; ///< one view is matched
   int frames = 20;
-  rangecast::StereoSettings settings;
+  int n_threads = 0; ///< of ours; 0: one per core
 };
 
 /** Matches pictures of the test scene as stereodepth does, whole and in the person's ROI alone,

@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "truth.hpp"
 
+#include <zlib.h>
+
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -9,88 +12,110 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <rangecast/geometry/range_image.hpp>
+#include <vector>
 
 using rangecast::Status;
 using rangecast::StatusCode;
 
 namespace bench {
+namespace {
 
-Status
-decode_pfm (const std::vector<std::uint8_t> &bytes, cv::Mat &values)
+using Bytes = std::vector<std::uint8_t>;
+
+/* The first file of a zip archive (PKWARE's APPNOTE 6.3, section 4.3.7), which ends where its
+ * deflated data say so. */
+bool
+unzip (const Bytes &zip, Bytes &file)
+{
+  constexpr std::size_t kMaxBytes = std::size_t{4} * rangecast::kMaxImageSide * 4096;
+  if (zip.size () < 30 || zip[8] != 8)
+    return false;
+  const std::size_t begin = 30 + zip[26] + 256u * zip[27] + zip[28] + 256u * zip[29];
+  z_stream stream{};
+  if (begin >= zip.size () || inflateInit2 (&stream, -MAX_WBITS) != Z_OK)
+    return false;
+  stream.next_in = const_cast<Bytef *> (&zip[begin]);
+  stream.avail_in = uInt (zip.size () - begin);
+  int result = Z_OK;
+  while (result == Z_OK && file.size () < kMaxBytes) {
+    constexpr std::size_t kMore = 1 << 20;
+    file.resize (file.size () + kMore);
+    stream.next_out = &file[file.size () - kMore];
+    stream.avail_out = kMore;
+    result = inflate (&stream, Z_NO_FLUSH);
+  }
+  file.resize (stream.total_out);
+  inflateEnd (&stream);
+  return result == Z_STREAM_END;
+}
+
+/* Rows of little-endian floats. */
+bool
+read_floats (const Bytes &bytes, std::size_t begin, int width, int height, cv::Mat &values)
+{
+  if (width < 1 || height < 1 || width > rangecast::kMaxImageSide ||
+      height > rangecast::kMaxImageSide || begin > bytes.size () ||
+      (bytes.size () - begin) / 4 / std::size_t (width) < std::size_t (height))
+    return false;
+  values.create (height, width, CV_32F);
+  std::memcpy (values.data, &bytes[begin], 4 * values.total ());
+  return true;
+}
+
+bool
+decode_npz (const Bytes &zip, cv::Mat &values)
+{
+  Bytes array;
+  if (!unzip (zip, array) || array.size () < 10)
+    return false;
+  const std::size_t begin = 10 + array[8] + 256u * array[9];
+  const std::string header (
+      array.begin () + 10, array.begin () + std::ptrdiff_t (std::min (begin, array.size ())));
+  const std::size_t shape = header.find ("'shape': (");
+  int width = 0, height = 0;
+  return header.find ("'<f4'") != std::string::npos && shape != std::string::npos &&
+         std::sscanf (header.c_str () + shape, "'shape': (%d, %d)", &height, &width) == 2 &&
+         read_floats (array, begin, width, height, values);
+}
+
+/* Of one channel and little-endian, as Middlebury's are; the bottom row comes first. */
+bool
+decode_pfm (const Bytes &bytes, cv::Mat &values)
 {
   const std::string head (
-      bytes.begin (), bytes.begin () + std::min<std::size_t> (80, bytes.size ()));
+      bytes.begin (), bytes.begin () + std::min<std::ptrdiff_t> (80, std::ssize (bytes)));
   int width = 0, height = 0, end = 0;
   double scale = 0;
   if (std::sscanf (head.c_str (), "Pf %d %d %lf%n", &width, &height, &scale, &end) != 3 ||
-      scale == 0)
-    return {StatusCode::kBadData, "is no PFM of one channel: expected 'Pf', size and scale"};
-  if (width < 1 || height < 1 || width > rangecast::kMaxImageSide ||
-      height > rangecast::kMaxImageSide)
-    return {StatusCode::kBadData, "PFM: expected a size from 1x1 to 16384x16384"};
-  const std::size_t from = std::size_t (end) + 1, row = 4 * std::size_t (width);
-  if (bytes.size () < from + row * std::size_t (height))
-    return {StatusCode::kTruncated, "PFM: ends too early for its size"};
-  values.create (height, width, CV_32F);
-  for (int y = 0; y < height; y++) /* the bottom row comes first */
-    for (int x = 0; x < width; x++) {
-      std::uint8_t b[4];
-      std::memcpy (
-          b, bytes.data () + from + row * std::size_t (height - 1 - y) + 4 * std::size_t (x), 4);
-      if (scale > 0) /* big-endian */
-        std::swap (b[0], b[3]), std::swap (b[1], b[2]);
-      std::memcpy (&values.at<float> (y, x), b, 4);
-    }
-  return {};
+      scale >= 0 || !read_floats (bytes, std::size_t (end) + 1, width, height, values))
+    return false;
+  cv::flip (values, values, 0);
+  return true;
 }
 
-static Status
-decode_picture (const std::vector<std::uint8_t> &bytes, cv::Mat &values)
+bool
+decode (const Bytes &bytes, cv::Mat &values)
 {
-  cv::Mat picture;
-  try {
-    picture = cv::imdecode (bytes, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception &) {
-    picture.release ();
-  }
-  if (picture.empty ())
-    return {StatusCode::kBadData, "expected a grey picture, PFM, NPZ or NPY"};
-  if (picture.channels () == 4)
-    cv::cvtColor (picture, picture, cv::COLOR_BGRA2GRAY);
-  else if (picture.channels () == 3)
-    cv::cvtColor (picture, picture, cv::COLOR_BGR2GRAY);
-  picture.convertTo (values, CV_32F);
-  return {};
-}
-
-static bool
-begins_with (const std::vector<std::uint8_t> &bytes, const char *text)
-{
-  return bytes.size () >= std::strlen (text) &&
-         !std::memcmp (bytes.data (), text, std::strlen (text));
-}
-
-static Status
-decode (const std::vector<std::uint8_t> &bytes, cv::Mat &values)
-{
-  if (begins_with (bytes, "Pf"))
+  if (bytes[0] == 'P' && bytes[1] == 'f')
     return decode_pfm (bytes, values);
-  if (begins_with (bytes, "PK"))
+  if (bytes[0] == 'P' && bytes[1] == 'K')
     return decode_npz (bytes, values);
-  if (begins_with (bytes, "\x93NUMPY"))
-    return decode_npy (bytes.data (), bytes.size (), values);
-  return decode_picture (bytes, values);
+  const cv::Mat image = cv::imdecode (bytes, cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);
+  image.convertTo (values, CV_32F);
+  return !image.empty ();
 }
+
+} // namespace
 
 Status
 read_truth (const std::string &path, double scale, cv::Mat &truth)
 {
   std::ifstream file (path, std::ios::binary);
-  const std::vector<std::uint8_t> bytes ((std::istreambuf_iterator<char> (file)), {});
-  if (!file.is_open () || bytes.empty ())
+  const Bytes bytes ((std::istreambuf_iterator<char> (file)), {});
+  if (bytes.size () < 2)
     return {StatusCode::kNotFound, path + ": cannot be read, or is empty"};
-  if (Status s = decode (bytes, truth); !s.ok ())
-    return {s.code (), path + ": " + s.message ()};
+  if (!decode (bytes, truth))
+    return {StatusCode::kBadData, path + ": use a PFM, an NPZ of floats or a grey image"};
   int known = 0;
   for (int y = 0; y < truth.rows; y++)
     for (int x = 0; x < truth.cols; x++) {

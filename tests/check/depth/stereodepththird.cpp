@@ -1,58 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* stereodepth with a third camera, and cameras that are slow, end or are exchanged. */
+/* stereodepth with a third camera. */
 #include "stereodepth-check.hpp"
 
 using namespace rangecast;
 using namespace rangecast::testing;
-
-/* A pipeline of the test scene whose rig is exported, run to its end. @param links  of element d;
- * gives the element, transfer full, and what its bus said. */
-static std::string
-play_scene (const std::string &source, const std::string &links, const std::string &properties,
-    GstMessageType wanted, GstStructure **stats)
-{
-  gchar *rig = g_strdup_printf ("%s/stereodepth-scene-%d.yaml", g_get_tmp_dir (), int (getpid ()));
-  GstElement *exporter = gst_parse_launch (
-      (std::string ("avatartestsrc views=1 rig-export=") + rig).c_str (), nullptr);
-  gst_element_set_state (exporter, GST_STATE_PAUSED);
-  gst_element_set_state (exporter, GST_STATE_NULL);
-  gst_object_unref (exporter);
-  const std::string line = "avatartestsrc views=1 name=c " + source + " " + links +
-                           " stereodepth name=d rig=" + rig + " " + properties + " ! fakesink";
-  GError *error = nullptr;
-  GstElement *pipeline = gst_parse_launch (line.c_str (), &error);
-  fail_unless (pipeline && !error, "%s: %s", line.c_str (), error ? error->message : "");
-  gst_element_set_state (pipeline, GST_STATE_PLAYING);
-  GstBus *bus = gst_element_get_bus (pipeline);
-  std::string text;
-  for (bool end = false; !end;) {
-    GstMessage *message = gst_bus_timed_pop_filtered (bus, 60 * GST_SECOND,
-        GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING));
-    fail_unless (message != nullptr, "no end");
-    end = GST_MESSAGE_TYPE (message) != GST_MESSAGE_WARNING;
-    if (GST_MESSAGE_TYPE (message) == wanted && wanted != GST_MESSAGE_EOS) {
-      GError *said = nullptr;
-      if (wanted == GST_MESSAGE_ERROR)
-        gst_message_parse_error (message, &said, nullptr);
-      else
-        gst_message_parse_warning (message, &said, nullptr);
-      text += std::string (said->message) + "\n";
-      g_error_free (said);
-    } else
-      fail_unless (GST_MESSAGE_TYPE (message) != GST_MESSAGE_ERROR, "an error");
-    gst_message_unref (message);
-  }
-  GstElement *d = gst_bin_get_by_name (GST_BIN (pipeline), "d");
-  if (stats)
-    g_object_get (d, "stats", stats, nullptr);
-  gst_object_unref (d);
-  gst_object_unref (bus);
-  gst_element_set_state (pipeline, GST_STATE_NULL);
-  gst_object_unref (pipeline);
-  g_unlink (rig);
-  g_free (rig);
-  return text;
-}
 
 static guint64
 field (const GstStructure *stats, const char *name)
@@ -62,69 +13,26 @@ field (const GstStructure *stats, const char *name)
   return value;
 }
 
-static const std::string kLeftRight = "c.left ! queue ! d.left c.right ! queue ! d.right";
-
-GST_START_TEST (test_third_camera_takes_part_in_every_frame)
+/* At half of the rate, until it ends. */
+GST_START_TEST (test_third_camera_takes_part_while_it_has_images)
 {
+  RigFile rig;
+  const std::string camera = std::string ("videotestsrc num-buffers=8 ! ") + kSmall;
+  const std::string line =
+      camera + " ! d.left " + camera + " ! d.right " + camera +
+      " ! videorate drop-only=true ! video/x-raw,framerate=25/2 ! identity eos-after=3 ! d.third "
+      "stereodepth name=d n-threads=2 " +
+      rig.property () + " ! fakesink";
+  GstElement *pipeline = gst_parse_launch (line.c_str (), nullptr);
+  GstElement *d = gst_bin_get_by_name (GST_BIN (pipeline), "d");
+  play_to_the_end (pipeline);
   GstStructure *stats = nullptr;
-  play_scene ("num-buffers=4", kLeftRight + " c.third ! queue ! d.third", "steady=0.5 n-threads=2",
-      GST_MESSAGE_EOS, &stats);
-  fail_unless_equals_uint64 (field (stats, "frames"), 4);
-  fail_unless_equals_uint64 (field (stats, "third-frames"), 4);
-  gst_structure_free (stats);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_third_camera_of_half_the_rate_takes_part_in_half_of_the_frames)
-{
-  GstStructure *stats = nullptr;
-  play_scene ("num-buffers=8",
-      kLeftRight + " c.third ! video/x-raw,framerate=25/1 ! videorate drop-only=true ! "
-                   "video/x-raw,framerate=25/2 ! queue ! "
-                   "d.third",
-      "", GST_MESSAGE_EOS, &stats);
+  g_object_get (d, "stats", &stats, nullptr);
   fail_unless_equals_uint64 (field (stats, "frames"), 8);
-  const guint64 third = field (stats, "third-frames");
-  fail_unless (third >= 3 && third <= 5, "%d of 8", int (third));
+  fail_unless_equals_uint64 (field (stats, "third-frames"), 2);
   gst_structure_free (stats);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_third_camera_that_ends_leaves_two)
-{
-  GstStructure *stats = nullptr;
-  play_scene ("num-buffers=6", kLeftRight + " c.third ! identity eos-after=2 ! queue ! d.third", "",
-      GST_MESSAGE_EOS, &stats);
-  fail_unless_equals_uint64 (field (stats, "frames"), 6);
-  ck_assert_uint_lt (field (stats, "third-frames"), 6);
-  gst_structure_free (stats);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_right_camera_of_half_the_rate_halves_the_output)
-{
-  GstStructure *stats = nullptr;
-  play_scene ("num-buffers=8",
-      "c.left ! queue ! d.left c.right ! video/x-raw,framerate=25/1 ! videorate drop-only=true ! "
-      "video/x-raw,framerate=25/2 ! "
-      "queue ! d.right",
-      "", GST_MESSAGE_EOS, &stats);
-  const guint64 frames = field (stats, "frames");
-  fail_unless (frames >= 3 && frames <= 4, "%d of 8", int (frames));
-  ck_assert_uint_ge (field (stats, "dropped-left"), 3);
-  fail_unless_equals_uint64 (field (stats, "dropped-right"), 0);
-  gst_structure_free (stats);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_exchanged_cameras_are_one_warning_that_names_the_cure)
-{
-  const std::string text =
-      play_scene ("num-buffers=3", "c.left ! queue ! d.right c.right ! queue ! d.left",
-          "refresh-interval=1", GST_MESSAGE_WARNING, nullptr);
-  fail_unless (text.find ("swap") != std::string::npos, "'%s'", text.c_str ());
-  fail_unless (text.find ('\n') == text.size () - 1, "more than one: %s", text.c_str ());
-  fail_unless (play_scene ("num-buffers=3", kLeftRight, "", GST_MESSAGE_WARNING, nullptr).empty ());
+  gst_object_unref (d);
+  gst_object_unref (pipeline);
 }
 GST_END_TEST;
 
@@ -297,11 +205,7 @@ stereodepththird_suite ()
   Suite *suite = suite_create ("stereodepththird");
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
-  tcase_add_test (tc, test_third_camera_takes_part_in_every_frame);
-  tcase_add_test (tc, test_third_camera_of_half_the_rate_takes_part_in_half_of_the_frames);
-  tcase_add_test (tc, test_third_camera_that_ends_leaves_two);
-  tcase_add_test (tc, test_right_camera_of_half_the_rate_halves_the_output);
-  tcase_add_test (tc, test_exchanged_cameras_are_one_warning_that_names_the_cure);
+  tcase_add_test (tc, test_third_camera_takes_part_while_it_has_images);
   tcase_add_test (tc, test_third_camera_without_calibration_is_one_error);
   tcase_add_test (tc, test_third_camera_of_another_size_is_one_error);
   tcase_add_test (tc, test_all_three_cameras_may_change_their_size_one_after_the_other);

@@ -7,7 +7,6 @@
 #include <opencv2/core.hpp>
 #include <rangecast/stereo/box_sum.hpp>
 #include <rangecast/stereo/disparity_filter.hpp>
-#include <rangecast/stereo/occupancy.hpp>
 #include <rangecast/stereo/silhouette_filter.hpp>
 
 using namespace rangecast;
@@ -66,28 +65,6 @@ count_differences (const cv::Mat &a, const cv::Mat &b, const std::vector<cv::Rec
 
 } // namespace
 
-TEST (StereoFilters, window_sums_are_the_sums_of_windows)
-{
-  Plane from, sums;
-  from.set_size (29, 17);
-  cv::RNG random (1);
-  for (int y = 0; y < 17; y++)
-    for (int x = 0; x < 29; x++)
-      from.row (y)[x] = static_cast<std::int16_t> (random.uniform (-255, 256));
-  std::vector<std::int16_t> memory;
-  sum_windows<3> (from, sums, memory);
-  ASSERT_EQ (sums.width (), 23);
-  ASSERT_EQ (sums.height (), 11);
-  for (int y = 0; y < 11; y++)
-    for (int x = 0; x < 23; x++) {
-      int sum = 0;
-      for (int v = 0; v < 7; v++)
-        for (int u = 0; u < 7; u++)
-          sum += from.row (y + v)[x + u];
-      ASSERT_EQ (sums.row (y)[x], sum) << x << "," << y;
-    }
-}
-
 TEST (StereoFilters, greys_of_the_other_picture_are_linear_between_pixels_and_stay_inside)
 {
   const std::vector<std::uint8_t> row = {10, 200, 30, 250, 0, 90};
@@ -122,30 +99,15 @@ TEST (StereoFilters, specks_go_as_with_opencv)
     Tiles tiles;
     tiles.set (parts, 2);
     DisparityFilter filter;
-    filter.clear_specks (40, 48, kMin, kMin, tiles, mine);
-    cv::filterSpeckles (theirs, kNone, 40, 48, memory);
+    filter.clear_specks (kMin, kMin, tiles, mine);
+    cv::filterSpeckles (theirs, kNone, 100, 32, memory);
     EXPECT_EQ (cv::countNonZero (mine != theirs), 0) << seed;
     EXPECT_GT (cv::countNonZero (mine == kNone), 90 * 61 / 5);
   }
 }
 
-TEST (StereoFilters, specks_farther_than_what_is_of_interest_stay)
-{
-  cv::Mat disparity (8, 8, CV_16S, cv::Scalar (kNone));
-  disparity.at<std::int16_t> (2, 2) = 100;
-  disparity.at<std::int16_t> (2, 3) = 400;
-  Tiles tiles;
-  const cv::Rect all (0, 0, 8, 8);
-  tiles.set ({&all, 1}, 1);
-  DisparityFilter filter;
-  filter.clear_specks (10, 32, kMin, 300, tiles, disparity);
-  EXPECT_EQ (disparity.at<std::int16_t> (2, 2), 100);
-  EXPECT_EQ (disparity.at<std::int16_t> (2, 3), kNone);
-}
-
 TEST (StereoFilters, flying_pixels_are_those_that_few_neighbours_follow)
 {
-  constexpr double kStep = 0.02;
   constexpr int kSupport = 4, kOffset = 60;
   for (int seed = 0; seed < 4; seed++) {
     cv::Mat from = made_up_disparity (83, 50, seed), to (50, 83, CV_16S, cv::Scalar (kNone)),
@@ -154,11 +116,11 @@ TEST (StereoFilters, flying_pixels_are_those_that_few_neighbours_follow)
     Tiles tiles;
     tiles.set (parts, 2);
     DisparityFilter filter;
-    filter.clear_flying (kStep, kSupport, kOffset, kMin, tiles, from, to);
+    filter.clear_flying (kOffset, kMin, tiles, from, to);
     for (int y = 0; y < from.rows; y++)
       for (int x = 0; x < from.cols; x++) {
         const int d = from.at<std::int16_t> (y, x),
-                  most = std::max (8, (d + kOffset) * int (65536 * kStep) >> 16);
+                  most = std::max (8, (d + kOffset) * int (65536 * kSurfaceStep) >> 16);
         int n = -1;
         for (int v = std::max (0, y - 1); v <= std::min (from.rows - 1, y + 1); v++)
           for (int u = std::max (0, x - 1); u <= std::min (from.cols - 1, x + 1); u++) {
@@ -184,22 +146,70 @@ TEST (StereoFilters, gaps_are_filled_within_a_part_and_not_between_parts)
   disparity (cv::Rect (10, 40, 1, 8)).setTo (kNone); /* across two that touch */
   Tiles tiles;
   tiles.set (std::vector{upper, lower, last}, 1);
-  DisparityFilter ().fill_gaps (colour, 30, kMin, tiles, disparity);
+  DisparityFilter ().fill_gaps (colour, kMin, tiles, disparity);
   EXPECT_EQ (cv::countNonZero (disparity (cv::Rect (0, 20, 20, 8)) != kNone), 0);
   EXPECT_EQ (cv::countNonZero (disparity (cv::Rect (0, 28, 4, 16)) != kNone), 0);
   for (const cv::Rect &part : {upper, lower, last})
     EXPECT_EQ (cv::countNonZero (disparity (part) != 320), 0);
 }
 
+static Tiles
+all_of (const cv::Mat &image)
+{
+  const cv::Rect all ({0, 0}, image.size ());
+  Tiles tiles;
+  tiles.set ({&all, 1}, 1);
+  return tiles;
+}
+
+TEST (StereoFilters, gap_in_one_surface_is_filled_and_one_between_two_is_not)
+{
+  cv::Mat disparity (1, 40, CV_16S, cv::Scalar (320));
+  cv::Mat colour (1, 40, CV_8UC4, cv::Scalar (90, 100, 110, 0));
+  disparity.colRange (5, 10).setTo (-16);
+  disparity.colRange (20, 40).setTo (400); /* a step of 5 pixels */
+  disparity.colRange (18, 22).setTo (-16);
+  disparity.colRange (30, 34).setTo (-16);
+  colour.colRange (31, 33).setTo (cv::Scalar (200, 10, 10, 0)); /* something else is there */
+  DisparityFilter ().fill_gaps (colour, 0, all_of (disparity), disparity);
+  for (int x = 0; x < 40; x++)
+    EXPECT_EQ (disparity.at<std::int16_t> (0, x) < 0, (x >= 18 && x < 22) || (x >= 30 && x < 34))
+        << x;
+}
+
+TEST (StereoFilters, rim_of_the_walls_colour_is_cleared)
+{
+  cv::Mat disparity (40, 60, CV_16S, cv::Scalar (160));
+  cv::Mat colour (40, 60, CV_8UC4, cv::Scalar (40, 40, 40, 0));
+  colour.colRange (30, 60).setTo (cv::Scalar (200, 180, 160, 0));
+  disparity.colRange (27, 60).setTo (480); /* what is near has grown by 3 columns */
+  cv::Mat cleared = disparity.clone ();
+  SilhouetteFilter::Settings settings;
+  SilhouetteFilter ().apply (settings, colour, all_of (disparity), disparity, cleared);
+  for (int x = 0; x < 60; x++)
+    EXPECT_EQ (cleared.at<std::int16_t> (20, x), x < 27 ? 160 : x < 30 ? -16 : 480) << x;
+}
+
+TEST (StereoFilters, patch_that_looks_otherwise_is_cleared_and_a_darker_one_is_not)
+{
+  cv::Mat left (40, 80, CV_8U), right (40, 80, CV_8U);
+  cv::randu (left, 0, 255);
+  cv::randu (right, 0, 255);
+  for (int y = 0; y < 40; y++)
+    for (int x = 40; x < 80; x++) /* seen 10 pixels further left, and darker */
+      right.at<std::uint8_t> (y, x - 10) = std::uint8_t (left.at<std::uint8_t> (y, x) * 7 / 8);
+  cv::Mat disparity (40, 80, CV_16S, cv::Scalar (160));
+  cv::Mat cleared = disparity.clone ();
+  DisparityFilter ().clear_unlike (left, right, 0, 0, all_of (disparity), disparity, cleared);
+  EXPECT_LT (cv::countNonZero (cleared.colRange (15, 35) >= 0), 40 * 20 / 10);
+  EXPECT_GT (cv::countNonZero (cleared.colRange (45, 75) >= 0), 40 * 30 * 95 / 100);
+}
+
 TEST (StereoFilters, what_the_right_camera_cannot_see_goes)
 {
   cv::Mat disparity (1, 64, CV_16S, cv::Scalar (160));
   disparity.colRange (40, 50).setTo (320);
-  Tiles tiles;
-  const cv::Rect all (0, 0, 64, 1);
-  tiles.set ({&all, 1}, 1);
-  DisparityFilter filter;
-  filter.clear_hidden (kMin, tiles, disparity);
+  DisparityFilter ().clear_hidden (kMin, all_of (disparity), disparity);
   /* What stands 10 pixels of disparity before the wall hides the 10 pixels left of it. */
   for (int x = 0; x < 64; x++)
     EXPECT_EQ (disparity.at<std::int16_t> (0, x) == kNone, x >= 30 && x < 40) << x;
@@ -224,11 +234,7 @@ wall_with_doubled_bar (cv::Mat &left, cv::Mat &right, bool same_colour)
 TEST (StereoFilters, pattern_that_repeats_is_not_seen_twice)
 {
   cv::Mat left, right, disparity = wall_with_doubled_bar (left, right, true);
-  Tiles tiles;
-  const cv::Rect all (0, 0, 200, 1);
-  tiles.set ({&all, 1}, 1);
-  DisparityFilter filter;
-  filter.clear_doubled (left, right, 0, kMin, tiles, disparity);
+  DisparityFilter ().clear_doubled (left, right, 0, kMin, all_of (disparity), disparity);
   EXPECT_EQ (cv::countNonZero (disparity.colRange (102, 106) == kNone), 4);
   EXPECT_EQ (cv::countNonZero (disparity.colRange (20, 90) == 20 * 16), 70);
 }
@@ -236,11 +242,7 @@ TEST (StereoFilters, pattern_that_repeats_is_not_seen_twice)
 TEST (StereoFilters, thin_thing_before_a_wall_of_another_colour_stays)
 {
   cv::Mat left, right, disparity = wall_with_doubled_bar (left, right, false);
-  Tiles tiles;
-  const cv::Rect all (0, 0, 200, 1);
-  tiles.set ({&all, 1}, 1);
-  DisparityFilter filter;
-  filter.clear_doubled (left, right, 0, kMin, tiles, disparity);
+  DisparityFilter ().clear_doubled (left, right, 0, kMin, all_of (disparity), disparity);
   EXPECT_EQ (cv::countNonZero (disparity.colRange (102, 106) == 82 * 16), 4);
 }
 
@@ -252,7 +254,7 @@ judge_plainly (const SilhouetteFilter::Settings &s, const cv::Mat &colour, const
   const int own = disparity.at<std::int16_t> (y, x), reach = s.radius * 2 / 3;
   const bool valid = own >= s.min;
   const auto tolerance = [&] (int d) {
-    return std::max (16, (d + s.offset) * int (65536 * s.step) >> 16);
+    return std::max (16, (d + s.offset) * int (65536 * kSurfaceStep) >> 16);
   };
   const cv::Rect all (0, 0, disparity.cols, disparity.rows);
   double lowest, highest;
@@ -301,7 +303,7 @@ TEST (StereoFilters, silhouettes_are_judged_as_without_vectors)
     Tiles tiles;
     tiles.set (parts, 2);
     SilhouetteFilter filter;
-    const SilhouetteFilter::Settings settings = {radius, 0.02, 20, kMin, 250};
+    const SilhouetteFilter::Settings settings = {radius, 20, kMin, 250};
     filter.apply (settings, colour, tiles, from, to);
     int changed = 0, differ = 0;
     for (const cv::Rect &part : parts)
@@ -313,96 +315,4 @@ TEST (StereoFilters, silhouettes_are_judged_as_without_vectors)
     EXPECT_EQ (differ, 0) << radius;
     EXPECT_GT (changed, 0) << radius;
   }
-}
-
-/* ---- where to look ---- */
-
-namespace {
-
-constexpr int kWidth = 160, kHeight = 96;
-
-struct Seen {
-  rangecast::testing::Image<Rgbx> colour{kWidth, kHeight};
-  rangecast::testing::Image<std::uint16_t> depth{kWidth, kHeight};
-  ChangeDetector changes;
-  Occupancy occupancy;
-
-  Seen () { occupancy.set (kWidth, kHeight); }
-  void learn ()
-  {
-    look ();
-    changes.set_reference ();
-    look ();
-    occupancy.learn ({0, {0, 0, kWidth, kHeight}, depth.view (), colour.view (), 0});
-  }
-  void look ()
-  {
-    const auto view = colour.view ();
-    changes.update (
-        cv::Mat (kHeight, kWidth, CV_8UC4, view.data, static_cast<std::size_t> (view.stride)));
-  }
-  void fill_depth (int x0, int y0, int x1, int y1)
-  {
-    for (int y = y0; y < y1; y++)
-      for (int x = x0; x < x1; x++)
-        depth.view ().at (x, y) = 1000;
-  }
-  int covered ()
-  {
-    int n = 0;
-    for (const cv::Rect &part : *occupancy.find (changes, {0, 0, kWidth, kHeight}))
-      n += part.area ();
-    return n;
-  }
-  bool covers (int x0, int y0, int x1, int y1)
-  {
-    cv::Mat mask = cv::Mat::zeros (kHeight, kWidth, CV_8U);
-    for (const cv::Rect &part : *occupancy.find (changes, {0, 0, kWidth, kHeight}))
-      mask (part & cv::Rect (0, 0, kWidth, kHeight)).setTo (255);
-    return cv::countNonZero (mask (cv::Rect (x0, y0, x1 - x0, y1 - y0))) == (x1 - x0) * (y1 - y0);
-  }
-};
-
-} // namespace
-
-TEST (Occupancy, looks_everywhere_while_nothing_is_known)
-{
-  Seen seen;
-  EXPECT_EQ (seen.occupancy.find (seen.changes, {0, 0, kWidth, kHeight}), nullptr);
-  seen.learn ();
-  EXPECT_NE (seen.occupancy.find (seen.changes, {0, 0, kWidth, kHeight}), nullptr);
-  seen.occupancy.reset ();
-  EXPECT_EQ (seen.occupancy.find (seen.changes, {0, 0, kWidth, kHeight}), nullptr);
-}
-
-TEST (Occupancy, looks_where_depth_was_and_a_block_around_and_not_much_further)
-{
-  Seen seen;
-  seen.fill_depth (64, 8, 80, 40);   /* a head */
-  seen.fill_depth (32, 48, 128, 90); /* shoulders */
-  seen.learn ();
-  EXPECT_TRUE (seen.covers (56, 0, 88, 48));
-  EXPECT_TRUE (seen.covers (24, 40, 136, 96));
-  EXPECT_LE (seen.covered (), 32 * 48 + 112 * 56 + 8 * 112);
-}
-
-TEST (Occupancy, looks_where_the_picture_has_changed)
-{
-  Seen seen;
-  seen.fill_depth (64, 48, 80, 64);
-  seen.learn ();
-  EXPECT_FALSE (seen.covers (120, 48, 128, 56));
-  for (int y = 48; y < 56; y++)
-    for (int x = 120; x < 128; x++)
-      seen.colour.view ().at (x, y) = {6, 6, 6, 0};
-  seen.look ();
-  EXPECT_TRUE (seen.covers (112, 40, 136, 64));
-}
-
-TEST (Occupancy, few_wrong_pixels_do_not_keep_a_block)
-{
-  Seen seen;
-  seen.fill_depth (64, 48, 67, 49);
-  seen.learn ();
-  EXPECT_EQ (seen.covered (), 0);
 }
