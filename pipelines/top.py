@@ -35,7 +35,7 @@ FORGET_S = 600
 
 # As a frame set meets them; within a host rows keep this order.
 ORDER = ("stereocamsrc", "stereodepth", "roiextract", "neighbourcodeenc", "rtpneighbourcodedepay", "rangemux",
-         "rtpneighbourcodepay", "rangedemux", "neighbourcodedec", "cylinderfilter", "striprender")
+         "rtpneighbourcodepay", "rangedemux", "neighbourcodedec", "rangealign", "cylinderfilter", "striprender")
 
 
 # ---- input ----

@@ -242,7 +242,7 @@ test_rig_that_changes_reaches_viewers () {
 test_picture_of_a_stream () {
   need_gl
   serve -- "$figure"
-  until_eos player.log rtspsrc "location=$url" latency=50 ! rtpneighbourcodedepay ! neighbourcodedec ! cylinderfilter \
+  until_eos player.log rtspsrc "location=$url" latency=50 ! rtpneighbourcodedepay ! neighbourcodedec ! rangealign \
     ! striprender ! "video/x-raw(memory:GLMemory),width=320,height=240" ! gldownload ! videoconvert ! identity eos-after=5 \
     ! pngenc ! multifilesink location=view-%02d.png || fail "$(tail -n 5 player.log)"
   expect_file view-02.png 5000

@@ -158,8 +158,8 @@ expect_one_error (const std::string &caps, const std::string &name, const char *
 
 GST_START_TEST (test_data_without_caps_are_one_error_that_names_them)
 {
-  for (const char *name : {"roiextract", "cylinderfilter", "neighbourcodeenc", "plyenc",
-           "rangesplit", "rangedemux", "striprender"})
+  for (const char *name : {"roiextract", "cylinderfilter", "rangealign", "neighbourcodeenc",
+           "plyenc", "rangesplit", "rangedemux", "striprender"})
     expect_one_error ("", name, "expected video/x-range (");
   expect_one_error ("", "neighbourcodedec", "expected video/x-neighbour-code (");
 }
@@ -168,8 +168,8 @@ GST_END_TEST;
 /* A source sends refused caps again with each buffer, and with EOS after its own error. */
 GST_START_TEST (test_caps_without_a_rig_are_one_error)
 {
-  for (const char *name : {"roiextract", "cylinderfilter", "neighbourcodeenc", "plyenc",
-           "rangesplit", "rangedemux", "striprender"})
+  for (const char *name : {"roiextract", "cylinderfilter", "rangealign", "neighbourcodeenc",
+           "plyenc", "rangesplit", "rangedemux", "striprender"})
     expect_one_error (
         "video/x-range,format=Z16_RGBx,views=1,width=320,height=240,framerate=15/1 ! ", name,
         "no field \"rig\"");
