@@ -36,7 +36,7 @@ record_stereo () {
   gst-launch-1.0 -q -e rangemux name=mux ! neighbourcodeparse ! "$stream" ! filesink location=stereo.rcnc "${chain[@]}"
 }
 
-# usage: sheet FILE RECORDING PANEL...: the last frame set, side by side; a panel is "cylinderfilter's properties|striprender's properties"
+# usage: sheet FILE RECORDING PANEL...: the last frame set, side by side; a panel is "elements after rangealign|striprender's properties"
 sheet () {
   local file=$1 recording=$2 i=0 panel chain=() filter render places=()
   shift 2
@@ -44,7 +44,7 @@ sheet () {
     read -ra filter <<<"${panel%%|*}"
     read -ra render <<<"${panel#*|}"
     places+=("sink_$i::xpos=$((404 * i))")
-    chain+=(sets. ! queue ! cylinderfilter "${filter[@]}" ! striprender "${render[@]}"
+    chain+=(sets. ! queue ! rangealign ! "${filter[@]}" ! striprender "${render[@]}"
       ! 'video/x-raw(memory:GLMemory),width=400,height=400' ! gldownload ! queue ! "sheet.sink_$i")
     i=$((i + 1))
   done
@@ -56,7 +56,7 @@ sheet () {
 }
 
 film () { # FILE
-  gst-launch-1.0 -q avatartestsrc "${figure[@]}" noise=0 views=6 num-buffers=36 range-person-only=true ! "$range" ! queue ! cylinderfilter \
+  gst-launch-1.0 -q avatartestsrc "${figure[@]}" noise=0 views=6 num-buffers=36 range-person-only=true ! "$range" ! queue ! rangealign \
     ! striprender auto-orbit=120 elevation=5 distance=0.9 ! 'video/x-raw(memory:GLMemory),width=400,height=400' ! gldownload \
     ! videoconvert ! pngenc ! multifilesink location=orbit-%05d.png
   ffmpeg -v error -y -framerate 12 -i orbit-%05d.png -c:v libwebp_anim -quality 85 -loop 0 "$out/$1"
@@ -67,12 +67,12 @@ record_exact bare.rcnc motion=0
 record_exact dressed.rcnc motion=0 dress=all
 record_stereo
 near="azimuth=20 distance=0.4 elevation=8 pan-y=0.03"
-sheet gallery-overlap.jpg stereo.rcnc "mode=off|$near mode=strips" "overlap=1|$near mode=strips" "overlap=8|$near mode=blend"
-sheet gallery-modes.jpg exact.rcnc "overlap=1|$near mode=points" "overlap=1|$near mode=rectangles" "overlap=1|$near mode=strips" "overlap=8|$near mode=blend"
-sheet gallery-bare.jpg bare.rcnc "overlap=8|azimuth=0" "overlap=8|azimuth=30" "overlap=8|azimuth=150"
-sheet gallery-dressed.jpg dressed.rcnc "overlap=8|azimuth=0" "overlap=8|azimuth=30" "overlap=8|azimuth=150"
+sheet gallery-overlap.jpg stereo.rcnc "identity|$near mode=strips" "cylinderfilter|$near mode=strips" "identity|$near mode=blend"
+sheet gallery-modes.jpg exact.rcnc "cylinderfilter|$near mode=points" "cylinderfilter|$near mode=rectangles" "cylinderfilter|$near mode=strips" "identity|$near mode=blend"
+sheet gallery-bare.jpg bare.rcnc "identity|azimuth=0" "identity|azimuth=30" "identity|azimuth=150"
+sheet gallery-dressed.jpg dressed.rcnc "identity|azimuth=0" "identity|azimuth=30" "identity|azimuth=150"
 units="azimuth=20 elevation=8 tint-views=true mode=strips"
-sheet gallery-units.jpg exact.rcnc "mode=off|$units" "overlap=1|$units"
+sheet gallery-units.jpg exact.rcnc "identity|$units" "cylinderfilter|$units"
 python3 "$docs/../tests/bench/bad-views.py" "$out/gallery-bad-views.jpg"
 if command -v ffmpeg >/dev/null; then
   film gallery-orbit.webp

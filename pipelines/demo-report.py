@@ -30,14 +30,13 @@ def main():
         file.write("\n")
 
     raw, coded = report["raw_bytes_per_frame_set"], report["coded_bytes_per_frame_set"]
-    points, kept = report["points_per_frame_set"], report["points_after_cylinder"]
+    points = report["points_per_frame_set"]
     cpu = ", ".join(f"{name} {host['cpu_seconds']:.1f}" for name, host in hosts.items())
     whole = report["whole_frame_sets"]
     rows = (
         ("frame sets", f"{report['frames']}, {whole} with all {report['views']} views", ""),
         ("frame sets/s", f"{report['fps']:.1f}", "9 to 12 on six PCs"),
         ("points", f"{points:.0f} a frame set", ""),
-        ("removed by the cylinder", f"{100 * (1 - kept / points) if points else 0:.0f} %", "25 %"),
         ("raw", f"{raw / 1000:.1f} kB a frame set", ""),
         ("coded / raw", f"{100 * coded / raw if raw else 0:.1f} %", "38 %"),
         ("capture to rendered", f"{report['latency_ms']['p50']:.0f} ms, p99 {report['latency_ms']['p99']:.0f} ms", ""),

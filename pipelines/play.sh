@@ -60,7 +60,7 @@ if [ -f "$speech" ] && [ "$speech" != "$file" ]; then
   fi
 fi
 picture="video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}"
-view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter
+view=(filesrc "location=$file" ! neighbourcodeparse ! neighbourcodedec ! rangealign
   ! striprender fit=true background-shade=0.5 "auto-orbit=$orbit" ! "$picture")
 if [ -n "$film" ]; then
   drop_empty "$film" ""

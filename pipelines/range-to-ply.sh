@@ -19,5 +19,5 @@ if ! is_numbered "$2"; then # the second frame set makes identity fail
   ! grep -q '^ERROR: .*second:' <<<"$said" ||
     die "'$2': the recording has more than one frame set; expected a name with a number, e.g. ${2%.*}-%05d.ply"
 fi
-launch filesrc "location=$1" ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter ! plyenc \
+launch filesrc "location=$1" ! neighbourcodeparse ! neighbourcodedec ! rangealign ! cylinderfilter ! plyenc \
   ! multifilesink "location=$2"

@@ -112,6 +112,6 @@ fi
 [ -z "$out" ] || drop_empty "$out/avatar.webm" "nothing came to port $listen (no coded frame set); $out/avatar.webm was not written"
 launch "${rtp[@]}" "${step[@]}" \
   ! queue max-size-buffers=4 leaky=downstream ! neighbourcodedec name=decoder \
-  ! queue max-size-buffers=1 leaky=downstream ! cylinderfilter name=cylinder ! striprender name=view "auto-orbit=$orbit" "${render[@]}" \
+  ! queue max-size-buffers=1 leaky=downstream ! rangealign ! striprender name=view "auto-orbit=$orbit" "${render[@]}" \
   ! "video/x-raw(memory:GLMemory),width=${size%x*},height=${size#*x}" ! gldownload \
   ! identity name=rendered ! tee name=picture "${sinks[@]}" "${audio[@]}" "${talking[@]}"

@@ -21,7 +21,7 @@
  * ]|
  * |[
  * gst-launch-1.0 filesrc location=head.rcnc ! neighbourcodeparse ! neighbourcodedec !
- * cylinderfilter ! striprender ! glimagesink
+ * rangealign ! striprender ! glimagesink
  * ]|
  *
  * Since: 0.1

@@ -17,7 +17,7 @@
  * Writes a file.
  * |[
  * gst-launch-1.0 filesrc location=head.rcnc ! neighbourcodeparse ! neighbourcodedec !
- * cylinderfilter ! striprender ! glimagesink
+ * rangealign ! striprender ! glimagesink
  * ]|
  * Plays it.
  *

@@ -11,7 +11,7 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 capturesync name=s avatartestsrc is-live=true num-buffers=60 ! s.sink_0 s.src_0 !
- * queue ! cylinderfilter ! striprender ! glimagesink
+ * queue ! rangealign ! striprender ! glimagesink
  * ]|
  *
  * Since: 0.1

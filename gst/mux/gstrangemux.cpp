@@ -15,7 +15,7 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 rangemux name=m ! cylinderfilter ! plyenc ! multifilesink location=cloud-%05d.ply
+ * gst-launch-1.0 rangemux name=m ! rangealign ! cylinderfilter ! plyenc ! multifilesink location=cloud-%05d.ply
  * avatartestsrc view-id=0 num-buffers=10 ! m. avatartestsrc view-id=1 num-buffers=10 ! m.
  * ]|
  *

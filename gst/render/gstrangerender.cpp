@@ -3,10 +3,10 @@
  * SECTION:element-rangerender
  * @title: rangerender
  *
- * Renders range images, raw or coded, as raw video: neighbourcodedec where needed, cylinderfilter,
+ * Renders range images, raw or coded, as raw video: neighbourcodedec where needed, rangealign,
  * striprender and gldownload in one bin, which playbin, playbin3 and decodebin plug as the decoder.
  * Pictures stay in OpenGL memory if downstream accepts it. The elements inside are named `decoder`,
- * `cylinder` and `render`; gst-launch-1.0 sets their properties with names such as
+ * `align` and `render`; gst-launch-1.0 sets their properties with names such as
  * `render::auto-orbit=30`.
  *
  * ## Example launch lines
@@ -31,7 +31,7 @@ struct _GstRangeRender {
   GstBin parent;
   const char *missing; /* factory of an element that could not be created */
   GstPad *sink;
-  GstElement *cylinder, *decoder; /* owned by the bin; decoder: nullptr if the input is raw */
+  GstElement *align, *decoder; /* owned by the bin; decoder: nullptr if the input is raw */
 };
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK,
@@ -126,7 +126,7 @@ set_target (GstRangeRender *self, GstElement *element)
   gst_object_unref (target);
 }
 
-/* Puts a decoder before cylinderfilter, or removes it. In the streaming thread. */
+/* Puts a decoder before rangealign, or removes it. In the streaming thread. */
 bool
 use_decoder (GstRangeRender *self, bool coded)
 {
@@ -137,7 +137,7 @@ use_decoder (GstRangeRender *self, bool coded)
     gst_element_set_state (self->decoder, GST_STATE_NULL);
     gst_bin_remove (GST_BIN (self), self->decoder);
     self->decoder = nullptr;
-    set_target (self, self->cylinder);
+    set_target (self, self->align);
     return true;
   }
   GstElement *decoder = gst_element_factory_make ("neighbourcodedec", "decoder");
@@ -147,7 +147,7 @@ use_decoder (GstRangeRender *self, bool coded)
   }
   self->decoder = decoder;
   gst_bin_add (GST_BIN (self), decoder);
-  gst_element_link (decoder, self->cylinder);
+  gst_element_link (decoder, self->align);
   gst_element_sync_state_with_parent (decoder);
   set_target (self, decoder);
   return true;
@@ -228,15 +228,15 @@ gst_range_render_change_state (GstElement *element, GstStateChange transition)
 static void
 gst_range_render_init (GstRangeRender *self)
 {
-  GstElement *cylinder = add (self, "cylinderfilter", "cylinder");
+  GstElement *align = add (self, "rangealign", "align");
   GstElement *render = add (self, "striprender", "render");
   GstElement *download = add (self, "gldownload", "download");
   if (self->missing)
     return;
   g_object_set (render, "fit", TRUE, "background-shade", 0.5, nullptr); /* for viewers */
-  gst_element_link_many (cylinder, render, download, nullptr);
-  self->cylinder = cylinder;
-  self->sink = add_ghost_pad (self, cylinder, "sink", &sink_template);
+  gst_element_link_many (align, render, download, nullptr);
+  self->align = align;
+  self->sink = add_ghost_pad (self, align, "sink", &sink_template);
   gst_pad_set_event_function (self->sink, GST_DEBUG_FUNCPTR (handle_sink_event));
   gst_pad_set_query_function (self->sink, GST_DEBUG_FUNCPTR (answer_sink_query));
   GstPad *src = add_ghost_pad (self, download, "src", &src_template);

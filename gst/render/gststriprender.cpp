@@ -13,7 +13,7 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 avatartestsrc ! cylinderfilter ! striprender auto-orbit=30 ! glimagesink
+ * gst-launch-1.0 avatartestsrc ! rangealign ! striprender auto-orbit=30 ! glimagesink
  * gst-launch-1.0 avatartestsrc range-person-only=true ! striprender fit=true background-shade=0.5 !
  * glimagesink
  * ]|
@@ -63,7 +63,7 @@ has_same_cameras (const rangecast::Rig &a, const rangecast::Rig &b)
       });
 }
 
-/* Downstream may renegotiate, or cylinderfilter correct poses, at any time: a fit outlasts both. */
+/* Downstream may renegotiate, or rangealign correct poses, at any time: a fit outlasts both. */
 bool
 handle_input_caps (GstStripRender *self, GstCaps *caps)
 {

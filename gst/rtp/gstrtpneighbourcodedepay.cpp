@@ -12,7 +12,7 @@
  * gst-launch-1.0 udpsrc port=5004
  * caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
  * rtpneighbourcodeguard ! rtpjitterbuffer ! rtpneighbourcodedepay ! neighbourcodedec !
- * cylinderfilter ! striprender ! glimagesink
+ * rangealign ! striprender ! glimagesink
  * ]|
  *
  * Since: 0.1

@@ -39,24 +39,13 @@ add_jitterbuffer (const GValue *item, gpointer user_data)
 }
 
 void
-read_cylinder (GstBin *bin, StreamStats &stats)
-{
-  GstElement *cylinder = gst_bin_get_by_name (bin, "cylinder");
-  if (!cylinder)
-    return;
-  stats.cylinder_frames = stat_of (cylinder, "frames");
-  stats.points_in = stat_of (cylinder, "points-in");
-  stats.points_out = stat_of (cylinder, "points-out");
-  gst_object_unref (cylinder);
-}
-
-void
 read_decoder (GstBin *bin, StreamStats &stats)
 {
   GstElement *decoder = gst_bin_get_by_name (bin, "decoder");
   if (!decoder)
     return;
   stats.coded_frames = stat_of (decoder, "frames");
+  stats.points = stat_of (decoder, "points");
   stats.raw_bytes = stat_of (decoder, "raw-bytes");
   stats.coded_bytes = stat_of (decoder, "coded-bytes");
   GstPad *pad = gst_element_get_static_pad (decoder, "src");
@@ -77,7 +66,6 @@ RunMeasure::stats ()
 {
   StreamStats stats;
   auto bin = GST_BIN (pipeline_);
-  read_cylinder (bin, stats);
   read_decoder (bin, stats);
   GstIterator *elements = gst_bin_iterate_recurse (bin);
   while (gst_iterator_foreach (elements, add_jitterbuffer, &stats) == GST_ITERATOR_RESYNC) {

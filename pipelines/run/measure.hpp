@@ -14,13 +14,12 @@
 /** What the elements of a pipeline have counted. */
 struct StreamStats {
   guint64 frames = 0, views = 0;
-  guint64 points_in = 0, points_out = 0, cylinder_frames = 0;
-  guint64 raw_bytes = 0, coded_bytes = 0, coded_frames = 0;
+  guint64 points = 0, raw_bytes = 0, coded_bytes = 0, coded_frames = 0;
   guint64 rtp_packets = 0, rtp_lost = 0;
 };
 
-/** Measures a pipeline by its elements named "rendered", "decoder" and "cylinder", by probes on
- *  their source pads and by their statistics, and turns the one named "view". Its memory does not
+/** Measures a pipeline by its elements named "rendered" and "decoder", by probes on their source
+ *  pads and by their statistics, and turns the one named "view". Its memory does not
  *  grow. */
 class RunMeasure {
 public:

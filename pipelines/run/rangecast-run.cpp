@@ -4,7 +4,7 @@
  * application can read: buffers, their metas, and the elements' `stats` properties.
  *
  * Elements it looks for, by name (all may be missing): "rendered" (frames and latency),
- * "decoder" (a neighbourcodedec), "cylinder" (a cylinderfilter), "view" (a striprender), "snapshot"
+ * "decoder" (a neighbourcodedec), "view" (a striprender), "snapshot"
  * (a sink whose last sample becomes a PNG), "microphone" (a volume, which SIGUSR1 mutes and
  * unmutes); every rtpjitterbuffer, whatever its name. */
 #include <glib-unix.h>

@@ -35,7 +35,7 @@ print_progress (RunMeasure &measure)
     std::printf ("  waiting: cameras are learning their background\n");
   else
     std::printf ("  frame set %5" G_GUINT64_FORMAT "  %5.1f /s  %7.0f points  %6.1f ms\n",
-        stats.frames, measure.fps (), per_frame (stats.points_out, stats.cylinder_frames),
+        stats.frames, measure.fps (), per_frame (stats.points, stats.coded_frames),
         measure.latency_ms (0.5));
   std::fflush (stdout);
 }
@@ -53,16 +53,15 @@ write_report (RunMeasure &measure, const char *path)
       "{\n  \"frames\": %" G_GUINT64_FORMAT ",\n  \"whole_frame_sets\": %" G_GUINT64_FORMAT
       ",\n  \"views\": %" G_GUINT64_FORMAT
       ",\n  \"fps\": %.2f,\n  \"points_per_frame_set\": %.1f,\n"
-      "  \"points_after_cylinder\": %.1f,\n  \"raw_bytes_per_frame_set\": %.1f,\n"
+      "  \"raw_bytes_per_frame_set\": %.1f,\n"
       "  \"coded_bytes_per_frame_set\": %.1f,\n"
       "  \"latency_ms\": {\"p50\": %.2f, \"p99\": %.2f},\n"
       "  \"rtp_packets\": %" G_GUINT64_FORMAT ",\n  \"rtp_lost\": %" G_GUINT64_FORMAT
       ",\n  \"cpu_seconds\": %.3f\n}\n",
       s.frames, measure.whole_of (s.frames), s.views, measure.fps (),
-      per_frame (s.points_in, s.cylinder_frames), per_frame (s.points_out, s.cylinder_frames),
-      per_frame (s.raw_bytes, s.coded_frames), per_frame (s.coded_bytes, s.coded_frames),
-      measure.latency_ms (0.5), measure.latency_ms (0.99), s.rtp_packets, s.rtp_lost,
-      cpu_seconds ());
+      per_frame (s.points, s.coded_frames), per_frame (s.raw_bytes, s.coded_frames),
+      per_frame (s.coded_bytes, s.coded_frames), measure.latency_ms (0.5),
+      measure.latency_ms (0.99), s.rtp_packets, s.rtp_lost, cpu_seconds ());
   const bool failed = std::ferror (file) != 0;
   if (std::fclose (file) == 0 && !failed)
     return true;

@@ -109,8 +109,6 @@ parse_arguments (int *argc, char ***argv, const char *keys, ViewerOptions &optio
           "Play the speech that arrives at this UDP port, too", "PORT"},
       {"latency", 0, 0, G_OPTION_ARG_INT, &options.latency_ms,
           "Jitter buffer of RTP and RTSP (default 30)", "MS"},
-      {"no-filter", 0, 0, G_OPTION_ARG_NONE, &options.no_filter,
-          "Do not remove redundant points where views overlap", nullptr},
       {"mode", 0, 0, G_OPTION_ARG_STRING, &options.mode,
           "blend (default), strips, rectangles or points", "MODE"},
       {"background", 0, 0, G_OPTION_ARG_STRING, &options.background, "Background colour", "RRGGBB"},

@@ -9,7 +9,6 @@ struct ViewerOptions {
   gint listen = 0; /* UDP port; 0: none */
   gint audio = 0;  /* UDP port of speech; 0: none */
   gint latency_ms = 30;
-  gboolean no_filter = FALSE;
   gboolean once = FALSE;
   gchar *background = nullptr;
   gchar *size = nullptr;

@@ -158,13 +158,8 @@ build_view (Viewer &viewer)
     g_object_set (viewer.render, "auto-orbit", options.auto_orbit, nullptr);
   if (!viewer.is_file) /* renders on while the stream stalls */
     g_object_set (viewer.render, "keep-rate", TRUE, nullptr);
-  GstElement *before = viewer.first;
-  if (!options.no_filter) {
-    before = add_element (viewer, "cylinderfilter");
-    gst_element_link (viewer.first, before);
-  }
-  gst_element_link_many (
-      before, viewer.render, viewer.size, viewer.overlay_element, viewer.sink, nullptr);
+  gst_element_link_many (viewer.first, add_element (viewer, "rangealign"), viewer.render,
+      viewer.size, viewer.overlay_element, viewer.sink, nullptr);
   add_probe (viewer.render, "sink", GST_PAD_PROBE_TYPE_BUFFER, on_frame_set, viewer);
   watch_controls (viewer);
   g_signal_connect (viewer.overlay_element, "draw", G_CALLBACK (on_draw), &viewer);

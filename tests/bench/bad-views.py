@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What one bad view of six costs the picture: the built-in figure, dressed, in exact depth, view 1 made wrong in five ways.
 usage: tests/bench/bad-views.py [SHEET.jpg]   in the environment of pipelines/env.sh; wants python3-opencv
-Columns of the sheet: without and with what cylinderfilter does about it (colour-balance and agree), and the picture without that view.
+Columns of the sheet: without and with rangealign, and the picture without that view.
 Printed: PSNR against the picture of six right views, dB, where either is drawn."""
 import os, subprocess, sys, tempfile
 import cv2, numpy as np
 
 VIEWS, BAD, AZIMUTH, SIZE, FRAMES = 6, 1, 40, 400, 16
+ALL = 'poses+views+points+colours'
 STREAM = 'video/x-neighbour-code,alignment=byte-stream'
 
 
@@ -55,8 +56,8 @@ def record(name, rig='rig.yaml', depth=lambda d: d, colour=lambda c: c):
            + ' '.join(f'filesrc location=v{i}.rcnc ! neighbourcodeparse ! queue ! m.' for i in range(VIEWS)))
 
 
-def picture(recording, properties):
-    launch(f'filesrc location={recording}.rcnc ! neighbourcodeparse ! neighbourcodedec ! cylinderfilter {properties} '
+def picture(recording, corrections):
+    launch(f'filesrc location={recording}.rcnc ! neighbourcodeparse ! neighbourcodedec ! rangealign corrections={corrections} '
            f'! striprender azimuth={AZIMUTH} elevation=5 background=0x00ffffff '
            f'! video/x-raw(memory:GLMemory),width={SIZE},height={SIZE} ! gldownload ! video/x-raw,format=RGBA ! pngenc ! multifilesink location=p%02d.png')
     p = cv2.imread(f'p{FRAMES - 1:02d}.png', -1).astype(float)
@@ -85,11 +86,11 @@ def main():
                  'exposure x 0.6': dict(colour=lambda c: (c * 0.6).round().astype(np.uint8)),
                  'half of its pixels missing': dict(depth=lambda d: np.where(holes, 0, d).astype(np.uint16)),
                  "another person's depth": dict(depth=lambda d: stranger)}
-        truth, without, rows = picture('right', ''), picture('without', ''), []
+        truth, without, rows = picture('right', ALL), picture('without', ALL), []
         print(f'without that view: {psnr(without, truth):.1f} dB')
         for name, change in cases.items():
             record('bad', **change)
-            before, after = picture('bad', 'consistency=none colour-balance=off'), picture('bad', '')
+            before, after = picture('bad', 'none'), picture('bad', ALL)
             print(f'{name}: {psnr(before, truth):.1f} dB -> {psnr(after, truth):.1f} dB')
             rows.append(np.hstack([before[0], after[0], without[0]]))
         if sheet:

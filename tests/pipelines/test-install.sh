@@ -68,10 +68,11 @@ test_elements_are_found_where_they_were_installed () {
     done
   done <<END
 neighbourcode neighbourcodeenc neighbourcodedec neighbourcodeparse
+rangealign rangealign cylinderfilter
 rangeconvert rangesplit plyenc
 rangedepth stereodepth roiextract rangecombine
 rangemux rangemux rangedemux capturesync
-rangerender cylinderfilter striprender rangerender
+rangerender striprender rangerender
 rangetestsrc avatartestsrc
 rangewebcam stereowebcamprovider
 rtpneighbourcode rtpneighbourcodepay rtpneighbourcodedepay rtpneighbourcodeguard
@@ -104,7 +105,7 @@ test_a_missing_library_costs_only_its_own_elements () {
   unshare -m true 2>/dev/null || skip "no right to make mount namespaces"
   export GST_REGISTRY=$PWD/registry.bin GST_REGISTRY_FORK=no
   without libopencv_core libaravis-0.8 libtinygltf -- gst-inspect-1.0 >inspect.txt 2>/dev/null
-  for element in neighbourcodeenc neighbourcodedec rtpneighbourcodepay rangemux rangesplit cylinderfilter; do
+  for element in neighbourcodeenc neighbourcodedec rtpneighbourcodepay rangemux rangesplit rangealign cylinderfilter; do
     grep -q " $element: " inspect.txt || fail "no element $element"
   done
   for element in stereodepth stereocamsrc avatartestsrc; do

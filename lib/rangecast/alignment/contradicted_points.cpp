@@ -8,15 +8,19 @@
 namespace rangecast {
 namespace {
 
+/* Two surfaces differ by no less in R, G or B, grey levels, in all of 3 x 3 pixels: no edge, where
+ * two views mix colours differently, is that wide. */
+constexpr float kMinPatchDifference = 40;
+
 bool
-has_colours (const FusedView &view)
+has_colours (const BalancedView &view)
 {
   return view.gains && view.image.colour.same_size (view.image.depth) && !view.image.depth.empty ();
 }
 
 /* A colour after colour balance, clipped alike: pixels that are white in both images stay equal. */
 std::array<float, 3>
-balanced_colour (const FusedView &view, int x, int y)
+balanced_colour (const BalancedView &view, int x, int y)
 {
   const Rgbx c = view.image.colour.at (x, y);
   const auto &gains = *view.gains;
@@ -28,7 +32,8 @@ balanced_colour (const FusedView &view, int x, int y)
 /* Whether a view sees, in all of 3 x 3 pixels around (x, y), a farther surface of another colour.
  * An invalid pixel is not farther than anything. */
 bool
-sees_other (const FusedView &view, int x, int y, float beyond, const std::array<float, 3> &colour)
+sees_other (
+    const BalancedView &view, int x, int y, float beyond, const std::array<float, 3> &colour)
 {
   const RangeImage &image = view.image;
   if (x < 1 || y < 1 || x >= image.depth.width - 1 || y >= image.depth.height - 1)
@@ -47,7 +52,7 @@ sees_other (const FusedView &view, int x, int y, float beyond, const std::array<
 
 bool
 is_contradicted (
-    const FusedView &own, const FusedView &other, const PixelTransfer &transfer, int x, int y)
+    const BalancedView &own, const BalancedView &other, const PixelTransfer &transfer, int x, int y)
 {
   const std::uint16_t depth = own.image.depth.at (x, y);
   float place[3];
@@ -69,9 +74,9 @@ is_contradicted (
 
 /* Every other pixel of a row, and those around one that is contradicted. */
 void
-ContradictedPoints::check_row (std::span<const FusedView> views, std::size_t which, int y)
+ContradictedPoints::check_row (std::span<const BalancedView> views, std::size_t which, int y)
 {
-  const FusedView &own = views[which];
+  const BalancedView &own = views[which];
   const int width = own.image.depth.width, height = own.image.depth.height;
   const auto check = [&] (const Other &other, int u, int v) {
     std::uint8_t &found = found_[static_cast<std::size_t> (v) * static_cast<std::size_t> (width) +
@@ -89,11 +94,11 @@ ContradictedPoints::check_row (std::span<const FusedView> views, std::size_t whi
 }
 
 void
-ContradictedPoints::find (std::span<const FusedView> views, std::size_t which)
+ContradictedPoints::find (std::span<const BalancedView> views, std::size_t which)
 {
   any_ = false;
   others_.clear ();
-  const FusedView &own = views[which];
+  const BalancedView &own = views[which];
   if (!has_colours (own))
     return;
   for (std::size_t i = 0; i < views.size (); i++)
@@ -111,7 +116,7 @@ ContradictedPoints::find (std::span<const FusedView> views, std::size_t which)
 }
 
 std::size_t
-ContradictedPoints::clear (const RangeImage &image, SurfacePlanes &planes)
+ContradictedPoints::clear (const RangeImage &image)
 {
   if (!any_)
     return 0;
@@ -121,7 +126,6 @@ ContradictedPoints::clear (const RangeImage &image, SurfacePlanes &planes)
     for (int x = 0; x < image.depth.width; x++)
       if (found_[static_cast<std::size_t> (y) * width + static_cast<std::size_t> (x)]) {
         image.depth.at (x, y) = kInvalidDepth;
-        planes.clear (x, y);
         cleared++;
       }
   return cleared;

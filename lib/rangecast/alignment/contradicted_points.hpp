@@ -1,13 +1,34 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
-#include "fused_view.hpp"
+#include "../geometry/pixel_transfer.hpp"
+#include "../geometry/range_image.hpp"
 
 namespace rangecast {
+
+/** One view of a frame set with its camera. */
+struct BalancedView {
+  RangeImage image;
+  PixelRays rays;
+  PixelLookup lookup;
+  /** Factors of its colours; without, they are not compared with those of other views. */
+  std::optional<std::array<float, 3>> gains;
+};
+
+/** Whether two cameras may see one surface well: they are at most 120 degrees apart. */
+inline bool
+may_share_surfaces (const PixelRays &a, const PixelRays &b)
+{
+  constexpr float kMinAxes = -0.5f;
+  const float *p = a.optical_axis, *q = b.optical_axis;
+  return p[0] * q[0] + p[1] * q[1] + p[2] * q[2] >= kMinAxes;
+}
 
 /** Finds points that cannot be where one view has them: another view should see them, but sees a
  *  surface farther away in another colour (photo-consistency, K. N. Kutulakos, S. M. Seitz, "A
@@ -22,15 +43,13 @@ public:
    *  Allocates only for an image larger than all before. Views without gains are left alone.
    *  @param which  number of the image that is checked; other images may be checked in parallel by
    *                other objects */
-  void find (std::span<const FusedView> views, std::size_t which);
-  /** Makes the points that find() found invalid, in depth and in the planes. To be called when all
-   *  images have been checked.
-   *  @param planes  of the image, or without pixels
+  void find (std::span<const BalancedView> views, std::size_t which);
+  /** Makes the points that find() found invalid. To be called when all images have been checked.
    *  @return how many points */
-  std::size_t clear (const RangeImage &image, SurfacePlanes &planes);
+  std::size_t clear (const RangeImage &image);
 
 private:
-  void check_row (std::span<const FusedView> views, std::size_t which, int y);
+  void check_row (std::span<const BalancedView> views, std::size_t which, int y);
 
   struct Other {
     std::size_t which;

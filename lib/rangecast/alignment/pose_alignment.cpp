@@ -8,7 +8,7 @@
 #include "../base/cholesky.hpp"
 #include "../geometry/pixel_transfer.hpp"
 #include "../geometry/world_points.hpp"
-#include "fused_view.hpp"
+#include "contradicted_points.hpp"
 
 namespace rangecast {
 
@@ -20,6 +20,12 @@ constexpr int kFirstRounds = 6;     ///< which is compared this many times
 constexpr double kKept = 0.85;      ///< weight of older frames in the next one
 constexpr float kSeenThrough =
     10; ///< footprints: distance at which a point is in front of a surface
+/* Maximum distance between what two views see of one surface, in footprints of a pixel. A footprint
+ * grows with z as the error of stereo does with z^2 / (focal length * baseline). */
+constexpr float kSurfaceFootprints = 6;
+/* Two pixels of one surface differ by less in R, G and B, grey levels: beside an edge they mix
+ * colours differently, so they may differ by much. */
+constexpr float kMaxPixelDifference = 60;
 constexpr float kMinWeight = 0.1f;        ///< SurfacePlane::weight of points that are compared
 constexpr float kMinNormals = 0.7f;       ///< cosine between the normals of one surface
 constexpr float kFar = 2 * kMaxImageSide; ///< pixels: no view sees as far aside

@@ -90,8 +90,10 @@ SurfacePlanes::make (const ConstRangeImage &image, float focal_px)
   width_ = image.depth.width;
   height_ = image.depth.height;
   reach_ = std::clamp (static_cast<int> (focal_px / kFocalPerReach + 0.5f), kMinReach, kMaxReach);
-  if (image.depth.empty ())
-    return clear ();
+  if (image.depth.empty ()) {
+    width_ = height_ = 0;
+    return;
+  }
   const std::size_t width = static_cast<std::size_t> (width_),
                     size = width * static_cast<std::size_t> (height_);
   if (planes_.size () < size)

@@ -5,19 +5,8 @@
 #include <vector>
 
 #include "../geometry/range_image.hpp"
-#include "../geometry/rig.hpp"
 
 namespace rangecast {
-
-/** Maximum distance between what two views see of one surface, in footprints of a pixel. A
- *  footprint grows with z as the error of stereo does with z^2 / (focal length * baseline). */
-inline constexpr float kSurfaceFootprints = 6;
-/** Two pixels of one surface differ by less in R, G and B, grey levels: beside an edge they mix
- *  colours differently, so they may differ by much. */
-inline constexpr float kMaxPixelDifference = 60;
-/** Two surfaces differ by no less in R, G or B, grey levels, in all of 3 x 3 pixels: no edge is
- * that wide, so less than kMaxPixelDifference is enough. */
-inline constexpr float kMinPatchDifference = 40;
 
 /** The plane that touches the surface at a pixel. On a plane 1 / depth is linear in column and row,
  *  so with h = (column * z, row * z, z) of a point, in the pixel's own plane of the image, the
@@ -40,27 +29,16 @@ public:
    * than all before.
    *  @param focal_px  focal length, pixels */
   void make (const ConstRangeImage &image, float focal_px);
-  /** Removes the plane of a pixel. Does nothing outside of the image. */
-  void clear (int x, int y)
-  {
-    if (x < width_ && y < height_)
-      planes_[static_cast<std::size_t> (y) * static_cast<std::size_t> (width_) +
-              static_cast<std::size_t> (x)]
-          .weight = 0;
-  }
-  /** Removes all planes, as of an image without pixels. */
-  void clear () { width_ = height_ = 0; }
-
   [[nodiscard]] int width () const { return width_; }
   [[nodiscard]] int height () const { return height_; }
-  [[nodiscard]] const SurfacePlane *row (int y) const
-  {
-    return planes_.data () + static_cast<std::size_t> (y) * static_cast<std::size_t> (width_);
-  }
   /** Whether a row has smooth surface at all, edges of depth apart. Rows of a lost slice have none,
    *  nor has a row of single pixels. */
   [[nodiscard]] bool is_used (int y) const { return used_[static_cast<std::size_t> (y)] != 0; }
-  [[nodiscard]] const SurfacePlane &at (int x, int y) const { return row (y)[x]; }
+  [[nodiscard]] const SurfacePlane &at (int x, int y) const
+  {
+    return planes_[static_cast<std::size_t> (y) * static_cast<std::size_t> (width_) +
+                   static_cast<std::size_t> (x)];
+  }
 
 private:
   void make_row (const ConstRangeImage &image, int y, float focal_px);

@@ -2,10 +2,9 @@
 #include "axis.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 #include <utility>
-
-#include "../base/simd.hpp"
 
 namespace rangecast {
 namespace {
@@ -23,39 +22,6 @@ struct Follow {
 };
 constexpr Follow kFollowPosition{0.2, 0.8, 0.02};             /* metres */
 constexpr Follow kFollowDirection{0.05, 0.7, 8 * M_PI / 180}; /* radians */
-
-/* Sums of what Moments holds, eight points at a time. Floats add up exactly enough over a block. */
-struct MomentsLoop {
-  const float *x, *y, *z;
-  std::size_t n;
-  static constexpr std::size_t kBlock = 512;
-
-  static constexpr int kLanes = 8;
-
-  static void add (float (&sum)[9][kLanes], const float *x, const float *y, const float *z, int n)
-  {
-    for (int l = 0; l < n; l++) {
-      sum[0][l] += x[l], sum[1][l] += y[l], sum[2][l] += z[l];
-      sum[3][l] += x[l] * x[l], sum[4][l] += x[l] * y[l], sum[5][l] += x[l] * z[l];
-      sum[6][l] += y[l] * y[l], sum[7][l] += y[l] * z[l], sum[8][l] += z[l] * z[l];
-    }
-  }
-
-  void run (double (&total)[9]) const
-  {
-    for (std::size_t begin = 0; begin < n; begin += kBlock) {
-      const std::size_t end = std::min (n, begin + kBlock);
-      float sum[9][kLanes] = {};
-      std::size_t i = begin;
-      for (; i + kLanes <= end; i += kLanes)
-        add (sum, x + i, y + i, z + i, kLanes);
-      add (sum, x + i, y + i, z + i, static_cast<int> (end - i));
-      for (int k = 0; k < 9; k++)
-        for (float s : sum[k])
-          total[k] += s;
-    }
-  }
-};
 
 /* One Jacobi rotation that makes a[p][q] zero; v collects the eigenvectors in its columns. */
 void
@@ -90,15 +56,12 @@ max_cosine (Vec3 direction, std::span<const PixelRays> cameras)
 } // namespace
 
 void
-Moments::add (const WorldPoints &points, WorldPoints::Part part)
+Moments::add (double x, double y, double z)
 {
-  const MomentsLoop loop{points.x.data () + part.begin, points.y.data () + part.begin,
-      points.z.data () + part.begin, part.size ()};
-  double total[9] = {};
-  for_this_cpu ([&] { loop.run (total); });
-  for (int k = 0; k < 9; k++)
-    (k < 3 ? sum[k] : product[k - 3]) += total[k];
-  n += static_cast<double> (part.size ());
+  n++;
+  sum[0] += x, sum[1] += y, sum[2] += z;
+  product[0] += x * x, product[1] += x * y, product[2] += x * z;
+  product[3] += y * y, product[4] += y * z, product[5] += z * z;
 }
 
 Moments &

@@ -3,7 +3,6 @@
 
 #include <span>
 
-#include "../geometry/camera.hpp"
 #include "../geometry/world_points.hpp"
 
 namespace rangecast {
@@ -12,7 +11,7 @@ namespace rangecast {
 enum class AxisMode {
   kPrincipal, ///< the direction in which the points spread most, through their centroid
   kVertical,  ///< world y, through the centroid
-  kFixed,     ///< as the settings say
+  kWorld,     ///< world y, through the origin
 };
 
 /** A line in the world. */
@@ -27,7 +26,7 @@ struct Moments {
   double sum[3] = {};     ///< x y z
   double product[6] = {}; ///< xx xy xz yy yz zz
 
-  void add (const WorldPoints &points, WorldPoints::Part part);
+  void add (double x, double y, double z);
   Moments &operator+= (const Moments &other);
   [[nodiscard]] Vec3 centroid () const;
 };

@@ -130,44 +130,7 @@ Clusters::find (const WorldPoints &cloud, int max_clusters)
       if (labels_[place] == found[cluster].label)
         cluster_[place] = static_cast<std::uint8_t> (cluster);
   spread ();
-  const std::size_t points = cloud.x.size ();
-  if (pixel_.size () < points) { /* the last to grow: all have grown */
-    for (auto *array : {&x_, &y_, &z_})
-      array->resize (points);
-    pixel_.resize (points);
-  }
   return count_;
-}
-
-void
-Clusters::sort_part (
-    WorldPoints &cloud, std::size_t number, std::array<std::size_t, kMaxClusters> &ends)
-{
-  const WorldPoints::Part part = cloud.parts ()[number];
-  const auto cluster_of = [&] (std::size_t i) {
-    return cluster_[place_of (cloud.x[i], cloud.z[i])];
-  };
-  std::array<std::size_t, kMaxClusters + 1> to{};
-  for (std::size_t i = part.begin; i < part.end; i++)
-    to[cluster_of (i) + 1]++;
-  to[0] = part.begin;
-  for (int cluster = 0; cluster < kMaxClusters; cluster++)
-    to[cluster + 1] += to[cluster];
-  for (std::size_t i = part.begin; i < part.end; i++) {
-    const std::size_t at = to[cluster_of (i)]++;
-    x_[at] = cloud.x[i];
-    y_[at] = cloud.y[i];
-    z_[at] = cloud.z[i];
-    pixel_[at] = cloud.pixel[i];
-  }
-  const auto put_back = [&] (const auto &from, auto &into) {
-    std::copy (from.begin () + part.begin, from.begin () + part.end, into.begin () + part.begin);
-  };
-  put_back (x_, cloud.x);
-  put_back (y_, cloud.y);
-  put_back (z_, cloud.z);
-  put_back (pixel_, cloud.pixel);
-  std::copy_n (to.begin (), kMaxClusters, ends.begin ());
 }
 
 } // namespace rangecast

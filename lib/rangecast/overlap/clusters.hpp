@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "../geometry/world_points.hpp"
-#include "cell_rows.hpp"
 
 namespace rangecast {
 
+/** Maximum number of cylinders. */
+inline constexpr int kMaxClusters = 8;
+
 /** Finds clusters of points: connected components of occupied places of the floor plan (world x, z)
- *  on a coarse grid. Keeps its memory from frame to frame: some 100 KB, and 16 bytes a point once
- *  there are two clusters. */
+ *  on a coarse grid. Keeps its memory from frame to frame: some 100 KB. */
 class Clusters {
 public:
   /** Side of a place, metres; larger where the points spread over more than kSide places. A gap of
@@ -27,11 +28,11 @@ public:
    *  @return how many there are, at least 1 */
   int find (const WorldPoints &cloud, int max_clusters);
 
-  /** Sorts the points of a part by cluster.
-   *  @param[out] ends  end of each cluster in the part; the first one begins with it. Parts may be
-   *                    sorted at the same time */
-  void sort_part (
-      WorldPoints &cloud, std::size_t part, std::array<std::size_t, kMaxClusters> &ends);
+  /** The cluster of a point, 0 .. find() - 1, the largest first. */
+  [[nodiscard]] std::uint32_t cluster_of (float x, float z) const
+  {
+    return count_ == 1 ? 0 : cluster_[static_cast<std::size_t> (place_of (x, z))];
+  }
 
 private:
   static constexpr int kSide = 128; /* places each way */
@@ -59,9 +60,6 @@ private:
   std::vector<std::uint16_t> labels_; /* of each place */
   std::vector<std::uint8_t> cluster_; /* of each place */
   std::vector<std::uint16_t> queue_;
-
-  std::vector<float> x_, y_, z_; /* while a part is sorted; as large as the cloud */
-  std::vector<std::uint32_t> pixel_;
 };
 
 } // namespace rangecast

@@ -11,30 +11,46 @@
 namespace rangecast {
 namespace {
 
+constexpr CellGrid::HeightRange kNoHeights = {
+    std::numeric_limits<float>::max (), -std::numeric_limits<float>::max ()};
+
+/* Of a cylinder: y along its axis, z as near to world z as that leaves (world x where the axis is
+ * along z), right-handed. */
+struct CylinderFrame {
+  float origin[3], rows[3][3]; /* world, metres; cylinder_from_world */
+
+  explicit CylinderFrame (const Axis &axis = {})
+  {
+    const Vec3 y = axis.direction, near_z = std::abs (y.z) < 0.9 ? Vec3{0, 0, 1} : Vec3{1, 0, 0};
+    Vec3 z = near_z - dot (near_z, y) * y;
+    z = 1 / norm (z) * z;
+    const Vec3 from[] = {axis.position, cross (y, z), y, z};
+    float *to[] = {origin, rows[0], rows[1], rows[2]};
+    for (int i = 0; i < 4; i++) {
+      to[i][0] = static_cast<float> (from[i].x);
+      to[i][1] = static_cast<float> (from[i].y);
+      to[i][2] = static_cast<float> (from[i].z);
+    }
+  }
+  void turn (const float v[3], float out[3]) const
+  {
+    for (int k = 0; k < 3; k++)
+      out[k] = rows[k][0] * v[0] + rows[k][1] * v[1] + rows[k][2] * v[2];
+  }
+};
+
 Status
 check (const CylinderSettings &settings)
 {
-  const CellSettings &cells = settings.cells;
-  auto bad = [] (const char *what) { return Status{StatusCode::kBadValue, what}; };
-  if (!(cells.height_m >= 0.0002 && cells.height_m <= 10))
-    return bad ("cylinder: unit height, expected 0.0002 to 10 metres");
-  if (cells.columns < 8 || cells.columns > 3600)
+  const auto bad = [] (const char *what) { return Status{StatusCode::kBadValue, what}; };
+  if (!(settings.slice_height_m >= 0.0002 && settings.slice_height_m <= 10))
+    return bad ("cylinder: slice height, expected 0.0002 to 10 metres");
+  if (settings.columns < 8 || settings.columns > 3600)
     return bad ("cylinder: columns, expected 8 to 3600");
-  if (!(cells.layer_gap_m >= 0 && cells.layer_gap_m <= 100) ||
-      !(cells.smoothing_m >= 0 && cells.smoothing_m <= 1))
-    return bad ("cylinder: layer gap, expected 0 to 100 metres; smoothing, 0 to 1 metre");
   if (!(settings.overlap >= 0 && settings.overlap <= kMaxOverlap))
     return bad ("cylinder: overlap, expected 0 to 16 pixels");
-  if (!(settings.hysteresis >= 0 && settings.hysteresis <= 2) ||
-      !(settings.agreement >= 0 && settings.agreement <= 2))
-    return bad ("cylinder: hysteresis and agreement, expected 0 to 2");
   if (settings.max_clusters < 1 || settings.max_clusters > kMaxClusters)
-    return bad ("cylinder: bodies, expected 1 to 8");
-  const double length = norm (settings.fixed_axis.direction);
-  if (settings.axis == AxisMode::kFixed && !(length > 1e-9 && length < 1e9))
-    return bad ("cylinder: direction of the fixed axis, expected a length of 1e-9 to 1e9");
-  if (settings.axis == AxisMode::kFixed && !(norm (settings.fixed_axis.position) < 1e6))
-    return bad ("cylinder: position of the fixed axis, expected less than 1000 km");
+    return bad ("cylinder: clusters, expected 1 to 8");
   return {};
 }
 
@@ -44,12 +60,6 @@ Status
 CylinderFilter::set_rig (const Rig &rig)
 {
   reset ();
-  return change_rig (rig);
-}
-
-Status
-CylinderFilter::change_rig (const Rig &rig)
-{
   rig_views_ = 0;
   return guarded ("rig", [&] () -> Status {
     if (Status status = validate (rig); !status.ok ())
@@ -71,23 +81,8 @@ CylinderFilter::reset ()
 {
   for (AxisTracker &tracker : trackers_)
     tracker.reset ();
-  cells_.rows.reset ();
+  grid_.reset ();
   decided_ = false;
-}
-
-/* Winners of cells about an axis found by another rule, or set elsewhere, are of no use. But an
- * application may move a fixed axis a little in each frame, to follow a person. */
-void
-CylinderFilter::reset_on_new_geometry (const CylinderSettings &settings)
-{
-  constexpr double kNear = 0.05, kAlike = 0.996; /* metres; cosine of 5 degrees */
-  const Vec3 a = settings.fixed_axis.direction, b = fixed_axis_.direction;
-  const bool stays = norm (settings.fixed_axis.position - fixed_axis_.position) < kNear &&
-                     std::abs (dot (a, b)) > kAlike * norm (a) * norm (b);
-  if (settings.axis != axis_mode_ || (settings.axis == AxisMode::kFixed && !stays))
-    reset ();
-  axis_mode_ = settings.axis;
-  fixed_axis_ = settings.fixed_axis;
 }
 
 Status
@@ -101,40 +96,16 @@ CylinderFilter::find_cameras (std::span<const RangeImage> images)
       return {StatusCode::kNotFound,
           "rig: no view " + std::to_string (id) + ", which the frame set has"};
     rays_[i] = rig_rays_[id];
+    lookups_[i] = rig_lookups_[id];
     ids_[i] = id;
   }
   return {};
 }
 
-/* Sorts the points by cluster, and computes the moments of each cluster. */
-void
-CylinderFilter::find_clusters (const CylinderSettings &settings)
-{
-  const auto parts = cloud_.parts ();
-  cluster_count_ =
-      clusters_.find (cloud_, settings.axis == AxisMode::kFixed ? 1 : settings.max_clusters);
-  const auto clusters = static_cast<std::size_t> (cluster_count_);
-  runs_.resize (parts.size () * clusters);
-  moments_.resize (runs_.size ());
-  in_parallel (parts.size (), settings.threads, [&] (std::size_t i) {
-    std::array<std::size_t, kMaxClusters> ends{parts[i].end};
-    if (clusters > 1)
-      clusters_.sort_part (cloud_, i, ends);
-    std::size_t begin = parts[i].begin;
-    for (std::size_t b = 0; b < clusters; b++) {
-      PointRun &run = runs_[i * clusters + b];
-      run = {begin, ends[b], static_cast<std::uint32_t> (i), static_cast<std::uint32_t> (b)};
-      begin = run.end;
-      moments_[i * clusters + b] = {};
-      moments_[i * clusters + b].add (cloud_, {run.begin, run.end});
-    }
-  });
-}
-
 /* Gives each cluster the slot that it had in the frame before: the nearest pair of a cluster and a
  * slot first, if they are less than half a metre apart; the other clusters get unused slots. */
 void
-CylinderFilter::choose_slots (const std::array<Axis, kMaxClusters> &measured)
+CylinderFilter::choose_slots (const std::array<Axis, kMaxClusters> &measured, int clusters)
 {
   constexpr double kFar = 0.5;
   slots_.fill (-1);
@@ -143,10 +114,10 @@ CylinderFilter::choose_slots (const std::array<Axis, kMaxClusters> &measured)
     slots_[cluster] = slot;
     taken |= 1u << slot;
   };
-  for (int pair = 0; pair < cluster_count_; pair++) {
+  for (int pair = 0; pair < clusters; pair++) {
     double nearest = kFar;
     int best_cluster = -1, best_slot = -1;
-    for (int cluster = 0; cluster < cluster_count_; cluster++)
+    for (int cluster = 0; cluster < clusters; cluster++)
       for (int slot = 0; slot < kMaxClusters; slot++) {
         if (slots_[cluster] >= 0 || (taken >> slot & 1) || !trackers_[slot].started ())
           continue;
@@ -161,7 +132,7 @@ CylinderFilter::choose_slots (const std::array<Axis, kMaxClusters> &measured)
   for (int slot = 0; slot < kMaxClusters; slot++)
     if (!(taken >> slot & 1))
       trackers_[slot].reset ();
-  for (int cluster = 0, slot = 0; cluster < cluster_count_; cluster++) {
+  for (int cluster = 0, slot = 0; cluster < clusters; cluster++) {
     while (slots_[cluster] < 0 && (taken >> slot & 1))
       slot++;
     if (slots_[cluster] < 0)
@@ -169,114 +140,92 @@ CylinderFilter::choose_slots (const std::array<Axis, kMaxClusters> &measured)
   }
 }
 
+/* Finds the clusters and the axis of each. */
 void
-CylinderFilter::choose_axes (const CylinderSettings &settings, std::size_t images)
+CylinderFilter::choose_axes (const CylinderSettings &settings, CylinderResult &result)
 {
-  if (settings.axis == AxisMode::kFixed) {
-    const Vec3 direction = settings.fixed_axis.direction;
-    const double up = direction.y < 0 ? -1 : 1;
-    axis_ = axes_[0] = {settings.fixed_axis.position, up / norm (direction) * direction};
+  const bool world = settings.axis == AxisMode::kWorld;
+  result.clusters = clusters_.find (cloud_, world ? 1 : settings.max_clusters);
+  if (world) {
+    result.axis = axes_[0] = {};
     slots_[0] = 0;
-    for (AxisTracker &tracker : trackers_)
-      tracker.reset ();
     return;
   }
+  const auto parts = cloud_.parts ();
+  in_parallel (parts.size (), settings.threads, [&] (std::size_t i) {
+    moments_[i].fill ({});
+    for (std::size_t k = parts[i].begin; k < parts[i].end; k++)
+      moments_[i][clusters_.cluster_of (cloud_.x[k], cloud_.z[k])].add (
+          cloud_.x[k], cloud_.y[k], cloud_.z[k]);
+  });
   std::array<Axis, kMaxClusters> measured;
-  const auto clusters = static_cast<std::size_t> (cluster_count_);
-  for (std::size_t cluster = 0; cluster < clusters; cluster++) {
+  for (int cluster = 0; cluster < result.clusters; cluster++) {
     Moments all;
-    for (std::size_t i = 0; i < images; i++)
-      all += moments_[i * clusters + cluster];
-    measured[cluster] = axis_of_points (settings.axis, all, {rays_.data (), images});
+    for (std::size_t i = 0; i < parts.size (); i++)
+      all += moments_[i][static_cast<std::size_t> (cluster)];
+    measured[cluster] = axis_of_points (settings.axis, all, {rays_.data (), parts.size ()});
   }
-  choose_slots (measured);
-  for (std::size_t cluster = 0; cluster < clusters; cluster++) {
-    const int slot = slots_[cluster];
-    axes_[slot] = trackers_[slot].follow (measured[cluster]);
-  }
-  axis_ = axes_[slots_[0]];
+  choose_slots (measured, result.clusters);
+  for (int cluster = 0; cluster < result.clusters; cluster++)
+    axes_[slots_[cluster]] = trackers_[slots_[cluster]].follow (measured[cluster]);
+  result.axis = axes_[slots_[0]];
 }
 
-/* Moves the points to coordinates of their cluster's cylinder, and finds each cylinder's heights.
- */
+/* Moves the points to the coordinates of their cluster's cylinder, and into its cells. */
 void
-CylinderFilter::unroll (const CylinderSettings &settings, std::size_t images)
+CylinderFilter::fill_grid (const CylinderSettings &settings, int clusters)
 {
+  const auto parts = cloud_.parts ();
   std::array<CylinderFrame, kMaxClusters> frames;
-  for (int cluster = 0; cluster < cluster_count_; cluster++) {
+  for (int cluster = 0; cluster < clusters; cluster++) {
     const int slot = slots_[cluster];
     frames[slot] = CylinderFrame (axes_[slot]);
-    for (std::size_t i = 0; i < images; i++) {
-      const float *a = rays_[i].optical_axis;
-      const Vec3 optical = frames[slot].rotation * Vec3{a[0], a[1], a[2]};
-      rules_.optical[slot][i] = {static_cast<float> (optical.x), static_cast<float> (optical.z)};
+    for (std::size_t i = 0; i < parts.size (); i++) {
+      float optical[3];
+      frames[slot].turn (rays_[i].optical_axis, optical);
+      optical_[slot][i] = {optical[0], optical[2]};
     }
   }
-  if (column_.size () < cloud_.x.size ()) { /* the last to grow: all have grown */
-    radius_.resize (cloud_.x.size ());
-    column_.resize (cloud_.x.size ());
-  }
-  run_ranges_.resize (runs_.size ());
-  in_parallel (runs_.size (), settings.threads, [&] (std::size_t i) {
-    runs_[i].cluster = static_cast<std::uint32_t> (slots_[runs_[i].cluster]);
-    run_ranges_[i] = project_to_cylinder (cloud_, {runs_[i].begin, runs_[i].end},
-        frames[runs_[i].cluster], settings.cells.columns, radius_.data (), column_.data ());
+  radius_.resize (std::max (radius_.size (), cloud_.x.size ()));
+  cell_.resize (radius_.size ());
+  const float columns_per_radian = static_cast<float> (settings.columns / (2 * M_PI));
+  in_parallel (parts.size (), settings.threads, [&] (std::size_t i) {
+    ranges_[i].fill (kNoHeights);
+    for (std::size_t k = parts[i].begin; k < parts[i].end; k++) {
+      float *p[] = {&cloud_.x[k], &cloud_.y[k], &cloud_.z[k]}, out[3];
+      const auto slot = static_cast<std::uint32_t> (slots_[clusters_.cluster_of (*p[0], *p[2])]);
+      const CylinderFrame &to = frames[slot];
+      const float moved[] = {*p[0] - to.origin[0], *p[1] - to.origin[1], *p[2] - to.origin[2]};
+      to.turn (moved, out);
+      for (int axis = 0; axis < 3; axis++)
+        *p[axis] = out[axis];
+      radius_[k] = std::sqrt (out[0] * out[0] + out[2] * out[2]);
+      const float phi = std::atan2 (out[2], out[0]);
+      const int column = static_cast<int> (
+          (phi < 0 ? phi + static_cast<float> (2 * M_PI) : phi) * columns_per_radian);
+      cell_[k] = slot << 16 | static_cast<std::uint32_t> (std::min (column, settings.columns - 1));
+      ranges_[i][slot].y_min = std::min (ranges_[i][slot].y_min, out[1]);
+      ranges_[i][slot].y_max = std::max (ranges_[i][slot].y_max, out[1]);
+    }
   });
-  constexpr float kHuge = std::numeric_limits<float>::max ();
-  ranges_.fill ({kHuge, -kHuge});
-  for (std::size_t i = 0; i < runs_.size (); i++) {
-    HeightRange &range = ranges_[runs_[i].cluster];
-    range.y_min = std::min (range.y_min, run_ranges_[i].y_min);
-    range.y_max = std::max (range.y_max, run_ranges_[i].y_max);
-  }
-}
-
-void
-CylinderFilter::set_rules (const CylinderSettings &settings, std::size_t images)
-{
-  constexpr double kMaxSmoothingSlices = 8; /* more would cost time for little */
-  const CellSettings &cells = settings.cells;
-  const double slices = std::min (cells.smoothing_m / cells_.slice_height_m, kMaxSmoothingSlices);
-  rules_.layer_gap = static_cast<float> (cells.layer_gap_m);
-  rules_.smoothing_columns = static_cast<float> (cells.smoothing_m * cells.columns / (2 * M_PI));
-  rules_.max_columns = std::min (float{CellRows::kPad}, static_cast<float> (cells.columns / 4));
-  rules_.smoothing_slices = cells.smoothing_m > 0 ? static_cast<int> (slices + 0.5) : 0;
-  rules_.hysteresis = static_cast<float> (settings.hysteresis);
-  rules_.agreement = static_cast<float> (settings.agreement);
-  rules_.images = static_cast<int> (images);
-}
-
-void
-CylinderFilter::decide_cells (const CylinderSettings &settings, CylinderResult &result)
-{
-  const std::size_t slices = cells_.slices.size ();
-  in_parallel (slices, settings.threads, [&] (std::size_t s) {
-    cells_.fill_rows (static_cast<int> (s));
-    cells_.rows.sum_along (rules_, static_cast<int> (s));
-  });
-  in_parallel (slices, settings.threads,
-      [&] (std::size_t s) { cells_.rows.sum_across (rules_, static_cast<int> (s)); });
-  cells_.rows.renumber_winners (ids_, rules_.images);
-  const RowCounts counts = cells_.rows.decide (rules_, settings.threads);
-  result.cells_held = counts.held;
-  result.cells_changed = counts.changed;
-  for (const Cells::Slice &slice : cells_.slices) {
-    result.cells += slice.occupied;
-    result.cells_shared += slice.shared;
-  }
-}
-
-void
-CylinderFilter::clear_redundant (
-    std::span<const RangeImage> images, const CylinderSettings &settings)
-{
-  std::array<PixelLookup, kMaxViews> lookups;
-  for (std::size_t i = 0; i < images.size (); i++)
-    lookups[i] = rig_lookups_[static_cast<std::size_t> (ids_[i])];
-  const ResolvedFrame frame{images, {rays_.data (), images.size ()},
-      {lookups.data (), images.size ()}, cloud_, runs_, column_, cells_};
-  redundant_.find (frame, settings.overlap, settings.threads);
-  redundant_.clear (frame);
+  std::array<CellGrid::HeightRange, kMaxClusters> all;
+  all.fill (kNoHeights);
+  for (std::size_t i = 0; i < parts.size (); i++)
+    for (std::size_t slot = 0; slot < kMaxClusters; slot++) {
+      all[slot].y_min = std::min (all[slot].y_min, ranges_[i][slot].y_min);
+      all[slot].y_max = std::max (all[slot].y_max, ranges_[i][slot].y_max);
+    }
+  grid_.lay_out (all, settings.slice_height_m, settings.columns);
+  for (const WorldPoints::Part &part : parts)
+    for (std::size_t k = part.begin; k < part.end; k++) {
+      cell_[k] = grid_.cell_of (cell_[k] >> 16, cloud_.y[k], cell_[k] & 0xffff);
+      grid_.count (cell_[k]);
+    }
+  grid_.make_room (cloud_.x.size ());
+  for (std::size_t i = 0; i < parts.size (); i++)
+    for (std::size_t k = parts[i].begin; k < parts[i].end; k++)
+      grid_.add (cell_[k], {radius_[k], cloud_.x[k], cloud_.z[k], static_cast<std::uint32_t> (k),
+                               static_cast<std::uint32_t> (i)});
 }
 
 Status
@@ -286,27 +235,24 @@ CylinderFilter::work (
   decided_ = false;
   if (Status status = cloud_.reset (images); !status.ok ())
     return status;
-  reset_on_new_geometry (settings);
+  if (settings.axis != axis_mode_) /* winners of cells about another axis are of no use */
+    reset ();
+  axis_mode_ = settings.axis;
   in_parallel (images.size (), settings.threads,
       [&] (std::size_t i) { cloud_.fill (i, images[i], rays_[i]); });
   result.points_in = result.points_out = cloud_.size ();
-  if (result.points_in > 0) {
-    find_clusters (settings);
-    choose_axes (settings, images.size ());
-    result.clusters = cluster_count_;
-  }
-  result.axis = axis_;
+  if (result.points_in > 0)
+    choose_axes (settings, result);
   if (std::ranges::count_if (
           cloud_.parts (), [] (const WorldPoints::Part &part) { return part.size () > 0; }) < 2)
     return {};
-  unroll (settings, images.size ());
-  cells_.sort (cloud_, radius_, column_, runs_, ranges_, settings.cells, settings.threads);
-  set_rules (settings, images.size ());
-  decide_cells (settings, result);
-  clear_redundant (images, settings);
-  cells_.rows.keep_winners (rules_, ids_);
+  fill_grid (settings, result.clusters);
+  result.cells = grid_.decide (optical_, {ids_.data (), images.size ()}, settings.threads);
+  const DecidedFrame frame{
+      images, {rays_.data (), images.size ()}, {lookups_.data (), images.size ()}, cloud_, grid_};
+  result.points_out -= redundant_.find (frame, settings.overlap, settings.threads);
+  redundant_.clear (images);
   decided_ = true;
-  result.points_out -= redundant_.size ();
   return {};
 }
 

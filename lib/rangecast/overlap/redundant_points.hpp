@@ -8,25 +8,23 @@
 
 #include "../geometry/range_image.hpp"
 #include "../geometry/world_points.hpp"
-#include "cells.hpp"
+#include "cell_grid.hpp"
 
 namespace rangecast {
 
-/** A frame set whose cells have been decided. */
-struct ResolvedFrame {
+/** A frame set whose winners have been decided. */
+struct DecidedFrame {
   std::span<const RangeImage> images;
   std::span<const PixelRays> rays;      ///< of each image's camera
   std::span<const PixelLookup> lookups; ///< of each image's camera
   const WorldPoints &cloud;
-  std::span<const PointRun> runs; ///< ordered by view
-  std::span<const std::int32_t> column;
-  const Cells &cells;
+  const CellGrid &grid;
 };
 
 /** The points that can go without opening a hole. Keeps its memory from frame to frame: 2 bytes a
- *  pixel, 4 a point.
+ *  pixel of all images, 12 a pixel of the largest.
  *
- *  A point whose cell another view won is a candidate. With it go the triangles between it and its
+ *  A point whose node another view won is a candidate. With it go the triangles between it and its
  *  eight neighbours, so it goes only if the winner's own triangles cover all of these:
  *  - Where the winner sees the point and each neighbour that joins it, the winner's surface is no
  *    more than kTolerance pixel footprints away.
@@ -35,75 +33,45 @@ struct ResolvedFrame {
  *  Pixels join as in striprender: their depths differ by no more than kDepthStep.
  *
  *  Images are processed in order. A point that goes no longer covers others, so each one that goes
- * is covered by points that stay, and where the regions of two views meet, the later one keeps an
+ *  is covered by points that stay, and where the regions of two views meet, the later one keeps an
  *  overlap of a pixel or two. */
 class RedundantPoints {
 public:
   /** @param overlap  radius around a point within which its surface must be covered, in pixels of
-   * its own view; 1: as far as its triangles reach; more keeps a wider overlap */
-  void find (const ResolvedFrame &frame, double overlap, int threads);
+   *                  its own view; 1: as far as its triangles reach; more keeps a wider overlap
+   *  @return how many points there are */
+  std::size_t find (const DecidedFrame &frame, double overlap, int threads);
 
   /** Makes the pixels found invalid. */
-  void clear (const ResolvedFrame &frame);
-
-  /** Points found. */
-  [[nodiscard]] std::size_t size () const { return count_; }
+  void clear (std::span<const RangeImage> images);
 
 private:
-  template <typename L> struct CoverLoop; /* cover_loop.hpp */
-
-  /* A byte for each pixel of an image, with a margin. */
-  class BytePlane {
-  public:
-    void reset (int width, int height, std::uint8_t value);
-    [[nodiscard]] std::uint8_t *row (int y) { return bytes_.data () + offset (y); }
-    [[nodiscard]] const std::uint8_t *row (int y) const { return bytes_.data () + offset (y); }
-    static constexpr int kMargin = 8; ///< bytes left and right of a row; above there is one row
-
-  private:
-    [[nodiscard]] std::size_t offset (int y) const
-    {
-      return static_cast<std::size_t> (y + 1) * stride_ + kMargin;
-    }
-    std::vector<std::uint8_t> bytes_;
-    std::size_t stride_ = 0;
+  /* A byte for each pixel of an image. */
+  struct BytePlane {
+    std::vector<std::uint8_t> bytes;
+    std::size_t width = 0;
+    void reset (const RangeImage &image, std::uint8_t value);
+    [[nodiscard]] std::uint8_t *row (int y) { return bytes.data () + std::size_t (y) * width; }
   };
-
   struct ImageState {
-    /* kSurface where the pixel, the one to its right and the two below are one surface of points
-     * that stay; else 0. */
+    /* 1 where the pixel, the one to its right and the two below are one surface of points that
+     * stay; else 0. */
     BytePlane surface;
-    /* Number of the image that won the pixel's cell; kNoWinner: it is no candidate; kGoes. */
+    /* Number of the image that won the pixel's node; kNoWinner: it is no candidate; kGoes. */
     BytePlane winner;
     std::uint64_t winners = 0; /* bit i: image i is in `winner` */
   };
-  static constexpr std::uint8_t kSurface = 0xff, kNoWinner = 0xff, kGoes = 0xfe;
-
-  /* A row of an image and of what lies left and right of it, as another image sees it. */
-  struct Row {
-    int y = -1;                           /* -1: not made */
-    std::vector<float> depth;             /* 0: invalid, or not in the image */
-    std::vector<float> u, v;              /* pixels of the other image's plane */
-    std::vector<std::int32_t> on_surface; /* -1: on the other image's surface; else 0 */
+  /* Where the image of a pixel's winner sees the pixel. */
+  struct Place {
+    float u, v;          /* pixels of the winner's plane */
+    std::uint8_t winner; /* kNoWinner: not known yet */
+    bool on_surface;     /* of the winner */
   };
-  struct Range { /* of columns */
-    int begin = 0, end = 0;
-  };
-
-  void begin (const ResolvedFrame &frame);
-  void find_nodes (const ResolvedFrame &frame);
-  void list_winners (const ResolvedFrame &frame);
-  void make_surface (const RangeImage &image, BytePlane &surface) const;
-  bool find_candidates (const RangeImage &image, const BytePlane &winners, std::size_t winner);
+  struct Comparison;
+  static constexpr std::uint8_t kNoWinner = 0xff, kGoes = 0xfe;
 
   std::array<ImageState, kMaxViews> images_;
-  std::size_t count_ = 0;
-  std::array<Row, 3> rows_;
-  std::vector<Range> candidates_; /* of each row */
-  /* First node of each slice of one plane, kNoNode for others, whose points have their node in
-   * node_of_: kNoNode for the fifth and further surfaces of a cell, whose points all stay. */
-  std::vector<std::uint32_t> first_node_, node_of_;
-  static constexpr std::uint32_t kNoNode = UINT32_MAX;
+  std::vector<Place> places_; /* of the pixels of one image */
 };
 
 } // namespace rangecast

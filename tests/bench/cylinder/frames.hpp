@@ -2,6 +2,8 @@
 /* Frame sets with their own pixels, and where they come from. */
 #pragma once
 
+#include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <rangecast/base/status.hpp>
 #include <rangecast/geometry/range_image.hpp>
@@ -39,10 +41,23 @@ struct Spot {
 /** The valid pixels of a frame set as points of the world. */
 std::vector<Spot> spots_of (FrameSet &set);
 
-/** A bust of ellipsoids in the middle of views x (width x height), 1.5 mm of noise. */
-FrameSet render_bust (int views, int width, int height);
-/** A pillar that fills the pictures to their edges. */
-FrameSet render_pillar (int views, int width, int height);
+/** The median time of some calls of work, each on the set as it was; milliseconds. */
+template <typename Work>
+double
+median_ms (FrameSet &set, int rounds, const Work &work)
+{
+  std::vector<double> ms;
+  for (int i = 0; i < rounds; i++) {
+    set.restore ();
+    const auto start = std::chrono::steady_clock::now ();
+    work ();
+    const std::chrono::duration<double, std::milli> took =
+        std::chrono::steady_clock::now () - start;
+    ms.push_back (took.count ());
+  }
+  std::nth_element (ms.begin (), ms.begin () + std::ptrdiff_t (ms.size () / 2), ms.end ());
+  return ms[ms.size () / 2];
+}
 
 /** What pipelines/bunny-to-range.py wrote there. */
 rangecast::Status load_bunny (const std::string &folder, FrameSet &set);

@@ -26,7 +26,7 @@ print_row (const TruthRow &r)
   std::printf (
       "%-35s %-20s %8zu %6.1f %% %6.2f %% %6.2f %6.2f %6.2f %6.2f %6.2f %% %7.2f %% %7.2f %% %7zu "
       "%8zu %8.2f\n",
-      scene, r.method.c_str (), v.points, 100 * v.removed, 100 * v.units_double, v.thickness_mm,
+      scene, r.method.c_str (), v.points, 100 * v.removed, 100 * v.cells_double, v.thickness_mm,
       v.thickness95_mm, v.distance_mm, v.distance95_mm, 100 * v.uncovered, 100 * r.new_holes,
       100 * r.new_holes_6mm, v.strips, v.isolated, r.ms);
   std::fflush (stdout);
@@ -47,12 +47,12 @@ write_json (const std::string &path, const std::vector<TruthRow> &rows)
     std::fprintf (file,
         "%s\n{\"scene\": \"%s\", \"views\": %d, \"noise\": \"%s\", \"pose_mm\": %g, "
         "\"pose_deg\": %g, \"method\": \"%s\", \"points\": %zu, \"removed\": %.6f, "
-        "\"units_double\": %.6f, \"thickness_mm\": %.4f, \"thickness95_mm\": %.4f, "
+        "\"cells_double\": %.6f, \"thickness_mm\": %.4f, \"thickness95_mm\": %.4f, "
         "\"distance_mm\": %.4f, \"distance95_mm\": %.4f, \"uncovered\": %.6f, "
         "\"new_holes\": %.6f, \"uncovered_6mm\": %.6f, \"new_holes_6mm\": %.6f, "
         "\"strips\": %zu, \"isolated\": %zu, \"ms\": %.4f}",
         i ? "," : "", r.scene.c_str (), r.views, r.noise.c_str (), r.pose_mm, r.pose_deg,
-        r.method.c_str (), v.points, v.removed, v.units_double, v.thickness_mm, v.thickness95_mm,
+        r.method.c_str (), v.points, v.removed, v.cells_double, v.thickness_mm, v.thickness95_mm,
         v.distance_mm, v.distance95_mm, v.uncovered, r.new_holes, v.uncovered_6mm, r.new_holes_6mm,
         v.strips, v.isolated, r.ms);
   }

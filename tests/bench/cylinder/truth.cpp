@@ -17,7 +17,7 @@ constexpr int kSamples = 60000;
 constexpr double kAcross = 0.02, kNear = 0.006;
 constexpr double kSliceHeight = 0.008; ///< metres
 constexpr int kAngles = 72;
-constexpr double kUnitHeight = 0.004, kLayerGap = 0.03; ///< metres
+constexpr double kSliceHeight = 0.004, kLayerGap = 0.03; ///< metres
 constexpr int kColumns = 360;
 
 double
@@ -135,23 +135,23 @@ Judge::covered (const FrameSet &set) const
 }
 
 double
-Judge::units_double (const std::vector<char> &alive) const
+Judge::cells_double (const std::vector<char> &alive) const
 {
   struct Member {
     double radius;
     int view;
   };
-  std::unordered_map<std::int64_t, std::vector<Member>> units;
+  std::unordered_map<std::int64_t, std::vector<Member>> cells;
   for (std::size_t i = 0; i < spots_.size (); i++) {
     if (!alive[i])
       continue;
     const Vec3 p = spots_[i].point - middle_;
-    const auto slice = std::int64_t (std::floor (p.y / kUnitHeight));
-    units[slice * kColumns + std::int64_t (turn_of (p) * kColumns)].push_back (
+    const auto slice = std::int64_t (std::floor (p.y / kSliceHeight));
+    cells[slice * kColumns + std::int64_t (turn_of (p) * kColumns)].push_back (
         {std::hypot (p.x, p.z), spots_[i].view});
   }
   std::size_t several = 0;
-  for (auto &[unit, members] : units) {
+  for (auto &[cell, members] : cells) {
     std::ranges::sort (members, {}, &Member::radius);
     bool shared = false;
     for (std::size_t i = 1; i < members.size (); i++)
@@ -159,7 +159,7 @@ Judge::units_double (const std::vector<char> &alive) const
                 members[i].radius - members[i - 1].radius <= kLayerGap;
     several += shared;
   }
-  return double (several) / double (std::max<std::size_t> (1, units.size ()));
+  return double (several) / double (std::max<std::size_t> (1, cells.size ()));
 }
 
 void
@@ -202,7 +202,7 @@ Judge::judge (FrameSet &set) const
   Verdict verdict;
   judge_distance (alive, verdict);
   judge_slice (alive, verdict);
-  verdict.units_double = units_double (alive);
+  verdict.cells_double = cells_double (alive);
   std::size_t open = 0, open_6mm = 0;
   for (std::size_t i = 0; i < visible_.size (); i++) {
     open += !is_covered (i, alive, kAcross);

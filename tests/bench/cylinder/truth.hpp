@@ -14,9 +14,9 @@ namespace bench {
 struct Verdict {
   std::size_t points = 0; ///< that are left
   double removed = 0;     ///< share of the points that were there
-  /** Of the units (4 mm high, 360 round the vertical through the middle of all points) that hold
+  /** Of the cells (4 mm high, 360 round the vertical through the middle of all points) that hold
    *  points, those in which points of several views share a surface (no gap of 3 cm between). */
-  double units_double = 0;
+  double cells_double = 0;
   /** Thickness of the surface in a slice 8 mm high: in each 5 degrees the range from the 10 % to
    *  the 90 % of the points' heights above the true surface. Mean and 95 % of all angles. */
   double thickness_mm = 0, thickness95_mm = 0;
@@ -44,7 +44,7 @@ public:
 private:
   void find_covers (double reach);
   void find_slice (double slice_y);
-  [[nodiscard]] double units_double (const std::vector<char> &alive) const;
+  [[nodiscard]] double cells_double (const std::vector<char> &alive) const;
   void judge_slice (const std::vector<char> &alive, Verdict &verdict) const;
   void judge_distance (const std::vector<char> &alive, Verdict &verdict) const;
   [[nodiscard]] std::vector<char> alive_in (const FrameSet &set) const;

@@ -6,7 +6,6 @@
 
 #include "peers.hpp"
 #include "picture.hpp"
-#include "speed.hpp"
 
 using namespace rangecast;
 
@@ -40,7 +39,7 @@ run_methods (FrameSet &set, const Judge &judge, TruthRow row, const TruthJob &jo
 {
   const Method methods[] = {{"before", [] (FrameSet &) {}, true},
       {"cylinder", cylinder (set.rig, job.settings)}, {"published rule", plain_rule, true},
-      {"voxel grid 4 mm", voxel_grid, true}, {"most frontal camera", frontal_camera, true}};
+      {"voxel grid 4 mm", voxel_grid, true}};
   double uncovered = 0, uncovered_6mm = 0;
   for (const Method &method : methods) {
     row.method = method.name;

@@ -119,7 +119,7 @@ GST_END_TEST;
 
 GST_START_TEST (test_caps_without_a_rig_are_an_error_that_says_so)
 {
-  for (const char *name : {"roiextract", "cylinderfilter", "neighbourcodeenc", "plyenc",
+  for (const char *name : {"roiextract", "cylinderfilter", "rangealign", "neighbourcodeenc", "plyenc",
            "rangesplit", "rangedemux", "striprender"}) {
     const std::string launch =
         std::string ("fakesrc num-buffers=3 sizetype=fixed sizemax=100 ! video/x-range,format="

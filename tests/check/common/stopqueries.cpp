@@ -94,8 +94,8 @@ stop_while_queries_come (const std::string &name)
 
 GST_START_TEST (test_query_does_no_harm_to_an_element_that_stops)
 {
-  for (const char *name :
-      {"cylinderfilter", "neighbourcodedec", "neighbourcodeenc", "plyenc", "roiextract"})
+  for (const char *name : {"cylinderfilter", "neighbourcodedec", "neighbourcodeenc", "plyenc",
+           "rangealign", "roiextract"})
     stop_while_queries_come (name);
 }
 GST_END_TEST;

@@ -246,13 +246,13 @@ GST_START_TEST (test_properties_inside_can_be_set)
 {
   GstElement *element = gst_element_factory_make ("rangerender", nullptr);
   gst_child_proxy_set (
-      GST_CHILD_PROXY (element), "render::auto-orbit", 30.0, "cylinder::columns", 180, nullptr);
+      GST_CHILD_PROXY (element), "render::auto-orbit", 30.0, "align::n-threads", 2, nullptr);
   gdouble orbit = 0;
-  gint columns = 0;
-  gst_child_proxy_get (GST_CHILD_PROXY (element), "render::auto-orbit", &orbit, "cylinder::columns",
-      &columns, nullptr);
+  gint threads = 0;
+  gst_child_proxy_get (GST_CHILD_PROXY (element), "render::auto-orbit", &orbit, "align::n-threads",
+      &threads, nullptr);
   fail_unless_cmp (orbit, ==, 30);
-  fail_unless_equals_int (columns, 180);
+  fail_unless_equals_int (threads, 2);
   gst_object_unref (element);
 }
 GST_END_TEST;
@@ -270,21 +270,21 @@ GST_START_TEST (test_rate_that_downstream_limits_is_kept_to)
 }
 GST_END_TEST;
 
-/* By cylinderfilter's error, which names the field. */
+/* By rangealign's error, which names the field. */
 GST_START_TEST (test_caps_without_a_size_are_named)
 {
   GstHarness *h = gst_harness_new ("rangerender");
   GstBus *bus = gst_bus_new ();
-  GstElement *cylinder = gst_bin_get_by_name (GST_BIN (h->element), "cylinder");
-  gst_element_set_bus (cylinder, bus);
+  GstElement *align = gst_bin_get_by_name (GST_BIN (h->element), "align");
+  gst_element_set_bus (align, bus);
   GstCaps *caps = gst_caps_new_empty_simple ("video/x-range");
   gst_harness_push_event (h, gst_event_new_stream_start ("a"));
   gst_harness_push_event (h, gst_event_new_caps (caps));
   gst_caps_unref (caps);
   const std::string found = next_message_text (bus, GST_MESSAGE_ERROR);
   fail_unless (found.find ("width") != std::string::npos, "'%s'", found.c_str ());
-  gst_element_set_bus (cylinder, nullptr);
-  gst_object_unref (cylinder);
+  gst_element_set_bus (align, nullptr);
+  gst_object_unref (align);
   gst_object_unref (bus);
   gst_harness_teardown (h);
 }

@@ -34,12 +34,12 @@ both (const Surface &a, const Surface &b)
   return [=] (Vec3 o, Vec3 d) { return std::min (a (o, d), b (o, d)); };
 }
 
-/* A square patch 0.1 m before the axis that faces that way (0: +z). */
+/* A square patch that is turned that way (0: faces +z). */
 inline Surface
-patch (double turn_deg, double half = 0.03)
+patch (double turn_deg, Vec3 centre = {0, 0, 0.1}, double half = 0.03)
 {
   const double a = turn_deg * M_PI / 180;
-  const Vec3 normal{std::sin (a), 0, std::cos (a)}, centre{0, 0, 0.1};
+  const Vec3 normal{std::sin (a), 0, std::cos (a)};
   return [=] (Vec3 o, Vec3 d) {
     const double s = dot (centre - o, normal) / dot (d, normal);
     const Vec3 p = o + s * d - centre;
@@ -141,10 +141,10 @@ run (CylinderFilter &filter, Frame &frame, const CylinderSettings &settings = {}
 }
 
 inline CylinderSettings
-vertical_through_origin ()
+about_world_axis ()
 {
   CylinderSettings settings;
-  settings.axis = AxisMode::kFixed;
+  settings.axis = AxisMode::kWorld;
   return settings;
 }
 

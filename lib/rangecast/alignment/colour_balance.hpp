@@ -6,8 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "../geometry/rig.hpp"
 #include "../geometry/view_pairs.hpp"
-#include "colour_cameras.hpp"
+#include "../geometry/world_points.hpp"
 
 namespace rangecast {
 
@@ -33,18 +34,15 @@ public:
    *  level), so that the colours of cameras which agree do not change in any bit. */
   static constexpr float kLeftUndone = 0.002f;
 
-  /** Sets the cameras and resets all gains. */
-  Status set_rig (const Rig &rig);
-  /** Sets other poses; gains are kept. */
-  Status change_rig (const Rig &rig);
+  /** Sets the cameras, of a valid rig; gains are kept. */
+  void set_rig (const Rig &rig);
   void reset ();
 
-  /** Learns from the images' overlaps, and multiplies their colours; depth is only read, and must
-   *  be as it was before overlaps were cleared. Images without colour are left alone.
-   *  The statistics of a pair of views are kept while one of them is missing.
-   *  Nothing is allocated once all views have been seen together.
-   *  @return as ColourCameras::check(), kNoSpace without memory; colours are then untouched */
-  Status process (std::span<const RangeImage> images, int threads);
+  /** Learns from the images' overlaps, and multiplies their colours; depth is only read. Images
+   *  without colour are left alone. The statistics of a pair of views are kept while one of them is
+   *  missing. Nothing is allocated once all views have been seen together.
+   *  @param images  of views of the rig */
+  void process (std::span<const RangeImage> images, int threads);
 
   /** Factors of a view's colours in the last frame. */
   [[nodiscard]] Gains gains (int view_id) const;
@@ -62,6 +60,12 @@ private:
     int first = 0, second = 0; /* view-ids, the smaller one first */
     std::array<Histogram, 3> ratios{};
   };
+  struct Camera {
+    PixelRays rays;
+    PixelLookup lookup;
+    float max_difference = 0; /* of the depth of two views of one surface, depth units */
+    float steepest = 0;       /* change of depth a pixel at 60 degrees, as a share of depth */
+  };
 
   void age (std::span<const RangeImage> images);
   void count_ratios (std::span<const RangeImage> images, std::size_t from);
@@ -70,9 +74,9 @@ private:
   void follow (std::span<const RangeImage> images);
   double middle_of_linked (std::uint64_t views);
 
-  ColourCameras cameras_;
-  std::uint64_t started_ = 0; /* bit i: the log gains of view-id i are known */
-  std::uint64_t linked_ = 0;  /* bit i: view-id i shares surface with another one */
+  std::array<Camera, kMaxViews> cameras_; /* by view-id */
+  std::uint64_t started_ = 0;             /* bit i: the log gains of view-id i are known */
+  std::uint64_t linked_ = 0;              /* bit i: view-id i shares surface with another one */
   std::uint32_t frame_ = 0;
   std::array<Gains, kMaxViews> log_gains_{}; /* by view-id; smoothed */
   std::array<int, kMaxViews> frames_{};      /* by view-id: that its gains were learnt from */

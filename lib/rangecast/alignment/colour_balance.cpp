@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "../base/cholesky.hpp"
-#include "../base/guarded.hpp"
 #include "../base/parallel.hpp"
 
 namespace rangecast {
@@ -18,9 +17,10 @@ constexpr int kFirstSamples = 65536; ///< in the first frame
 constexpr float kBinsPerLog = 400;   ///< so histograms reach from -0.8 to 0.8: 0.45 to 2.2
 constexpr float kMinShared = 30;     ///< shared pixels of a pair that counts
 constexpr float kKept = 0.9f;        ///< weight of older counts in the next frame
-/* Of kMaxDepthDifferenceM. Where stereo is wrong on a shaded surface the colours are always wrong
- * the same way, so places that it has right tell more than many that it has nearly right. */
-constexpr float kSamePlace = 0.3f;
+/* Maximum difference of depth of two views of one place, metres. A third of what stereo errs by:
+ * where it is wrong on a shaded surface the colours are always wrong the same way, so places that
+ * it has right tell more than many that it has nearly right. */
+constexpr double kSamePlaceM = 0.0045;
 constexpr double kMaxShared = 300; ///< more do not add weight to a pair
 /* Pulls gains towards 1 where overlaps say little: as 3 shared pixels. */
 constexpr double kPrior = 0.01;
@@ -37,6 +37,12 @@ log_table ()
   return table;
 }
 
+bool
+has_colour (const RangeImage &image)
+{
+  return !image.depth.empty () && image.colour.same_size (image.depth);
+}
+
 /* Dark pixels have hardly any colour, bright ones may be clipped. Both are tested together, so that
  * no side's ratios are favoured. */
 bool
@@ -48,7 +54,7 @@ are_usable (int a, int b)
 /* Whether the surface about a pixel is seen well enough: all round it, and no more than 60 degrees
  * off. Where a view looks along a surface, or at its edge, stereo errs most, and always the same
  * way: that would pass for a difference in colour.
- *  @param steepest  ColourCameras::Camera::steepest */
+ *  @param steepest  Camera::steepest */
 bool
 is_steady (const RangeImage &image, int x, int y, float steepest)
 {
@@ -115,17 +121,13 @@ multiply (const RangeImage &image, const ColourBalance::Gains &gains)
 
 } // namespace
 
-Status
+void
 ColourBalance::set_rig (const Rig &rig)
 {
-  reset ();
-  return change_rig (rig);
-}
-
-Status
-ColourBalance::change_rig (const Rig &rig)
-{
-  return guarded ("rig", [&] { return cameras_.set (rig); });
+  for (const View &view : rig.views)
+    cameras_[static_cast<std::size_t> (view.id)] = {PixelRays (view), PixelLookup (view),
+        static_cast<float> (kSamePlaceM / view.depth_unit_m),
+        static_cast<float> (std::sqrt (3.0) / view.intrinsics.fx)};
 }
 
 void
@@ -155,31 +157,32 @@ void
 ColourBalance::compare (std::span<const RangeImage> images, std::size_t from, int x, int y)
 {
   const RangeImage &image = images[from];
+  const Camera &camera = cameras_[static_cast<std::size_t> (image.view_id)];
   const std::uint16_t depth = image.depth.at (x, y);
-  if (depth == kInvalidDepth)
-    return;
-  if (!is_steady (image, x, y, cameras_.of[static_cast<std::size_t> (image.view_id)].steepest))
+  if (depth == kInvalidDepth || !is_steady (image, x, y, camera.steepest))
     return;
   float point[3];
-  cameras_.point (image, x, y, depth, point);
-  const Rgbx mine = image.colour.at (x, y);
+  camera.rays.point (
+      static_cast<float> (image.roi.x + x), static_cast<float> (image.roi.y + y), depth, point);
   const auto &logs = log_table ();
-  for (std::size_t j = 0; j < images.size (); j++) {
-    const RangeImage &other = images[j];
-    ColourCameras::Place seen;
-    if (j == from || !has_colour (other) || !cameras_.find (other, point, seen))
+  for (const RangeImage &other : images) {
+    if (other.view_id == image.view_id || !has_colour (other))
       continue;
-    const int column = ColourCameras::column (seen), row = ColourCameras::row (seen);
+    const Camera &seen_by = cameras_[static_cast<std::size_t> (other.view_id)];
+    float u, v, z;
+    seen_by.lookup.find (point, u, v, z);
+    u -= static_cast<float> (other.roi.x);
+    v -= static_cast<float> (other.roi.y);
+    /* False for NaN. */
+    if (!(z > 0 && u >= 0 && v >= 0 && u <= static_cast<float> (other.depth.width - 1) &&
+            v <= static_cast<float> (other.depth.height - 1)))
+      continue;
+    const int column = static_cast<int> (u + 0.5f), row = static_cast<int> (v + 0.5f);
     const std::uint16_t there = other.depth.at (column, row);
-    const float same = cameras_.of[static_cast<std::size_t> (other.view_id)].max_difference;
-    if (there == kInvalidDepth || !(std::abs (seen.depth - there) < kSamePlace * same))
+    if (there == kInvalidDepth || !(std::abs (z - there) < seen_by.max_difference) ||
+        !is_steady (other, column, row, seen_by.steepest))
       continue;
-    if (!is_steady (
-            other, column, row, cameras_.of[static_cast<std::size_t> (other.view_id)].steepest))
-      continue;
-    const Rgbx theirs = other.colour.at (column, row);
-    if (other.view_id == image.view_id)
-      continue;
+    const Rgbx mine = image.colour.at (x, y), theirs = other.colour.at (column, row);
     const bool forward = image.view_id < other.view_id;
     const Rgbx &first = forward ? mine : theirs, &second = forward ? theirs : mine;
     Pair &pair = pairs_.get (image.view_id, other.view_id);
@@ -303,25 +306,20 @@ ColourBalance::gains (int view_id) const
   return gains;
 }
 
-Status
+void
 ColourBalance::process (std::span<const RangeImage> images, int threads)
 {
-  return guarded ("colour balance", [&] () -> Status {
-    if (Status status = cameras_.check (images); !status.ok ())
-      return status;
-    frame_++;
-    if (images.size () > 1) { /* a single view keeps its gains */
-      age (images);
-      for (std::size_t i = 0; i < images.size (); i++)
-        count_ratios (images, i);
-      solve ();
-      follow (images);
-    }
-    in_parallel (images.size (), threads, [&] (std::size_t i) {
-      if (has_colour (images[i]))
-        multiply (images[i], gains (images[i].view_id));
-    });
-    return {};
+  frame_++;
+  if (images.size () > 1) { /* a single view keeps its gains */
+    age (images);
+    for (std::size_t i = 0; i < images.size (); i++)
+      count_ratios (images, i);
+    solve ();
+    follow (images);
+  }
+  in_parallel (images.size (), threads, [&] (std::size_t i) {
+    if (has_colour (images[i]))
+      multiply (images[i], gains (images[i].view_id));
   });
 }
 

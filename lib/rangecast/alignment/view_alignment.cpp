@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "view_agreement.hpp"
+#include "view_alignment.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -7,6 +7,7 @@
 #include <string>
 
 #include "../base/guarded.hpp"
+#include "../base/parallel.hpp"
 
 namespace rangecast {
 
@@ -27,17 +28,17 @@ constexpr double kMaxContradictedAgain = 0.04;
 
 /* Whether a view contradicts those that it is compared with. */
 bool
-contradicts (const PairAgreement &sum, bool left_out)
+contradicts (const PairAgreement &sum, bool skipped)
 {
-  const double max = left_out ? kMaxContradictedAgain : ViewAgreement::kMaxContradicted,
-               min = left_out ? ViewAgreement::kConsistentAgain : ViewAgreement::kMinConsistency;
+  const double max = skipped ? kMaxContradictedAgain : ViewAlignment::kMaxContradicted,
+               min = skipped ? ViewAlignment::kConsistentAgain : ViewAlignment::kMinConsistency;
   return sum.comparable - sum.same > max * sum.points && sum.share () < min;
 }
 
 } // namespace
 
 Status
-ViewAgreement::set_rig (const Rig &rig)
+ViewAlignment::set_rig (const Rig &rig)
 {
   return guarded ("rig", [&] () -> Status {
     if (Status status = validate (rig); !status.ok ())
@@ -47,34 +48,37 @@ ViewAgreement::set_rig (const Rig &rig)
     for (std::size_t i = 0; i < rig.views.size (); i++)
       index_[static_cast<std::size_t> (rig.views[i].id)] = static_cast<int> (i);
     poses_.set_rig (rig);
+    balance_.set_rig (rig);
     reset ();
     return {};
   });
 }
 
 void
-ViewAgreement::reset ()
+ViewAlignment::reset ()
 {
   rig_ = nominal_;
   poses_.reset ();
+  balance_.set_rig (rig_);
+  balance_.reset ();
   of_.fill ({});
-  gains_.fill (std::nullopt);
   frame_ = changed_at_ = 0;
   evaluated_ = corrected_ = rig_changed_ = false;
 }
 
 const View &
-ViewAgreement::view_of (const RangeImage &image) const
+ViewAlignment::view_of (const RangeImage &image) const
 {
   const int index = index_[static_cast<std::size_t> (image.view_id)];
   return rig_.views[static_cast<std::size_t> (index)];
 }
 
-/* Corrects the rig by the poses that are known, if that makes a difference. */
+/* Corrects the rig by the poses that are known, if that makes a difference.
+ * @param was_evaluated  before this frame set; the first correction need not wait */
 void
-ViewAgreement::correct_rig (bool poses)
+ViewAlignment::correct_rig (bool poses, bool was_evaluated)
 {
-  if (evaluated_ && frame_ - changed_at_ < kChangeEvery)
+  if (was_evaluated && frame_ - changed_at_ < kChangeEvery)
     return;
   double largest = 0, change = 0;
   for (const View &view : nominal_.views)
@@ -97,13 +101,16 @@ ViewAgreement::correct_rig (bool poses)
     rig_.views[i].world_from_view =
         corrects ? poses_.corrected (view.world_from_view, used) : view.world_from_view;
   }
+  if (!validate (rig_).ok ()) /* never: corrections are small, rotations orthonormal */
+    rig_ = nominal_;
+  balance_.set_rig (rig_);
   corrected_ = corrects;
   changed_at_ = frame_;
   rig_changed_ = true;
 }
 
 PairAgreement
-ViewAgreement::agreement_among (int id, std::uint64_t trusted) const
+ViewAlignment::agreement_among (int id, std::uint64_t trusted) const
 {
   PairAgreement sum;
   for (std::uint64_t rest = trusted & ~(std::uint64_t{1} << id); rest; rest &= rest - 1)
@@ -113,7 +120,7 @@ ViewAgreement::agreement_among (int id, std::uint64_t trusted) const
 
 /* Points of these views that contradict each other; each pair counts twice. */
 double
-ViewAgreement::contradictions_of (std::uint64_t views) const
+ViewAlignment::contradictions_of (std::uint64_t views) const
 {
   double sum = 0;
   for (std::uint64_t rest = views; rest; rest &= rest - 1) {
@@ -125,7 +132,7 @@ ViewAgreement::contradictions_of (std::uint64_t views) const
 
 /* Whether two of these views confirm each other. */
 bool
-ViewAgreement::has_good_pair (std::uint64_t trusted) const
+ViewAlignment::has_good_pair (std::uint64_t trusted) const
 {
   for (std::uint64_t a = trusted; a; a &= a - 1)
     for (std::uint64_t b = a & (a - 1); b; b &= b - 1) {
@@ -136,10 +143,10 @@ ViewAgreement::has_good_pair (std::uint64_t trusted) const
   return false;
 }
 
-/* Finds the views to leave out: of those that are contradicted, first the one without which the
+/* Finds the views to skip: of those that are contradicted, first the one without which the
  * others contradict each other least. */
 void
-ViewAgreement::evaluate_views (std::span<const RangeImage> images)
+ViewAlignment::evaluate_views (std::span<const RangeImage> images)
 {
   std::uint64_t all = 0;
   for (const RangeImage &image : images)
@@ -150,7 +157,7 @@ ViewAgreement::evaluate_views (std::span<const RangeImage> images)
     double min = std::numeric_limits<double>::max ();
     for (std::uint64_t rest = trusted; rest; rest &= rest - 1) {
       const int id = std::countr_zero (rest);
-      if (!contradicts (agreement_among (id, trusted), of_[static_cast<std::size_t> (id)].left_out))
+      if (!contradicts (agreement_among (id, trusted), of_[static_cast<std::size_t> (id)].skipped))
         continue;
       const std::uint64_t others = trusted & ~(std::uint64_t{1} << id);
       if (const double left = contradictions_of (others); left < min && has_good_pair (others))
@@ -163,77 +170,77 @@ ViewAgreement::evaluate_views (std::span<const RangeImage> images)
   /* A view whose only disagreement was with a bad one is kept. */
   for (std::uint64_t rest = all & ~trusted; rest; rest &= rest - 1) {
     const int id = std::countr_zero (rest);
-    if (!contradicts (agreement_among (id, trusted), of_[static_cast<std::size_t> (id)].left_out))
+    if (!contradicts (agreement_among (id, trusted), of_[static_cast<std::size_t> (id)].skipped))
       trusted |= std::uint64_t{1} << id;
   }
   for (std::uint64_t rest = all; rest; rest &= rest - 1) {
     const int id = std::countr_zero (rest);
     ViewConsistency &view = of_[static_cast<std::size_t> (id)];
     view.consistency = agreement_among (id, trusted).share ();
-    view.left_out = !(trusted >> id & 1);
+    view.skipped = !(trusted >> id & 1);
   }
 }
 
-/* Clears contradicted points, and moves depth of one surface together. */
-void
-ViewAgreement::fuse (std::span<const RangeImage> images, const AgreementSettings &settings)
+/* Colours of two views are compared only if both have gains: cameras that are not balanced see one
+ * colour differently. */
+std::optional<ColourBalance::Gains>
+ViewAlignment::gains_of (int view_id, bool balanced) const
 {
-  fused_.clear ();
-  for (std::size_t i = 0; i < images.size (); i++) {
-    const View &view = view_of (images[i]);
-    fused_.push_back ({images[i], &planes_[i], PixelRays (view), PixelLookup (view),
-        static_cast<float> (view.intrinsics.fx), static_cast<float> (view.depth_unit_m),
-        gains_[static_cast<std::size_t> (images[i].view_id)]});
-  }
-  if (settings.points) {
-    in_parallel (images.size (), settings.threads,
-        [&] (std::size_t i) { contradicted_[i].find (fused_, i); });
-    for (std::size_t i = 0; i < images.size (); i++)
-      contradicted_points_ += contradicted_[i].clear (images[i], planes_[i]);
-  }
-  if (!settings.depth)
-    return;
-  workers_.reserve (workers_for (images.size (), settings.threads));
-  in_parallel (images.size (), settings.threads,
-      [&] (std::size_t i, std::size_t worker) { workers_.of (worker).process (fused_, i); });
+  return balanced && balance_.has_gains (view_id) ? std::optional (balance_.gains (view_id))
+                                                  : std::nullopt;
 }
 
 void
-ViewAgreement::work (std::span<const RangeImage> images, const AgreementSettings &settings)
+ViewAlignment::clear_contradicted (std::span<const RangeImage> images, int threads)
 {
-  const bool several = images.size () > 1,
-             learns = several && (settings.poses || settings.views) && frame_ % kLearnEvery == 0;
-  if (learns || (several && settings.depth))
-    in_parallel (images.size (), settings.threads, [&] (std::size_t i) {
-      planes_[i].make (images[i], static_cast<float> (view_of (images[i]).intrinsics.fx));
-    });
-  if (learns) {
-    aligned_.clear ();
-    for (std::size_t i = 0; i < images.size (); i++)
-      aligned_.push_back (
-          {images[i], &planes_[i], gains_[static_cast<std::size_t> (images[i].view_id)]});
-    poses_.learn (aligned_);
-    evaluate_views (images);
-  }
-  correct_rig (settings.poses);
-  evaluated_ = evaluated_ || learns;
+  balanced_.clear ();
+  for (const RangeImage &image : images)
+    balanced_.push_back ({image, PixelRays (view_of (image)), PixelLookup (view_of (image)),
+        gains_of (image.view_id, true)});
+  in_parallel (
+      images.size (), threads, [&] (std::size_t i) { contradicted_[i].find (balanced_, i); });
+  for (std::size_t i = 0; i < images.size (); i++)
+    contradicted_points_ += contradicted_[i].clear (images[i]);
+}
+
+void
+ViewAlignment::learn (std::span<const RangeImage> images, const AlignmentSettings &settings)
+{
+  in_parallel (images.size (), settings.threads, [&] (std::size_t i) {
+    planes_[i].make (images[i], static_cast<float> (view_of (images[i]).intrinsics.fx));
+  });
+  aligned_.clear ();
+  for (std::size_t i = 0; i < images.size (); i++)
+    aligned_.push_back ({images[i], &planes_[i], gains_of (images[i].view_id, settings.colours)});
+  poses_.learn (aligned_);
+  evaluate_views (images);
+  evaluated_ = true;
+}
+
+/* Colours last: the corrected rig finds the same places in other views, and what a view is compared
+ * by here are the gains of the frame before. */
+void
+ViewAlignment::work (std::span<const RangeImage> images, const AlignmentSettings &settings)
+{
+  const bool several = images.size () > 1, was_evaluated = evaluated_;
+  if (several && (settings.poses || settings.views) && frame_ % kLearnEvery == 0)
+    learn (images, settings);
+  correct_rig (settings.poses, was_evaluated);
   frame_ += evaluated_;
   if (!several || !settings.views)
     for (ViewConsistency &view : of_)
-      view.left_out = false;
-  for (std::size_t i = 0; i < images.size (); i++) {
-    if (!of_[static_cast<std::size_t> (images[i].view_id)].left_out)
-      continue;
-    for (int y = 0; y < images[i].depth.height; y++)
-      std::fill_n (images[i].depth.row (y), images[i].depth.width, kInvalidDepth);
-    planes_[i].clear ();
-  }
-  if (several && (settings.points || settings.depth))
-    fuse (images, settings);
+      view.skipped = false;
+  for (const RangeImage &image : images)
+    for (int y = 0; y < image.depth.height && view (image.view_id).skipped; y++)
+      std::fill_n (image.depth.row (y), image.depth.width, kInvalidDepth);
+  if (several && settings.points && settings.colours)
+    clear_contradicted (images, settings.threads);
+  if (settings.colours)
+    balance_.process (images, settings.threads);
 }
 
 Status
-ViewAgreement::process (std::span<const RangeImage> images, const AgreementSettings &settings)
+ViewAlignment::process (std::span<const RangeImage> images, const AlignmentSettings &settings)
 {
   rig_changed_ = false;
   contradicted_points_ = 0;
