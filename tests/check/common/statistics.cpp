@@ -469,7 +469,7 @@ GST_START_TEST (test_counters_start_over_with_each_start)
       nullptr);
   fail_unless (pipeline != nullptr);
   GstElement *source = gst_bin_get_by_name (GST_BIN (pipeline), "source");
-  for (const char *name : {"roi", "enc", "pay", "depay", "dec", "filter", "mux"}) {
+  for (const char *name : {"roi", "enc", "pay", "depay", "dec", "align", "filter", "mux"}) {
     GstElement *element = gst_bin_get_by_name (GST_BIN (pipeline), name);
     g_object_set (element, "stats-interval", 3600000u, nullptr);
     gst_object_unref (element);
