@@ -200,20 +200,6 @@ GST_START_TEST (test_recording_starts_with_the_first_key_frame_set)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_recording_does_not_start_with_a_frame_set_before_its_segment)
-{
-  Step step ("sink_0");
-  const GstClockTime begin = 900 * GST_SECOND;
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  segment.start = 100 * kMs;
-  gst_harness_push_event (step.picture, gst_event_new_segment (&segment));
-  fail_if (GST_CLOCK_TIME_IS_VALID (pass (step.picture, 33 * kMs, begin, kFrameSet)));
-  fail_unless_equals_uint64 (pass (step.picture, 133 * kMs, begin + 100 * kMs, kFrameSet), 0);
-  fail_unless_equals_uint64 (pass (step.sound, 70 * kMs, begin + 120 * kMs, kRtp), 20 * kMs);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_recording_without_a_start_is_a_warning)
 {
   Step step ("sink_1");
@@ -228,26 +214,6 @@ GST_START_TEST (test_recording_without_a_start_is_a_warning)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_start_with_another_name_than_a_pad_is_an_error)
-{
-  GstElement *element = gst_element_factory_make ("capturesync", nullptr);
-  GstBus *bus = gst_bus_new ();
-  gst_element_set_bus (element, bus);
-  g_object_set (element, "start-with", "nosuch", nullptr);
-  GstPad *pad = gst_element_request_pad_simple (element, "sink_0");
-  fail_unless_equals_int (
-      gst_element_set_state (element, GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
-  const std::string text = next_message_text (bus, GST_MESSAGE_ERROR, 0);
-  fail_unless (text == "start-with: no pad 'nosuch'; expected one of sink_0", "%s", text.c_str ());
-  gst_element_set_state (element, GST_STATE_NULL);
-  gst_element_release_request_pad (element, pad);
-  gst_object_unref (pad);
-  gst_element_set_bus (element, nullptr);
-  gst_object_unref (bus);
-  gst_object_unref (element);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_recording_leaves_out_what_another_clock_captured)
 {
   Step step ("sink_0");
@@ -257,14 +223,11 @@ GST_START_TEST (test_recording_leaves_out_what_another_clock_captured)
   for (GstClockTime other :
       {begin + 3600 * GST_SECOND, begin + 5 * GST_SECOND}) /* restarted hosts */
     fail_if (GST_CLOCK_TIME_IS_VALID (pass (step.sound, 90 * kMs, other, kRtp)));
-  const std::string text = next_message_text (step.bus, GST_MESSAGE_WARNING, 0);
-  fail_unless (text.starts_with ("sink_1: dropping buffers"), "%s", text.c_str ());
-  fail_unless (next_message_text (step.bus, GST_MESSAGE_WARNING, 0).empty ());
   fail_unless_equals_uint64 (pass (step.sound, 110 * kMs, begin + 60 * kMs, kRtp), 60 * kMs);
 }
 GST_END_TEST;
 
-GST_START_TEST (test_stream_that_has_ended_holds_nobody_up)
+GST_START_TEST (test_stream_that_has_ended_delays_no_other)
 {
   Step step;
   for (GstEventType end : {GST_EVENT_EOS, GST_EVENT_UNKNOWN}) { /* or is only silent */
@@ -359,11 +322,9 @@ capturesync_suite ()
   tcase_add_test (tc, test_streams_of_different_clocks_pass_with_one_warning);
   tcase_add_test (tc, test_buffers_without_capture_time_pass_with_one_warning);
   tcase_add_test (tc, test_recording_starts_with_the_first_key_frame_set);
-  tcase_add_test (tc, test_recording_does_not_start_with_a_frame_set_before_its_segment);
   tcase_add_test (tc, test_recording_without_a_start_is_a_warning);
-  tcase_add_test (tc, test_start_with_another_name_than_a_pad_is_an_error);
   tcase_add_test (tc, test_recording_leaves_out_what_another_clock_captured);
-  tcase_add_test (tc, test_stream_that_has_ended_holds_nobody_up);
+  tcase_add_test (tc, test_stream_that_has_ended_delays_no_other);
   tcase_add_test (tc, test_streams_whose_clocks_part_are_discontinuous);
   tcase_add_test (tc, test_gap_moves_with_its_stream);
   tcase_add_test (tc, test_pads_come_in_pairs_and_go);
