@@ -8,8 +8,6 @@
 
 #include "camera/aravis/debug.hpp"
 
-using rangecast::FrameSets;
-
 namespace {
 
 /* A camera that has not answered a trigger after this time will not. */
@@ -29,17 +27,6 @@ timestamp (const CameraFrame &frame)
 
 } // namespace
 
-FramePairing::FramePairing (GstElement *element) : element_ (element)
-{
-  for (WaitingFrame &waiting : frames_)
-    waiting.next_free = std::exchange (free_, &waiting);
-}
-
-FramePairing::~FramePairing ()
-{
-  drop_waiting ();
-}
-
 void
 FramePairing::configure (
     int cameras, TriggeredBy by, GstClockTime period_ns, GstClockTime exposure_ns, int max_waiting)
@@ -47,7 +34,7 @@ FramePairing::configure (
   drop_waiting ();
   std::lock_guard guard (lock_);
   cameras_ = cameras;
-  max_waiting_ = max_waiting;
+  max_waiting_ = std::clamp (max_waiting, 1, kMaxWaiting);
   by_ = by;
   period_ns_ = static_cast<std::int64_t> (period_ns > 0 ? period_ns : GST_SECOND);
   exposure_ns_ = static_cast<std::int64_t> (exposure_ns);
@@ -59,13 +46,12 @@ FramePairing::reset ()
   drop_waiting ();
   std::lock_guard guard (lock_);
   tolerance_ns_ = period_ns_ / 2;
-  sets_.start (cameras_, by_ == TriggeredBy::kElement ? 0 : tolerance_ns_, max_waiting_);
   intervals_.reset ();
   counted_intervals_ = 0;
   clocks_are_off_ = false;
   for (int c = 0; c < kMaxCameras; c++) {
     matchers_[c].start (period_ns_);
-    associators_[c].start (period_ns_);
+    lanes_[c].last_key.reset ();
     clocks_[c].reset ();
     offsets_ns_[c].reset ();
     answered_[c] = last_frame_ns_[c] = last_taken_ns_[c] = 0;
@@ -82,11 +68,9 @@ void
 FramePairing::drop_waiting ()
 {
   std::lock_guard guard (lock_);
-  FrameSets::Set frames;
-  while (sets_.drain (frames) == FrameSets::Step::kDrop)
-    for (FrameSets::Frame frame : frames.frames)
-      if (frame)
-        release (static_cast<WaitingFrame *> (frame));
+  for (int c = 0; c < kMaxCameras; c++)
+    while (lanes_[c].count > 0)
+      pop (c);
 }
 
 void
@@ -246,12 +230,6 @@ FramePairing::capture_time (int camera, const CameraFrame &frame)
   std::optional<std::int64_t> taken_ns;
   if (frame.buffer || frame.camera_time_ns > 0) /* otherwise it timed out long after its arrival */
     taken_ns = exposed_ns ? *exposed_ns : arrived_ns - exposure_ns_;
-  if (by_ == TriggeredBy::kCamera)
-    return taken_ns;
-  if (camera > 0)
-    return associators_[camera].place (frame.number, taken_ns, exposed_ns.has_value ());
-  for (int c = 1; taken_ns && c < cameras_; c++)
-    associators_[c].leader (frame.number, *taken_ns);
   return taken_ns;
 }
 
@@ -284,36 +262,32 @@ FramePairing::update_tolerance (int camera, std::int64_t taken_ns)
   intervals_.add (taken_ns - last_ns);
   if (++counted_intervals_ % 16 == 0)
     tolerance_ns_ = std::clamp (intervals_.quantile (0.25), period_ns_ / 8, period_ns_) / 2;
-  sets_.set_tolerance (tolerance_ns_);
 }
 
 /* @param key  trigger number, or taken_ns */
 void
 FramePairing::queue (int camera, std::int64_t key, CameraFrame frame, std::int64_t taken_ns)
 {
-  WaitingFrame *waiting = nullptr;
-  if (frame.buffer && free_) { /* FrameSets keeps fewer than there are */
-    const std::int64_t exposed_ns = exposure_time (camera, frame).value_or (taken_ns);
-    waiting = std::exchange (free_, free_->next_free);
-    waiting->frame = std::move (frame);
-    waiting->taken_ns = taken_ns;
-    waiting->exposed_ns = exposed_ns;
-  } else if (frame.buffer) {
-    counters_.dropped[camera]++;
-  }
-  if (auto refused = static_cast<WaitingFrame *> (sets_.put (camera, key, waiting))) {
-    counters_.dropped[camera]++;
+  Lane &lane = lanes_[camera];
+  if (lane.count == lane.ring.size () || (lane.last_key && key <= *lane.last_key)) {
+    counters_.dropped[camera] += frame.buffer != nullptr;
     GST_DEBUG_OBJECT (element_, "camera %d: image %" G_GUINT64_FORMAT " dropped: out of order",
-        camera, guint64 (refused->frame.number));
-    release (refused);
+        camera, guint64 (frame.number));
+    return;
   }
+  lane.last_key = key;
+  const std::int64_t exposed_ns = exposure_time (camera, frame).value_or (taken_ns);
+  lane.ring[(lane.first + lane.count++) % lane.ring.size ()] = {
+      std::move (frame), key, taken_ns, exposed_ns};
 }
 
 void
-FramePairing::release (WaitingFrame *waiting)
+FramePairing::pop (int camera)
 {
-  waiting->frame.buffer.reset ();
-  waiting->next_free = std::exchange (free_, waiting);
+  Lane &lane = lanes_[camera];
+  lane.front ().frame.buffer.reset ();
+  lane.first = (lane.first + 1) % lane.ring.size ();
+  lane.count--;
 }
 
 /* ---- sets ---- */
@@ -322,59 +296,79 @@ bool
 FramePairing::next_set (ImageSet &set)
 {
   std::lock_guard guard (lock_);
-  FrameSets::Set frames;
-  for (;;)
-    switch (sets_.next (frames)) {
-      case FrameSets::Step::kWait:
-        return false;
-      case FrameSets::Step::kDrop:
-        drop (frames, "no partner");
-        break;
-      case FrameSets::Step::kSet:
-        if (complete (frames, set))
-          return true;
+  std::array<MatchStream *, kMaxCameras> heads{};
+  for (int c = 0; c < cameras_; c++)
+    heads[c] = &lanes_[c].head;
+  const auto streams = std::span (heads).first (static_cast<std::size_t> (cameras_));
+  const GstClockTime tolerance =
+      by_ == TriggeredBy::kElement ? 0 : static_cast<GstClockTime> (tolerance_ns_);
+  for (;;) {
+    bool timeout = false; /* a camera's frames have waited long enough */
+    for (int c = 0; c < cameras_; c++) {
+      Lane &lane = lanes_[c];
+      lane.head.required = true;
+      lane.head.head = lane.count == 0              ? MatchStream::Head::kMissing
+                       : lane.front ().frame.buffer ? MatchStream::Head::kFrame
+                                                    : MatchStream::Head::kGap;
+      if (lane.count > 0)
+        lane.head.time = lane.head.end = static_cast<GstClockTime> (lane.front ().key);
+      timeout |= lane.count > static_cast<std::size_t> (max_waiting_);
     }
+    MatchStream *dropped = nullptr;
+    switch (match_streams (streams, tolerance, timeout, dropped)) {
+      case MatchStep::kDrop:
+        drop (static_cast<int> (std::ranges::find (streams, dropped) - streams.begin ()),
+            "no partner");
+        break;
+      case MatchStep::kSet:
+        if (complete (set))
+          return true;
+        break;
+      default:
+        return false;
+    }
+  }
 }
 
 /* @return false: exposed too far apart to be one set; it is dropped */
 bool
-FramePairing::complete (FrameSets::Set &frames, ImageSet &set)
+FramePairing::complete (ImageSet &set)
 {
-  const auto waiting = [&] (int c) { return static_cast<WaitingFrame *> (frames.frames[c]); };
+  const auto front = [this] (int c) -> WaitingFrame & { return lanes_[c].front (); };
   std::int64_t spread_ns = 0, apart_ns = 0;
   for (int c = 1; c < cameras_; c++)
     for (int d = 0; d < c; d++) {
-      spread_ns =
-          std::max (spread_ns, std::abs (waiting (c)->exposed_ns - waiting (d)->exposed_ns));
-      apart_ns = std::max (apart_ns, std::abs (waiting (c)->taken_ns - waiting (d)->taken_ns));
+      spread_ns = std::max (spread_ns, std::abs (front (c).exposed_ns - front (d).exposed_ns));
+      apart_ns = std::max (apart_ns, std::abs (front (c).taken_ns - front (d).taken_ns));
     }
   if (apart_ns > tolerance_ns_) {
-    drop (frames, "exposed too far apart from its partners");
+    for (int c = 0; c < cameras_; c++)
+      drop (c, "exposed too far apart from its partners");
     counters_.apart++;
     return false;
   }
   spread_.add (spread_ns);
-  set.trigger_time = by_ == TriggeredBy::kElement ? triggers_[frames.keys[0] % kMaxTriggers].time
+  set.trigger_time = by_ == TriggeredBy::kElement ? triggers_[front (0).key % kMaxTriggers].time
                                                   : GST_CLOCK_TIME_NONE;
-  set.taken_ns = waiting (0)->taken_ns;
+  set.taken_ns = front (0).taken_ns;
   for (int c = 0; c < cameras_; c++) {
-    set.images[c] = std::move (waiting (c)->frame.buffer);
-    release (waiting (c));
+    set.images[c] = std::move (front (c).frame.buffer);
+    pop (c);
   }
   counters_.sets++;
   return true;
 }
 
 void
-FramePairing::drop (FrameSets::Set &frames, const char *reason)
+FramePairing::drop (int camera, const char *reason)
 {
-  for (int c = 0; c < cameras_; c++)
-    if (auto waiting = static_cast<WaitingFrame *> (frames.frames[c])) {
-      counters_.dropped[c]++;
-      GST_DEBUG_OBJECT (element_, "camera %d: image %" G_GUINT64_FORMAT " dropped: %s", c,
-          guint64 (waiting->frame.number), reason);
-      release (waiting);
-    }
+  const WaitingFrame &waiting = lanes_[camera].front ();
+  if (waiting.frame.buffer) {
+    counters_.dropped[camera]++;
+    GST_DEBUG_OBJECT (element_, "camera %d: image %" G_GUINT64_FORMAT " dropped: %s", camera,
+        guint64 (waiting.frame.number), reason);
+  }
+  pop (camera);
 }
 
 /* ---- statistics ---- */

@@ -5,15 +5,12 @@
 
 #include "camera/aravis/frame.hpp"
 #include "camera/aravis/settings.hpp"
+#include "common/matcher.hpp"
 #include <array>
 #include <mutex>
 #include <optional>
 #include <rangecast/sync/camera_clock.hpp>
-#include <rangecast/sync/frame_associator.hpp>
-#include <rangecast/sync/frame_sets.hpp>
 #include <rangecast/sync/trigger_matcher.hpp>
-
-using rangecast::kMaxCameras;
 
 /** Images of all cameras that were exposed at the same time. */
 struct ImageSet {
@@ -40,10 +37,12 @@ struct PairingStatistics {
 class FramePairing {
 public:
   /** @param element  for log messages; outlives this; may be null */
-  explicit FramePairing (GstElement *element = nullptr);
-  ~FramePairing ();
+  explicit FramePairing (GstElement *element = nullptr) : element_ (element) {}
   FramePairing (const FramePairing &) = delete;
   FramePairing &operator= (const FramePairing &) = delete;
+
+  /** A partner more than so many frames late is not waited for. */
+  static constexpr int kMaxWaiting = 8;
 
   enum class TriggeredBy {
     kElement,  ///< this element, which reports each trigger with add_trigger()
@@ -53,7 +52,7 @@ public:
 
   /** @param period_ns    frame period; 0 for single shots
    *  @param exposure_ns  as far as it is known
-   *  @param max_waiting  images of one camera that may wait for partners */
+   *  @param max_waiting  images of one camera that may wait for partners, 1 to kMaxWaiting */
   void configure (int cameras, TriggeredBy by, GstClockTime period_ns, GstClockTime exposure_ns,
       int max_waiting);
   /** Drops frames and what was learnt about delays and clocks; keeps the counters. */
@@ -85,18 +84,26 @@ public:
   PairingStatistics stats ();
 
 private:
-  /** A frame that waits for its partners, in a pool of fixed size. */
+  /** A frame that waits for its partners; without a buffer it was lost, and they need not wait. */
   struct WaitingFrame {
     CameraFrame frame;
+    std::int64_t key = 0;        ///< number of its trigger, or taken_ns
     std::int64_t taken_ns = 0;   ///< comparable between cameras; decides
     std::int64_t exposed_ns = 0; ///< by the cameras' clocks if known; for statistics
-    WaitingFrame *next_free = nullptr;
+  };
+  /** The frames of one camera that wait, in order of their keys. */
+  struct Lane {
+    std::array<WaitingFrame, kMaxWaiting + 1> ring; ///< next_set() keeps at most kMaxWaiting
+    std::size_t first = 0, count = 0;
+    std::optional<std::int64_t> last_key;
+    MatchStream head;
+    WaitingFrame &front () { return ring[first]; }
   };
   struct Trigger {
     GstClockTime time = 0;    ///< on the pipeline clock
     std::int64_t sent_ns = 0; ///< g_get_monotonic_time
   };
-  static constexpr int kMaxFrames = 40, kMaxTriggers = 64, kMaxLearningTriggers = 8;
+  static constexpr int kMaxTriggers = 64, kMaxLearningTriggers = 8;
 
   void add_triggered_frame (int camera, CameraFrame frame);
   void add_timed_frame (int camera, CameraFrame frame);
@@ -104,9 +111,9 @@ private:
   std::optional<std::int64_t> exposure_time (int camera, const CameraFrame &frame);
   void update_tolerance (int camera, std::int64_t taken_ns);
   void queue (int camera, std::int64_t key, CameraFrame frame, std::int64_t taken_ns);
-  bool complete (rangecast::FrameSets::Set &frames, ImageSet &set);
-  void drop (rangecast::FrameSets::Set &frames, const char *reason);
-  void release (WaitingFrame *waiting);
+  bool complete (ImageSet &set);
+  void pop (int camera);
+  void drop (int camera, const char *reason);
   [[nodiscard]] std::int64_t answer_timeout () const;
   [[nodiscard]] bool all_answered () const;
 
@@ -117,10 +124,7 @@ private:
   TriggeredBy by_ = TriggeredBy::kCamera;
   std::int64_t period_ns_ = 0, exposure_ns_ = 0;
 
-  /* Frames that wait for partners, keyed by trigger number or by time. */
-  rangecast::FrameSets sets_;
-  std::array<WaitingFrame, kMaxFrames> frames_;
-  WaitingFrame *free_ = nullptr;
+  std::array<Lane, kMaxCameras> lanes_;
   std::int64_t tolerance_ns_ = 0; ///< half of the time between images
   rangecast::RecentValues intervals_;
   unsigned counted_intervals_ = 0;
@@ -136,7 +140,6 @@ private:
   bool answers_owed_ = false; ///< while delays are learnt, late answers to older triggers may come
 
   /* Without triggers of this element: when frames were exposed. */
-  std::array<rangecast::FrameAssociator, kMaxCameras> associators_; ///< all but the left camera's
   std::array<rangecast::CameraClock, kMaxCameras> clocks_;
   std::array<std::optional<std::int64_t>, kMaxCameras> offsets_ns_;
   bool clocks_are_off_ = false;

@@ -182,7 +182,7 @@ StereoCamSettings::find_names (CameraNames &found) const
                                        " camera: expected property " +
                                        (found[0].empty () ? "left" : "right") +
                                        ", or rig with a file that names the cameras"};
-  for (int i = 0; i < rangecast::kMaxCameras; i++)
+  for (int i = 0; i < kMaxCameras; i++)
     for (int j = 0; j < i; j++)
       if (found[i] == found[j])
         return {StatusCode::kBadValue,

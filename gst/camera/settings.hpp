@@ -3,16 +3,16 @@
 
 #include <gst/gst.h>
 
+#include "camera/aravis/frame.hpp"
 #include "camera/aravis/settings.hpp"
 #include <array>
 #include <rangecast/base/status.hpp>
 #include <rangecast/geometry/rig.hpp>
-#include <rangecast/sync/frame_sets.hpp>
 #include <string>
 
 #include "common/properties.hpp"
 
-using CameraNames = std::array<std::string, rangecast::kMaxCameras>; ///< left, right, third
+using CameraNames = std::array<std::string, kMaxCameras>; ///< left, right, third
 
 /** The cameras of a rig's view; empty where it names none. */
 inline CameraNames

@@ -211,6 +211,8 @@ set_source_caps (GstBaseParse *base)
 {
   Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
   stream.src_caps_set = false;
+  if (!require_downstream (GST_ELEMENT (base), GST_BASE_PARSE_SRC_PAD (base), false))
+    return false;
   gst_pad_check_reconfigure (GST_BASE_PARSE_SRC_PAD (base)); /* clears the flag */
   /* Decoders that decodebin plugs later take access units. */
   const char *alignment = preferred_alignment (
@@ -220,8 +222,6 @@ set_source_caps (GstBaseParse *base)
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
   stream.src_caps_set = gst_pad_set_caps (GST_BASE_PARSE_SRC_PAD (base), caps);
   gst_caps_unref (caps);
-  if (!stream.src_caps_set)
-    require_downstream (GST_ELEMENT (base), GST_BASE_PARSE_SRC_PAD (base));
   gst_base_parse_set_frame_rate (base, guint (stream.info.fps_n), guint (stream.info.fps_d), 0, 0);
   GstTagList *tags = gst_tag_list_new (GST_TAG_VIDEO_CODEC, "Neighbour code", nullptr);
   gst_base_parse_merge_tags (base, tags, GST_TAG_MERGE_REPLACE);

@@ -17,14 +17,14 @@ media_types (const GstCaps *caps)
 }
 
 bool
-require_downstream (GstElement *element, GstPad *src)
+require_downstream (GstElement *element, GstPad *src, bool strict)
 {
   GstPad *peer = GST_PAD_IS_FLUSHING (src) ? nullptr : gst_pad_get_peer (src);
   if (!peer)
     return true;
   GstCaps *own = gst_pad_get_pad_template_caps (src), *taken = gst_pad_query_caps (peer, nullptr);
   const std::string output = media_types (own), accepted = media_types (taken);
-  bool fits = gst_caps_is_any (taken);
+  bool fits = gst_caps_is_any (taken) || (!strict && gst_caps_is_empty (taken));
   for (guint i = 0; i < gst_caps_get_size (own); i++)
     fits |= accepted.find (gst_structure_get_name (gst_caps_get_structure (own, i))) !=
             std::string::npos;

@@ -4,8 +4,10 @@
 #include <gst/base/gstaggregator.h>
 
 /** Posts an error that says what to add, if the peer of a source pad accepts none of the media
- * types that the pad outputs. @return whether it accepts one, or the pad is flushing or unlinked */
-bool require_downstream (GstElement *element, GstPad *src);
+ *  types that the pad outputs.
+ *  @param strict  false: no error if the peer accepts nothing at all, because it will say why
+ *  @return whether it accepts one, or the pad is flushing or unlinked */
+bool require_downstream (GstElement *element, GstPad *src, bool strict = true);
 
 /** GstAggregator's default negotiate(), after require_downstream(). */
 gboolean negotiate_downstream (GstAggregator *aggregator);

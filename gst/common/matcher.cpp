@@ -192,7 +192,9 @@ FrameMatcher::drop (std::size_t index, GstClockTime tolerance)
     if (++unmatched_ == kMaxUnmatched && !std::exchange (warned_unmatched_, true))
       GST_ELEMENT_WARNING (element_, STREAM, FAILED,
           ("Images of pads %s and %s do not pair up: their times must differ by at most half a "
-           "frame, or 5 ms if the caps have no framerate",
+           "frame, or 5 ms if the caps have no framerate, and live ones must arrive within 0.5 s "
+           "of "
+           "each other, or latency must be raised",
               names_[0], names_[1]),
           ("the last %d images found no partner", int (kMaxUnmatched)));
   }

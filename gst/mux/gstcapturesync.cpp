@@ -18,15 +18,16 @@
  */
 #include "gstcapturesync.h"
 
+#include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <mutex>
-#include <new>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "capturealignment.hpp"
 #include "common/capturetime.hpp"
 #include "common/elementproperties.hpp"
 
@@ -35,9 +36,29 @@ GST_DEBUG_CATEGORY_STATIC (gst_capture_sync_debug);
 
 namespace {
 
+/* A lag that differs by more than this from before is that of another sender or clock. */
+constexpr gint64 kOtherClock = 500 * GST_MSECOND;
+/* Less than this is followed without a step. Viewers notice sound that is 45 ms early or 125 ms
+ * late (ITU-R BT.1359, detectability). */
+constexpr gint64 kStep = 10 * GST_MSECOND;
+/* A stream that has been silent for so long may come back from another host, and delays no other.
+ */
+constexpr GstClockTime kSilence = 5 * GST_SECOND;
+/* Shares of a difference by which a lag, and the common lag, follow it with each buffer. */
+constexpr gint64 kLagShare = 16, kCommonShare = 64;
+
 struct Settings {
   GstClockTime max_delay = 2 * GST_SECOND;
   std::string start_with; /* name of a sink pad; empty: streams begin when they come */
+};
+
+/* When buffers of a stream are due. Its lag is the running time of a buffer less its capture time,
+ * smoothed, so that it follows a clock that drifts. */
+struct Timing {
+  std::optional<gint64> lag; /* ns */
+  gint64 delay = 0;          /* ns from the last buffer's running time until it is due */
+  guint steps = 0;           /* of the element, when its last buffer came */
+  GstClockTime last = GST_CLOCK_TIME_NONE; /* running time of its last buffer */
 };
 
 /* What enters at a sink pad and leaves at the source pad of the same number. */
@@ -49,11 +70,10 @@ struct Stream {
   GstSegment segment{};
   bool warned = false; /* of missing capture times */
   /* with start-with */
-  bool started = false;         /* its segment was sent */
-  bool dropped = false;         /* something */
-  bool warned_of_clock = false; /* of capture times of another clock */
+  bool started = false; /* its segment was sent */
+  bool dropped = false; /* something */
 
-  CaptureAlignment::Stream timing{}; /* under the element's lock */
+  Timing timing{}; /* under the element's lock */
 };
 
 } // namespace
@@ -62,7 +82,8 @@ struct GstCaptureSyncPrivate {
   std::mutex lock; /* guards what follows; never held while pushing or posting */
   Settings settings;
   std::vector<std::unique_ptr<Stream>> streams;
-  CaptureAlignment alignment;
+  std::optional<gint64> common;             /* ns from capture to due, of all streams */
+  guint steps = 0;                          /* how often all streams were moved at once */
   bool apart = false;                       /* and a warning was posted */
   GstClockTime start = GST_CLOCK_TIME_NONE; /* with start-with: capture time of running time 0 */
   gint64 start_lag = 0;                     /* running time less capture time there */
@@ -70,10 +91,8 @@ struct GstCaptureSyncPrivate {
   /* with the streaming thread, or while none runs */
   Stream *find (guint number)
   {
-    for (const auto &stream : streams)
-      if (stream->number == number)
-        return stream.get ();
-    return nullptr;
+    const auto found = std::ranges::find (streams, number, &Stream::number);
+    return found == streams.end () ? nullptr : found->get ();
   }
 };
 
@@ -110,23 +129,39 @@ warn_missing_capture_time (GstCaptureSync *self, Stream &stream, const char *con
         (nullptr));
 }
 
-static void
-report_relation (GstCaptureSync *self, CaptureAlignment::Relation relation, gint64 spread)
+/* Sets the delay of a stream for a buffer: its capture time plus the lag of the slowest stream is
+ * when it is due. Under the lock.
+ * @return ns between the quickest and the slowest stream, if they are further apart than max-delay:
+ *         none is delayed then; else 0 */
+static gint64
+place (GstCaptureSyncPrivate *priv, Timing &timing, GstClockTime running, GstClockTime capture)
 {
-  const bool apart = relation == CaptureAlignment::Relation::kApart;
-  {
-    std::lock_guard guard (self->priv->lock);
-    if (apart == std::exchange (self->priv->apart, apart))
-      return;
-  }
-  if (apart)
-    GST_ELEMENT_WARNING (self, STREAM, FAILED,
-        ("The streams are %.1f s apart and pass as they are; expected capture times of one clock "
-         "and at most max-delay between streams",
-            double (spread) / GST_SECOND),
-        (nullptr));
+  const gint64 lag = GST_CLOCK_DIFF (capture, running);
+  if (timing.lag && std::abs (lag - *timing.lag) <= kOtherClock)
+    *timing.lag += (lag - *timing.lag) / kLagShare;
   else
-    GST_INFO_OBJECT (self, "the streams are in sync");
+    timing.lag = lag;
+  timing.last = running;
+  gint64 quickest = *timing.lag, slowest = *timing.lag;
+  for (const auto &stream : priv->streams)
+    if (const Timing &other = stream->timing; other.lag && other.last + kSilence >= running) {
+      quickest = std::min (quickest, *other.lag);
+      slowest = std::max (slowest, *other.lag);
+    }
+  if (guint64 (slowest - quickest) > priv->settings.max_delay) {
+    priv->common.reset ();
+    priv->steps += timing.delay != 0;
+    timing.delay = 0;
+    return slowest - quickest;
+  }
+  if (!priv->common || std::abs (slowest - *priv->common) > kStep) {
+    priv->common = slowest;
+    priv->steps++;
+  } else {
+    *priv->common += (slowest - *priv->common) / kCommonShare;
+  }
+  timing.delay = *priv->common - lag;
+  return 0;
 }
 
 /* Sets the buffer's time so that it is due with others of its capture time. */
@@ -141,20 +176,24 @@ align (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
     warn_missing_capture_time (self, stream, "pass as they are");
   GST_LOG_OBJECT (stream.sink, "captured %" GST_TIME_FORMAT ", running time %" GST_TIME_FORMAT,
       GST_TIME_ARGS (capture), GST_TIME_ARGS (running));
-  const bool placed = GST_CLOCK_TIME_IS_VALID (capture) && GST_CLOCK_TIME_IS_VALID (running);
-  bool stepped = false;
-  gint64 delay = 0, spread = 0;
-  auto relation = CaptureAlignment::Relation::kTogether;
+  bool stepped = false, newly_apart = false;
+  gint64 delay = 0, apart = 0;
   {
     std::lock_guard guard (priv->lock);
-    if (placed)
-      relation = priv->alignment.place (
-          stream.timing, running, capture, priv->settings.max_delay, stepped);
+    if (GST_CLOCK_TIME_IS_VALID (capture) && GST_CLOCK_TIME_IS_VALID (running)) {
+      apart = place (priv, stream.timing, running, capture);
+      newly_apart = apart > 0 && !priv->apart;
+      priv->apart = apart > 0;
+      stepped = std::exchange (stream.timing.steps, priv->steps) != priv->steps;
+    }
     delay = stream.timing.delay;
-    spread = placed ? priv->alignment.spread (running) : 0;
   }
-  if (placed)
-    report_relation (self, relation, spread);
+  if (newly_apart)
+    GST_ELEMENT_WARNING (self, STREAM, FAILED,
+        ("The streams are %.1f s apart and pass as they are; synchronise the hosts' clocks, or "
+         "raise max-delay",
+            double (apart) / GST_SECOND),
+        (nullptr));
   if (stepped)
     GST_DEBUG_OBJECT (stream.sink, "step: from now on %" GST_STIME_FORMAT " later than it comes",
         GST_STIME_ARGS (delay));
@@ -172,18 +211,6 @@ align (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
 }
 
 /* ---- start-with ---- */
-
-/* A sender that was restarted elsewhere, or a host whose clock was set. */
-static void
-warn_other_clock (GstCaptureSync *self, Stream &stream)
-{
-  if (!std::exchange (stream.warned_of_clock, true))
-    GST_ELEMENT_WARNING (self, STREAM, FAILED,
-        ("%s: dropping buffers whose capture times are of another clock than that of the first "
-         "buffer of %s",
-            GST_PAD_NAME (stream.sink), self->priv->settings.start_with.c_str ()),
-        (nullptr));
-}
 
 /* Where running time 0 is, which the first key frame set (or packet of speech) of the named pad
  * decides. GST_CLOCK_TIME_NONE until then.
@@ -220,8 +247,6 @@ restart (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
   const GstClockTime start = find_start (self->priv, stream, buffer, capture,
       gst_segment_to_running_time (&stream.segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer)),
       other_clock);
-  if (other_clock)
-    warn_other_clock (self, stream);
   if (other_clock || !GST_CLOCK_TIME_IS_VALID (capture) || !GST_CLOCK_TIME_IS_VALID (start) ||
       capture < start) {
     GST_DEBUG_OBJECT (stream.sink, "%s: dropping %" GST_PTR_FORMAT,
@@ -401,7 +426,6 @@ gst_capture_sync_request_pad (
       return nullptr;
     }
     stream = priv->streams.emplace_back (new Stream{.number = number}).get ();
-    priv->alignment.add (&stream->timing);
   }
   gst_segment_init (&stream->segment, GST_FORMAT_UNDEFINED);
   const std::string number = std::to_string (stream->number);
@@ -426,7 +450,6 @@ gst_capture_sync_release_pad (GstElement *element, GstPad *sink)
     std::lock_guard guard (priv->lock);
     for (GstPad *pad : {src, sink})
       gst_pad_set_element_private (pad, nullptr);
-    priv->alignment.remove (&stream->timing);
     std::erase_if (priv->streams, [stream] (const auto &one) { return one.get () == stream; });
   }
   gst_element_remove_pad (element, src);
@@ -435,48 +458,22 @@ gst_capture_sync_release_pad (GstElement *element, GstPad *sink)
 
 /* ---- life ---- */
 
-/* Whether start-with is empty or the name of a sink pad; posts an error if not. */
-static bool
-names_a_pad (GstCaptureSync *self)
-{
-  GstCaptureSyncPrivate *priv = self->priv;
-  std::string name, pads;
-  {
-    std::lock_guard guard (priv->lock);
-    name = priv->settings.start_with;
-    if (name.empty ())
-      return true;
-    for (const auto &stream : priv->streams) {
-      if (name == GST_PAD_NAME (stream->sink))
-        return true;
-      pads += std::string (pads.empty () ? "" : ", ") + GST_PAD_NAME (stream->sink);
-    }
-  }
-  GST_ELEMENT_ERROR (self, RESOURCE, SETTINGS,
-      ("start-with: no pad '%s'; expected one of %s", name.c_str (),
-          pads.empty () ? "sink_0, sink_1 and so on" : pads.c_str ()),
-      (nullptr));
-  return false;
-}
-
 static GstStateChangeReturn
 gst_capture_sync_change_state (GstElement *element, GstStateChange transition)
 {
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !names_a_pad (GST_CAPTURE_SYNC (element)))
-    return GST_STATE_CHANGE_FAILURE;
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS (gst_capture_sync_parent_class)->change_state (element, transition);
   if (transition != GST_STATE_CHANGE_PAUSED_TO_READY)
     return result;
   GstCaptureSyncPrivate *priv = GST_CAPTURE_SYNC (element)->priv;
   std::lock_guard guard (priv->lock);
-  priv->alignment = {};
   for (const auto &stream : priv->streams) {
     gst_segment_init (&stream->segment, GST_FORMAT_UNDEFINED);
-    stream->warned = stream->started = stream->dropped = stream->warned_of_clock = false;
+    stream->warned = stream->started = stream->dropped = false;
     stream->timing = {};
-    priv->alignment.add (&stream->timing);
   }
+  priv->common.reset ();
+  priv->steps = 0;
   priv->start = GST_CLOCK_TIME_NONE;
   priv->apart = false;
   return result;
@@ -502,8 +499,8 @@ capture_sync_properties ()
 static GstStructure *
 make_stats (const GstCaptureSyncPrivate *priv)
 {
-  GstStructure *stats = gst_structure_new ("application/x-capturesync-stats", "steps",
-      G_TYPE_UINT64, guint64 (priv->alignment.steps ()), nullptr);
+  GstStructure *stats = gst_structure_new (
+      "application/x-capturesync-stats", "steps", G_TYPE_UINT64, guint64 (priv->steps), nullptr);
   for (const auto &stream : priv->streams) {
     if (!stream->timing.lag)
       continue;

@@ -5,6 +5,8 @@
 #include <gst/gst.h>
 #include <memory>
 
+inline constexpr int kMaxCameras = 3; ///< left, right, third
+
 struct GstBufferUnref {
   void operator() (GstBuffer *buffer) const { gst_buffer_unref (buffer); }
 };

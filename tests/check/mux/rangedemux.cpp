@@ -75,55 +75,6 @@ GST_START_TEST (test_pixels_are_shared_and_the_rest_is_kept)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_other_reference_times_are_kept)
-{
-  Demux demux;
-  const Rig rig = ring_rig (1);
-  demux.set_caps (range_caps (rig));
-  GstCaps *ntp = gst_caps_new_empty_simple ("timestamp/x-ntp");
-  GstBuffer *input = make_frame_set (rig);
-  gst_buffer_add_reference_timestamp_meta (input, ntp, 77, GST_CLOCK_TIME_NONE);
-  fail_unless_equals_int (demux.push (input), GST_FLOW_OK);
-  GstBuffer *view = demux.pull (0);
-  const auto meta = gst_buffer_get_reference_timestamp_meta (view, ntp);
-  fail_unless (meta != nullptr);
-  fail_unless_equals_uint64 (meta->timestamp, 77);
-  gst_buffer_unref (view);
-  gst_caps_unref (ntp);
-}
-GST_END_TEST;
-
-/* Depth planes as others may lay them out: padded rows, colour in front of depth. */
-GST_START_TEST (test_padded_strides_stay)
-{
-  Demux demux;
-  const Rig rig = ring_rig (2, 16, 12);
-  demux.set_caps (range_caps (rig));
-  GstBuffer *input = gst_buffer_new_allocate (nullptr, 6000, nullptr);
-  gst_buffer_memset (input, 0, 3, 6000);
-  for (guint id : {0u, 1u}) {
-    auto meta = reinterpret_cast<GstRangeMeta *> (
-        gst_buffer_add_meta (input, GST_RANGE_META_INFO, nullptr));
-    meta->view_id = id;
-    meta->width = 16;
-    meta->height = 12;
-    meta->colour_offset = 4 + 3000 * id;
-    meta->colour_stride = 100;
-    meta->depth_offset = 1402 + 3000 * id;
-    meta->depth_stride = 66;
-  }
-  GST_BUFFER_PTS (input) = 0;
-  fail_unless_equals_int (demux.push (gst_buffer_ref (input)), GST_FLOW_OK);
-  for (guint id : {0u, 1u}) {
-    GstBuffer *view = demux.pull (int (id));
-    fail_unless_equals_int (gst_buffer_get_range_meta (view, id)->depth_stride, 66);
-    ck_assert_ptr_eq (first_depth (view, id), first_depth (input, id));
-    gst_buffer_unref (view);
-  }
-  gst_buffer_unref (input);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_coded_views_have_their_own_units_and_caps)
 {
   Demux demux;
@@ -258,22 +209,6 @@ GST_START_TEST (test_planes_outside_their_buffer_are_a_gap)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_empty_view_is_a_buffer_without_pixels)
-{
-  Demux demux;
-  const Rig rig = ring_rig (2);
-  demux.set_caps (range_caps (rig));
-  GstBuffer *input = make_frame_set (rig);
-  gst_buffer_get_range_meta (input, 0)->width = gst_buffer_get_range_meta (input, 0)->height = 0;
-  fail_unless_equals_int (demux.push (input), GST_FLOW_OK);
-  GstBuffer *view = demux.pull (0);
-  fail_unless_equals_int (gst_buffer_n_range_metas (view), 1);
-  fail_unless_equals_int (gst_buffer_get_size (view), 0);
-  gst_buffer_unref (view);
-  gst_buffer_unref (demux.pull (1));
-}
-GST_END_TEST;
-
 GST_START_TEST (test_views_that_the_rig_does_not_name_are_counted_as_dropped)
 {
   for (const bool coded : {false, true}) {
@@ -360,8 +295,6 @@ rangedemux_suite ()
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_each_view_has_a_pad_with_its_own_rig);
   tcase_add_test (tc, test_pixels_are_shared_and_the_rest_is_kept);
-  tcase_add_test (tc, test_other_reference_times_are_kept);
-  tcase_add_test (tc, test_padded_strides_stay);
   tcase_add_test (tc, test_coded_views_have_their_own_units_and_caps);
   tcase_add_test (tc, test_coded_view_that_is_whole_is_a_place_to_begin);
   tcase_add_test (tc, test_more_pieces_than_a_buffer_holds_keep_their_order);
@@ -369,7 +302,6 @@ rangedemux_suite ()
   tcase_add_test (tc, test_damaged_units_are_dropped_and_counted);
   tcase_add_test (tc, test_no_prefix_of_a_frame_set_is_read_beyond_its_end);
   tcase_add_test (tc, test_planes_outside_their_buffer_are_a_gap);
-  tcase_add_test (tc, test_empty_view_is_a_buffer_without_pixels);
   tcase_add_test (tc, test_views_that_the_rig_does_not_name_are_counted_as_dropped);
   tcase_add_test (tc, test_64_views);
   tcase_add_test (tc, test_rangemux_puts_together_what_came_apart);
