@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "../options.hpp"
-#include "report.hpp"
+#include "matchers.hpp"
 #include "scene.hpp"
 #include "truth.hpp"
 
@@ -20,14 +20,14 @@ namespace {
 const char *const kUsage =
     "usage: stereo_bench --left FILE --right FILE [--ground-truth FILE] [--scale S]\n"
     "                    --focal-length PX --baseline M [--doffs PX]\n"
-    "                    [--near M] [--far M] [--rounds N] [--json FILE]\n"
+    "                    [--near M] [--far M] [--rounds N]\n"
     "       stereo_bench --scene [--model FILE] [--size WxH] [--distance M] [--noise LEVELS]\n"
     "                    [--frames N]\n"
     "Matches a pair of pictures as stereodepth does, and with OpenCV's BM, SGBM and\n"
     "3-way SGBM in the same run. Prints, for the pixels whose truth is known: density, the share\n"
     "that has a disparity; and of those bad-1.0 and bad-2.0, the shares further off than 1 and 2\n"
     "pixels, and the median error.\n"
-    "  --ground-truth FILE  true disparities of the left picture: PFM, NPZ or a grey picture; 0\n"
+    "  --ground-truth FILE  true disparities of the left picture: NPZ or a grey picture; 0\n"
     "                       and not finite = unknown\n"
     "  --scale S            its values per pixel of disparity (default 1)\n"
     "  --focal-length PX    of both rectified pictures, pixels\n"
@@ -52,11 +52,10 @@ const char *const kUsage =
     "                       quarter of the picture)\n"
     "  --noise LEVELS       standard deviation of sensor noise, grey levels (default 1.5)\n"
     "  --frames N           that are measured (default 20)\n"
-    "  --threads N          of ours (default 0: one a core)\n"
-    "  --json FILE          write rows: matcher, density, bad1, bad2 (0 to 1), median_px, ms\n";
+    "  --threads N          of ours (default 0: one a core)\n";
 
 struct Job {
-  std::string left, right, truth, json;
+  std::string left, right, truth;
   int rounds = 12;
   double focal = 0, baseline = 0, offset = 0, scale = 1, near_m = 0, far_m = 0;
   bool scene = false;
@@ -86,7 +85,6 @@ add_options (Options &options, Job &job)
   options.number ("--noise", s.noise_sigma, 0.0, 20.0);
   options.number ("--frames", job.rendered.frames, 1, 1000);
   options.number ("--threads", job.rendered.n_threads, 0, 64);
-  options.text ("--json", job.json);
 }
 
 /* What is wrong with the options together, or nothing. */
@@ -94,10 +92,9 @@ std::string
 complaint (const Job &job)
 {
   if (job.scene)
-    return job.left.empty () && job.right.empty () && job.json.empty ()
+    return job.left.empty () && job.right.empty ()
                ? ""
-               : "--scene renders its pictures and prints a table; expected no --left, --right, "
-                 "--json";
+               : "--scene renders its pictures: omit --left, --right";
   if (job.left.empty () || job.right.empty ())
     return "expected --left and --right";
   if (job.focal <= 0 || job.baseline <= 0)
@@ -168,6 +165,21 @@ make_view (const Job &job, const Pair &pair, View &view)
   return validate ({{view}});
 }
 
+void
+print_rows (const std::vector<Row> &rows, bool has_truth)
+{
+  std::printf (
+      "%-28s %9s %9s %9s %9s %9s\n", "matcher", "density", "bad-1.0", "bad-2.0", "median px", "ms");
+  for (const Row &r : rows) {
+    std::printf ("%-28s %7.2f %%", r.matcher.c_str (), 100 * r.density);
+    if (has_truth)
+      std::printf (" %7.2f %% %7.2f %% %9.3f", 100 * r.bad1, 100 * r.bad2, r.median_px);
+    else
+      std::printf (" %9s %9s %9s", "-", "-", "-");
+    std::printf (" %9.1f\n", r.ms);
+  }
+}
+
 Status
 measure (const Job &job, const Pair &pair)
 {
@@ -177,7 +189,7 @@ measure (const Job &job, const Pair &pair)
   for (const Row &row : run_peers (pair, job.rounds))
     rows.push_back (row);
   print_rows (rows, !pair.truth.empty ());
-  return job.json.empty () ? Status{} : write_json (job.json, rows, !pair.truth.empty ());
+  return {};
 }
 
 Status

@@ -49,19 +49,6 @@ unzip (const Bytes &zip, Bytes &file)
   return result == Z_STREAM_END;
 }
 
-/* Rows of little-endian floats. */
-bool
-read_floats (const Bytes &bytes, std::size_t begin, int width, int height, cv::Mat &values)
-{
-  if (width < 1 || height < 1 || width > rangecast::kMaxImageSide ||
-      height > rangecast::kMaxImageSide || begin > bytes.size () ||
-      (bytes.size () - begin) / 4 / std::size_t (width) < std::size_t (height))
-    return false;
-  values.create (height, width, CV_32F);
-  std::memcpy (values.data, &bytes[begin], 4 * values.total ());
-  return true;
-}
-
 bool
 decode_npz (const Bytes &zip, cv::Mat &values)
 {
@@ -69,35 +56,24 @@ decode_npz (const Bytes &zip, cv::Mat &values)
   if (!unzip (zip, array) || array.size () < 10)
     return false;
   const std::size_t begin = 10 + array[8] + 256u * array[9];
-  const std::string header (
-      array.begin () + 10, array.begin () + std::ptrdiff_t (std::min (begin, array.size ())));
+  if (begin > array.size ())
+    return false;
+  const std::string header (array.begin () + 10, array.begin () + std::ptrdiff_t (begin));
   const std::size_t shape = header.find ("'shape': (");
   int width = 0, height = 0;
-  return header.find ("'<f4'") != std::string::npos && shape != std::string::npos &&
-         std::sscanf (header.c_str () + shape, "'shape': (%d, %d)", &height, &width) == 2 &&
-         read_floats (array, begin, width, height, values);
-}
-
-/* Of one channel and little-endian, as Middlebury's are; the bottom row comes first. */
-bool
-decode_pfm (const Bytes &bytes, cv::Mat &values)
-{
-  const std::string head (
-      bytes.begin (), bytes.begin () + std::min<std::ptrdiff_t> (80, std::ssize (bytes)));
-  int width = 0, height = 0, end = 0;
-  double scale = 0;
-  if (std::sscanf (head.c_str (), "Pf %d %d %lf%n", &width, &height, &scale, &end) != 3 ||
-      scale >= 0 || !read_floats (bytes, std::size_t (end) + 1, width, height, values))
+  if (header.find ("'<f4'") == std::string::npos || shape == std::string::npos ||
+      std::sscanf (header.c_str () + shape, "'shape': (%d, %d)", &height, &width) != 2 ||
+      width < 1 || height < 1 || width > rangecast::kMaxImageSide ||
+      (array.size () - begin) / 4 / std::size_t (width) < std::size_t (height))
     return false;
-  cv::flip (values, values, 0);
+  values.create (height, width, CV_32F);
+  std::memcpy (values.data, &array[begin], 4 * values.total ());
   return true;
 }
 
 bool
 decode (const Bytes &bytes, cv::Mat &values)
 {
-  if (bytes[0] == 'P' && bytes[1] == 'f')
-    return decode_pfm (bytes, values);
   if (bytes[0] == 'P' && bytes[1] == 'K')
     return decode_npz (bytes, values);
   const cv::Mat image = cv::imdecode (bytes, cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);
@@ -115,7 +91,7 @@ read_truth (const std::string &path, double scale, cv::Mat &truth)
   if (bytes.size () < 2)
     return {StatusCode::kNotFound, path + ": cannot be read, or is empty"};
   if (!decode (bytes, truth))
-    return {StatusCode::kBadData, path + ": use a PFM, an NPZ of floats or a grey image"};
+    return {StatusCode::kBadData, path + ": use an NPZ of floats or a grey image"};
   int known = 0;
   for (int y = 0; y < truth.rows; y++)
     for (int x = 0; x < truth.cols; x++) {

@@ -7,8 +7,7 @@
 
 namespace bench {
 
-/** Reads true disparities: PFM, as Middlebury publishes them, NumPy's NPZ with an array of floats,
- *  or an image that OpenCV reads.
+/** Reads true disparities: NumPy's NPZ with an array of floats, or an image that OpenCV reads.
  *  @param scale       file values per pixel of disparity, > 0
  *  @param[out] truth  CV_32F, pixels; 0 = unknown, which the file may also mark as not finite
  *  @return kNotFound, kBadData; the message begins with the path */

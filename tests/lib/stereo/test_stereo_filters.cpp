@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
-#include <rangecast/stereo/box_sum.hpp>
 #include <rangecast/stereo/disparity_filter.hpp>
 #include <rangecast/stereo/silhouette_filter.hpp>
 
@@ -64,31 +63,6 @@ count_differences (const cv::Mat &a, const cv::Mat &b, const std::vector<cv::Rec
 }
 
 } // namespace
-
-TEST (StereoFilters, greys_of_the_other_picture_are_linear_between_pixels_and_stay_inside)
-{
-  const std::vector<std::uint8_t> row = {10, 200, 30, 250, 0, 90};
-  std::vector<std::int16_t> disparity, grey (200);
-  for (int d = -40; d < 160; d++)
-    disparity.push_back (static_cast<std::int16_t> (d));
-  /* All of them at column 4: pixel i lies at 4, not at 4 + i. */
-  for (int i = 0; i < 200; i++) {
-    look_up (&disparity[std::size_t (i)], 1, row.data (), 6, 4, &grey[std::size_t (i)]);
-    const int there = 64 - disparity[std::size_t (i)];
-    if (there < 0 || there >= 80)
-      continue; /* outside: only that nothing else is read */
-    const int u = there / 16, f = there % 16;
-    const double exact = (row[std::size_t (u)] * (16 - f) + row[std::size_t (u) + 1] * f) / 16.0;
-    EXPECT_NEAR (grey[std::size_t (i)], exact, 0.51) << disparity[std::size_t (i)];
-  }
-  std::vector<std::int16_t> same (130, 24), long_grey (130);
-  std::vector<std::uint8_t> ramp (150);
-  for (std::size_t i = 0; i < ramp.size (); i++)
-    ramp[i] = static_cast<std::uint8_t> (i);
-  look_up (same.data (), 130, ramp.data (), 150, 10, long_grey.data ());
-  for (int i = 0; i < 130; i++)
-    EXPECT_NEAR (long_grey[std::size_t (i)], i + 8.5, 0.51);
-}
 
 TEST (StereoFilters, specks_go_as_with_opencv)
 {
