@@ -245,14 +245,16 @@ gst_range_align_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
   }
   const Status status = rangecast::guarded ("rangealign", [&] {
     const gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
-    return frame.status ().ok () ? priv->alignment.process (frame.views (), settings)
-                                 : frame.status ();
+    Status result = frame.status ();
+    if (result.ok ())
+      result = priv->alignment.process (frame.views (), settings);
+    if (result.ok () && (priv->rig_pending || priv->alignment.rig_changed ()))
+      send_rig (self);
+    return result;
   });
   if (status.ok ()) {
     GST_LOG_OBJECT (self, "frame set of %" GST_TIME_FORMAT ": cleared %zu contradicted points",
         GST_TIME_ARGS (GST_BUFFER_PTS (buffer)), priv->alignment.contradicted_points ());
-    if (priv->rig_pending || priv->alignment.rig_changed ())
-      send_rig (self);
     count (priv);
     warn_skipped (self);
   }

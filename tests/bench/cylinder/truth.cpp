@@ -17,7 +17,7 @@ constexpr int kSamples = 60000;
 constexpr double kAcross = 0.02, kNear = 0.006;
 constexpr double kSliceHeight = 0.008; ///< metres
 constexpr int kAngles = 72;
-constexpr double kSliceHeight = 0.004, kLayerGap = 0.03; ///< metres
+constexpr double kCellHeight = 0.004, kLayerGap = 0.03; ///< metres
 constexpr int kColumns = 360;
 
 double
@@ -146,7 +146,7 @@ Judge::cells_double (const std::vector<char> &alive) const
     if (!alive[i])
       continue;
     const Vec3 p = spots_[i].point - middle_;
-    const auto slice = std::int64_t (std::floor (p.y / kSliceHeight));
+    const auto slice = std::int64_t (std::floor (p.y / kCellHeight));
     cells[slice * kColumns + std::int64_t (turn_of (p) * kColumns)].push_back (
         {std::hypot (p.x, p.z), spots_[i].view});
   }
