@@ -54,7 +54,7 @@ need_option "$peer" --peer
 need_option "$rig" --rig
 [ -f "$rig" ] || die "--rig: no file '$rig'"
 views=$(count_views "$rig")
-[ "$views" -gt 0 ] || die "--rig: '$rig' has no views; expected a rig file, as calibrate.sh writes"
+[ "$views" -gt 0 ] || die "--rig: '$rig' has no views; expected a rig file, as `rangecast calibrate` writes"
 need_number "$port" --port 1 $((65535 - 10 - views))
 [[ "$peer" != *:* ]] || die "--peer: expected a name or IPv4 address, got '$peer'"
 split_address "$peer:$port" --peer

@@ -8,7 +8,7 @@
 
 /** Prints a line: frames, rate, points, latency. */
 void print_progress (RunMeasure &measure);
-/** Writes what was measured, JSON; pipelines/demo-report.py reads it. */
+/** Writes what was measured, JSON; `rangecast demo` reads it. */
 bool write_report (RunMeasure &measure, const char *path);
 /** Writes the last picture that shows all views, or else the last one of the sink named "snapshot",
  *  as a PNG. */

@@ -26,7 +26,7 @@ head=$data/lps_head/LeePerrySmith.glb
 measure head --model "$head"
 measure head-640x480 --model "$head" --size 640x480
 
-"$pipelines/bunny-to-range.py" --scans "$data/stanford_bunny_range" --out "$out/bunny" >&2
+"$here/bunny-to-range.py" --scans "$data/stanford_bunny_range" --out "$out/bunny" >&2
 pairs=()
 for i in {0..5}; do pairs+=(--color "$out/bunny/view$i-colour.png" --depth "$out/bunny/view$i-depth.png"); done
 measure bunny "${pairs[@]}" --depth-unit 0.0001 --near 0.5 --far 1.5

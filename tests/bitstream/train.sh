@@ -38,7 +38,7 @@ scene () { # name, options of avatartestsrc
 
 scans () { # the bunny's scans, each a view
   local settings view i=0 depth
-  "$here/../../pipelines/bunny-to-range.py" --scans "$data/stanford_bunny_range" --out "$out/bunny" >&2
+  "$here/../bench/bunny-to-range.py" --scans "$data/stanford_bunny_range" --out "$out/bunny" >&2
   for settings in "${exact[@]}" "${fine[@]}" "${coarse[@]}"; do
     for view in {0..5}; do
       depth=$out/bunny/view$view-depth.png

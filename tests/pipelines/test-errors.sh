@@ -143,8 +143,6 @@ test_folders_that_there_are_not_are_named () {
   expect_error "record.sh: nowhere/new.rcnc: directory 'nowhere' does not exist" "$pipelines/record.sh" nowhere/new.rcnc
   mkdir folder
   expect_error "record.sh: folder: is a directory" "$pipelines/record.sh" folder
-  touch some.rcnc
-  expect_error "play.sh: nowhere/new.webm: directory 'nowhere' does not exist" "$pipelines/play.sh" some.rcnc --film nowhere/new.webm
 }
 
 test_a_recording_from_a_port_that_is_taken_gives_one_cause () {
@@ -158,23 +156,6 @@ s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", '$((por
   [[ "$said" == *"$((ports + 205))"*"in use"* ]] || fail "it said: $said"
   [[ "$said" != *"nothing came"* ]] || fail "it said more: $said"
   [ ! -e none.rcnc ] || fail "an empty file is left"
-}
-
-test_a_film_of_what_is_no_recording_leaves_no_file () {
-  local i
-  echo "no recording" >bad.rcnc
-  expect_error "No access unit found" "$pipelines/play.sh" bad.rcnc --film film.webm
-  for ((i = 0; i < 100; i++)); do [ -e film.webm ] || break; sleep 0.1; done
-  [ ! -e film.webm ] || fail "an empty film is left"
-}
-
-test_without_a_display_what_is_wrong_with_the_file_comes_first () {
-  unset DISPLAY WAYLAND_DISPLAY
-  echo "no recording" >bad.rcnc
-  "$pipelines/record.sh" good.rcnc --frames 2 --size 160x120 --views 1
-  expect_error "'bad.rcnc' is not a recording" "$pipelines/play.sh" bad.rcnc
-  expect_error "no display" "$pipelines/play.sh" good.rcnc
-  ! "$pipelines/play.sh" good.rcnc 2>&1 | grep 'not a recording' || fail "it is one"
 }
 
 test_an_element_that_fails_without_a_word_ends_the_run () {
@@ -261,8 +242,6 @@ test_options_without_effect_are_refused () {
     # shellcheck disable=SC2086
     expect_error "record.sh: ${option% *}: expected with --listen" "$pipelines/record.sh" none.rcnc $option
   done
-  touch some.rcnc
-  expect_error "--speaker: expected without --film" "$pipelines/play.sh" some.rcnc --film film.webm --speaker fakesink
   expect_error "--talk-clock: expected with --talk" "${viewer[@]}" --talk-clock 127.0.0.1:7000
   expect_error "--echo-cancel: expected with --talk" "${viewer[@]}" --audio 6002 --echo-cancel
   expect_error "--speaker: expected with --audio" "${viewer[@]}" --speaker none
@@ -312,14 +291,8 @@ test_hosts_that_cannot_adapt_say_so () {
 test_recordings_that_there_are_are_kept () {
   "$pipelines/record.sh" good.rcnc --frames 3 --size 160x120 --views 1
   cp good.rcnc before.rcnc
-  expect_error "is the recording itself" "$pipelines/play.sh" good.rcnc --film good.rcnc
-  cmp good.rcnc before.rcnc || fail "it was changed"
   timeout -s INT 3 "$pipelines/record.sh" good.rcnc --listen $((ports + 203)) >record.log 2>&1 || true
   cmp good.rcnc~ before.rcnc || fail "it is gone: $(ls) $(cat record.log)"
-  echo text >old.txt
-  cp before.rcnc film.webm
-  expect_error "is not a recording" "$pipelines/play.sh" old.txt --film film.webm
-  cmp film.webm before.rcnc || fail "the film before is gone"
 }
 
 test_required_options_are_named () {
@@ -356,19 +329,6 @@ test_simulated_views_are_those_of_the_rig () {
   expect_error "bad.yaml" "$pipelines/camera-host.sh" --view 1 --to 127.0.0.1:6000 --rig bad.yaml
 }
 
-test_point_clouds_of_several_frame_sets_need_a_number () {
-  "$pipelines/record.sh" two.rcnc --frames 2 --size 160x120 --views 1
-  expect_error "'same.ply': the recording has more than one frame set; expected a name with a number, e.g. same-%05d.ply" \
-    "$pipelines/range-to-ply.sh" two.rcnc same.ply
-  [ ! -e same.ply ] || fail "a point cloud was written"
-  "$pipelines/record.sh" one.rcnc --frames 1 --size 160x120 --views 1
-  "$pipelines/range-to-ply.sh" one.rcnc one.ply
-  expect_file one.ply 1000
-  echo text >bad.rcnc
-  expect_error "No access unit found" "$pipelines/range-to-ply.sh" bad.rcnc bad.ply
-  expect_error "expected a name with a number" "$pipelines/rgbd-to-ply.sh" colour-%05d.jpg depth-%05d.png same.ply
-}
-
 test_scripts_name_the_bad_option () {
   expect_error "--size: expected 16x16 to 4096x4096, got '1x1'" "$pipelines/record.sh" none.rcnc --size 1x1
   expect_error "--size: expected 16x16 to 4096x4096, got '16384x16384'" "$pipelines/record.sh" none.rcnc --size 16384x16384
@@ -378,8 +338,6 @@ test_scripts_name_the_bad_option () {
   expect_error "--size: expected 16x16" "$pipelines/viewer-host.sh" --listen $((ports + 201)) --size 1x1
   expect_error "expected one file" "$pipelines/record.sh" none.rcnc other.rcnc
   expect_error "--orbit" "$pipelines/viewer-host.sh" --listen $((ports + 201)) --orbit x
-  touch empty.rcnc
-  expect_error "--orbit" "$pipelines/play.sh" empty.rcnc --film film.webm --orbit 4000
   expect_error "--interface" "$pipelines/viewer-host.sh" --listen $((ports + 201)) --interface lo
   expect_error "--interface" "$pipelines/record.sh" none.rcnc --interface lo
   expect_error "--interface" "$pipelines/parent-host.sh" --views 1 --listen $((ports + 201)) --to 127.0.0.1:1 --interface lo

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The scripts that read and write files.
+# record, play and convert; recordings, RGB-D pictures, stereo pairs and scans.
 
-# Prints "VERTICES SIZE_OK" of a binary PLY.
+# Prints the number of vertices of a binary PLY.
 ply_vertices () {
   python3 - "$1" <<'END'
 import sys
@@ -9,92 +9,61 @@ data = open(sys.argv[1], "rb").read()
 head, body = data.split(b"end_header\n", 1)
 assert head.startswith(b"ply\nformat binary_little_endian 1.0\n"), head[:60]
 sizes = {b"float": 4, b"uchar": 1}
-count = stride = 0
-for line in head.split(b"\n"):
-    words = line.split()
-    if words[:2] == [b"element", b"vertex"]:
-        count = int(words[2])
-    if words[:1] == [b"property"]:
-        stride += sizes[words[1]]
-assert len(body) == count * stride, (len(body), count, stride)
+words = [line.split() for line in head.split(b"\n")]
+count = next(int(w[2]) for w in words if w[:2] == [b"element", b"vertex"])
+assert len(body) == count * sum(sizes[w[1]] for w in words if w[:1] == [b"property"]), (len(body), count)
 print(count)
 END
 }
+opencv_doc=/usr/share/doc/opencv-doc/examples/data
+need_aloe () { [ -f "$opencv_doc/aloeL.jpg" ] || skip "no aloeL.jpg (Debian package opencv-doc)"; }
 
-test_recording_plays_again_and_becomes_ply () {
-  "$pipelines/record.sh" recording.rcnc --frames 12 --size 160x120
+test_recording_becomes_points_film_and_numbers () {
+  need_gl
+  rangecast record recording.rcnc --frames 8 --size 160x120
   expect_file recording.rcnc 10000
-  "$pipelines/range-to-ply.sh" recording.rcnc cloud-%05d.ply
-  [ "$(find . -name 'cloud-*.ply' | wc -l)" = 12 ] || fail "expected 12 PLY files: $(ls)"
+  rangecast convert recording.rcnc cloud-%05d.ply
+  [ "$(find . -name 'cloud-*.ply' | wc -l)" = 8 ] || fail "not 8 PLY files: $(ls)"
   [ "$(ply_vertices cloud-00005.ply)" -gt 3000 ] || fail "few points: $(ply_vertices cloud-00005.ply)"
-}
-
-test_application_reads_a_recording () {
-  "$pipelines/record.sh" recording.rcnc --frames 3 --size 160x120 --views 2
-  "${RANGECAST_BUILD:-$source_dir/build}/pipelines/count-points" recording.rcnc >points.txt
-  [ "$(grep -c '^frame set' points.txt)" = 3 ] || fail "$(cat points.txt)"
-  [ "$(grep -cE '^  view [01]: [0-9]{4,} points, centre' points.txt)" = 6 ] || fail "$(cat points.txt)"
-}
-
-test_recording_plays_to_a_film () {
-  need_gl
-  "$pipelines/record.sh" recording.rcnc --frames 8 --size 160x120
-  "$pipelines/play.sh" recording.rcnc --film film.webm --size 320x240
+  expect_error "use-a-name-such-as-out-%05d.ply" rangecast convert recording.rcnc one.ply
+  rangecast play recording.rcnc --film film.webm --picture 320x240
   expect_file film.webm 1000
+  "${RANGECAST_BUILD:-$source_dir/build}/pipelines/count-points" recording.rcnc >points.txt
+  [ "$(grep -c '^frame set' points.txt)" = 8 ] || fail "$(cat points.txt)"
+  [ "$(grep -cE '^  view [0-3]: [0-9]{4,} points, centre' points.txt)" = 32 ] || fail "$(cat points.txt)"
 }
 
-test_what_is_no_recording_is_an_error_and_no_film () {
+test_rgbd_pictures_become_points_and_a_picture () {
   need_gl
-  echo "this is no recording" >text.txt
-  expect_error "No access unit found" "$pipelines/play.sh" text.txt --film film.webm
-}
-
-test_rgbd_pictures_become_a_point_cloud () {
   need_data open3d_rgbd/depth
-  "$pipelines/rgbd-to-ply.sh" "$(find "$data/open3d_rgbd/color" -name '*.jpg' | sort | head -n 1)" \
-    "$(find "$data/open3d_rgbd/depth" -name '*.png' | sort | head -n 1)" cloud.ply --focal-length 525
+  local pictures=("$data/open3d_rgbd/color/00000.jpg" "$data/open3d_rgbd/depth/00000.png")
+  rangecast convert --rgbd "${pictures[@]}" cloud.ply --focal-length 525
   [ "$(ply_vertices cloud.ply)" -gt 200000 ] || fail "few points: $(ply_vertices cloud.ply)"
+  rangecast convert --rgbd "${pictures[@]}" picture.png --focal-length 525
+  expect_file picture.png 50000
+  expect_error "is not a 16-bit greyscale PNG" rangecast convert --rgbd "${pictures[0]}" "${pictures[0]}" cloud.ply
 }
 
-test_rgbd_pictures_are_rendered () {
+test_stereo_pair_is_rendered_without_a_word () {
   need_gl
-  gst-launch-1.0 -q avatartestsrc num-buffers=1 view-id=0 ! video/x-range,width=160,height=120 ! rangesplit name=s \
-    s.colour ! queue ! videoconvert ! jpegenc ! filesink location=colour.jpg s.depth ! queue ! pngenc ! filesink location=depth.png
-  "$pipelines/rgbd-to-ply.sh" colour.jpg depth.png picture.png --depth-scale 0.0001 --near 0.3 --far 2
-  expect_file picture.png 5000
-}
-
-test_stereo_pair_is_rendered () {
-  need_gl
-  gst-launch-1.0 -q avatartestsrc name=s num-buffers=1 \
-    s.left ! video/x-raw,format=RGB,width=320,height=240 ! queue ! pngenc ! filesink location=left.png \
-    s.right ! video/x-raw,format=RGB,width=320,height=240 ! queue ! pngenc ! filesink location=right.png
-  "$pipelines/stereo-to-png.sh" left.png right.png picture.png --focal-length 320 --baseline 0.1 --near 0.45 --far 1.3
-  expect_file picture.png 20000
-}
-
-test_aloe_pair_is_rendered () {
-  need_gl
-  local folder
-  folder=$(dirname "$(dpkg -L opencv-doc 2>/dev/null | grep -m 1 'aloeL.jpg')" 2>/dev/null) || folder=
-  [ -f "$folder/aloeL.jpg" ] || skip "no aloeL.jpg (Debian package opencv-doc)"
-  "$pipelines/stereo-to-png.sh" "$folder/aloeL.jpg" "$folder/aloeR.jpg" aloe.png \
-    --focal-length 3740 --baseline 0.16 --near 2.6 --far 20 >said.txt 2>&1
+  need_aloe
+  local geometry=(--focal-length 1200 --baseline 0.16 --near 0.6 --far 3)
+  rangecast convert "$opencv_doc/aloeL.jpg" "$opencv_doc/aloeR.jpg" right.png "${geometry[@]}" >said.txt 2>&1
+  expect_file right.png 100000
   [ ! -s said.txt ] || fail "$(cat said.txt)"
-  expect_file aloe.png 100000
 }
 
 test_bunny_scans_go_through_everything () {
   need_gl
   need_data stanford_bunny_range/bun000.ply.gz
-  python3 "$pipelines/bunny-to-range.py" --scans "$data/stanford_bunny_range" --out bunny
+  python3 "$source_dir/tests/bench/bunny-to-range.py" --scans "$data/stanford_bunny_range" --out bunny
   local mux=() view
   for view in 0 1 2 3 4 5; do
     mux+=(filesrc "location=bunny/view$view-colour.png" ! pngdec ! videoconvert ! "combine$view.colour"
       filesrc "location=bunny/view$view-depth.png" ! pngdec ! videoconvert ! "combine$view.depth"
       rangecombine "name=combine$view" rig=bunny/rig.yaml "view-id=$view" depth-scale=0.0001 ! neighbourcodeenc ! mux.)
   done
-  gst-launch-1.0 -q -e "${mux[@]}" rangemux name=mux ! neighbourcodedec ! cylinderfilter name=cylinder ! tee name=t \
+  gst-launch-1.0 -q -e "${mux[@]}" rangemux name=mux ! neighbourcodedec ! rangealign ! tee name=t \
     t. ! queue ! plyenc ! filesink location=bunny.ply \
     t. ! queue ! striprender ! 'video/x-raw(memory:GLMemory),width=640,height=480' ! gldownload ! videoconvert ! pngenc ! filesink location=bunny.png
   expect_file bunny.png 5000
@@ -107,9 +76,8 @@ test_people_are_cut_out_of_a_real_recording_without_their_shadows () {
   need_data luxonis_people_stereo/left.mp4
   local input=$data/luxonis_people_stereo empty n
   rig-convert luxonis "$input/calib.json" rig.yaml --near 0.7 --far 4 --scale 0.5
-  "$pipelines/stereo-to-cutout.sh" "$input/left.mp4" "$input/right.mp4" out --rig rig.yaml --size 640x400 \
-    --fps 5 --settle 17 --learn 8 \
-    --roi "shadow=0.1 highlight=8 depth-threshold=0.3 min-area=1000 max-hole=400"
+  rangecast convert "$input/left.mp4" "$input/right.mp4" out --rig rig.yaml --size 640x400 --fps 5 --settle 17 --learn 8 \
+    --person "shadow=0.1 highlight=8 depth-threshold=0.3 min-area=1000 max-hole=400"
   empty=$(stat -c %s out/00001.png) # learning: all black
   for n in 00020 00027 00100; do
     [ "$(stat -c %s out/$n.png)" = "$empty" ] || fail "frame $n is not empty"
@@ -132,4 +100,26 @@ test_raw_depth_from_a_pipe_joins_live_colour () {
     rangecombine name=c focal-length=150 depth-scale=0.0001 ! neighbourcodeenc ! filesink location=pipe.rcnc
   count-points pipe.rcnc >points.txt
   [ "$(grep -c ' [1-9][0-9]\{3,\} points' points.txt)" -ge 10 ] || fail "$(cat points.txt)"
+}
+
+test_examples_of_launch_strings_run () {
+  local examples=$pipelines/examples file
+  for file in "$examples"/*.sh; do
+    [ "$(wc -l <"$file")" -le 20 ] || fail "$file has more than 20 lines"
+  done
+  # Without a window, a camera of two kinds and a film of a few frames.
+  adapt () { sed -e 's/gst-launch-1.0/timeout -s INT 10 gst-launch-1.0 -e/' -e 's/glimagesink[a-z= ]*/fakesink/' -e "$2" "$examples/$1.sh" >"$1.sh"; }
+  gst-launch-1.0 -q avatartestsrc views=4 num-buffers=1 rig-export=rig.yaml ! fakesink
+  adapt camera-host 's/avatartestsrc/avatartestsrc num-buffers=60/' && sh camera-host.sh || fail camera-host
+  adapt record 's/udpsrc/udpsrc timeout=0/' && { sh record.sh & }
+  sleep 1
+  rangecast record figure.rcnc --frames 30 --size 160x120
+  gst-launch-1.0 -q filesrc location=figure.rcnc ! neighbourcodeparse ! rtpneighbourcodepay ! udpsink host=127.0.0.1 port=7000 sync=true
+  wait
+  expect_file person.rcnc 5000
+  need_gl
+  adapt play 's/x/x/' && sh play.sh || fail play
+  adapt viewer 's/x/x/' && { sh viewer.sh & } && sleep 1 && { sh parent-host.sh & }
+  kill %% 2>/dev/null || true
+  adapt rtp-with-fec 's/is-live=true/is-live=true num-buffers=60/' && { timeout -s INT 12 sh rtp-with-fec.sh || true; }
 }

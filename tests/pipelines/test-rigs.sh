@@ -163,14 +163,14 @@ END
 test_cameras_are_drawn () {
   need_gl
   gst-launch-1.0 -q avatartestsrc views=4 num-buffers=1 rig-export=rig.yaml ! fakesink
-  "$pipelines/rig-check.sh" rig.yaml --png rig.png --width 320 --height 240 >/dev/null
+  rig-check rig.yaml --png rig.png --width 320 --height 240 >/dev/null
   expect_file rig.png 3000
   expect_empty_border rig.png 320 240
   middlebury 994.978
   rig-convert middlebury calib.txt pair.yaml
-  "$pipelines/rig-check.sh" pair.yaml --png pair.png --width 320 --height 240 >/dev/null
+  rig-check pair.yaml --png pair.png --width 320 --height 240 >/dev/null
   expect_empty_border pair.png 320 240
-  expect_error "nowhere/rig.png" "$pipelines/rig-check.sh" rig.yaml --png nowhere/rig.png
+  expect_error "nowhere/rig.png" rig-check rig.yaml --png nowhere/rig.png
 }
 
 # 8 pairs of 8.4 megapixels are a rig, 16 cameras of such are not.
@@ -181,6 +181,6 @@ test_cameras_of_a_rig_with_many_pixels_are_drawn () {
   sed -i "s/^width=.*/width=4000/; s/^height=.*/height=2100/" calib.txt
   rig-convert middlebury calib.txt rig.yaml
   for id in {1..7}; do rig-convert middlebury calib.txt rig.yaml --view-id "$id" --append; done
-  "$pipelines/rig-check.sh" rig.yaml --png rig.png --width 320 --height 240 >/dev/null
+  rig-check rig.yaml --png rig.png --width 320 --height 240 >/dev/null
   expect_file rig.png 1000
 }

@@ -115,7 +115,7 @@ test_recording_has_speech_in_step_with_the_picture () {
   stop_all "$recorder" "$camera" "$parent"
   play_claps talk >claps.txt
   expect_in_step claps.txt 2
-  "$pipelines/play.sh" talk.rcnc --film talk.webm --size 160x120 --orbit 0
+  rangecast play talk.rcnc --film talk.webm --picture 160x120 --orbit 0
   rm -f film.log
   with_claps CLAP_LOG="$PWD/film.log" rangecast-run filesrc location=talk.webm ! matroskademux name=d \
     d. ! queue ! vp8dec ! fakesink name=snapshot d. ! queue ! opusdec ! audioconvert ! audioresample ! fakesink name=speaker
@@ -247,11 +247,11 @@ test_recordings_are_kept () {
   stop_all "$first"
   cmp old.rcnc live.rcnc~ || fail "the recording before is lost"
   echo speech >talk.opus
-  expect_error "'talk.opus' is the recorded speech" "$pipelines/play.sh" talk.rcnc --film talk.opus
+  expect_error "'talk.opus' is what is played" rangecast play talk.rcnc --film talk.opus
   [ -s talk.opus ] || fail "speech is lost"
   cp talk.rcnc talk.rcnc~
   cp talk.opus talk.opus~
-  RANGECAST_LAUNCH=echo "$pipelines/play.sh" talk.rcnc~ --film x.webm >launch.txt 2>&1 || true
+  rangecast play talk.rcnc~ --film x.webm --print >launch.txt 2>&1 || true
   ! grep -q 'location=talk.opus ' launch.txt || fail "$(cat launch.txt)"
 }
 

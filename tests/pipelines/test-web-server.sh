@@ -353,27 +353,31 @@ test_stream_is_served_with_tls () {
   stop_server
 }
 
-# A tree whose setup.sh has nothing to do. demo.sh is started with signals as a terminal has them: a shell that was started with
-# one ignored cannot take it.
-make_tree () {
-  mkdir tree
-  ln -s "$pipelines" tree/pipelines
-  ln -s "${RANGECAST_BUILD:-$source_dir/build}" tree/build
-  printf '#!/bin/sh\necho "$@" >"%s/setup.txt"\n' "$PWD" >tree/setup.sh
-  chmod +x tree/setup.sh
+# usage: start_demo PORT options...: starts a small demo in browsers with signals as a terminal has them -> demo
+start_demo () {
+  set -m
+  env --default-signal=INT,TERM rangecast demo --input range --views 2 --size 64x48 --fps 8 --port "$1" --out demo "${@:2}" >demo.log 2>&1 &
+  demo=$!
+  set +m
+  trap 'kill -KILL -- -$demo 2>/dev/null || true' EXIT
+}
+
+# usage: ends_demo SIGNAL STATUS: as Ctrl+C does, and nothing is left
+ends_demo () {
+  local status=0
+  kill "-$1" -- "-$demo"
+  wait "$demo" || status=$?
+  [ "$status" = "$2" ] || fail "status $status: $(cat demo.log)"
+  ! pgrep -f "rangecast-run .*$PWD/demo" || fail "hosts are left"
+  ! grep -q Traceback demo.log || fail "$(cat demo.log)"
+  trap - EXIT
 }
 
 test_demo_is_shown_in_browsers () {
   need_server
-  make_tree
   local demo port
-  set -m
-  env --default-signal=INT,TERM tree/pipelines/demo.sh --input range --views 2 --size 64x48 --fps 8 --port $((ports + 10)) --out demo --web 0 >demo.log 2>&1 &
-  demo=$!
-  set +m
-  trap 'kill -KILL -- -$demo 2>/dev/null || true' EXIT
+  start_demo $((ports + 10)) --web 0
   until_true 40 grep -q '^http.*/rig$' demo.log
-  [ "$(cat setup.txt)" = --web ] || fail "setup.sh $(cat setup.txt)"
   port=$(sed -nE 's|^http://127\.0\.0\.1:([0-9]+)/$|\1|p' demo.log)
   [ -n "$port" ] || fail "$(cat demo.log)"
   curl -sSf -o server.json "http://127.0.0.1:$port/server.json"
@@ -381,68 +385,17 @@ test_demo_is_shown_in_browsers () {
   gets 5 watch "http://127.0.0.1:$port/" "" 5
   watch "http://127.0.0.1:$port/" "" 0 stats >watched.txt || fail "$(cat watched.txt)"
   grep -q '"type":"stats"' watched.txt || fail "$(cat watched.txt)"
-  kill -INT -- "-$demo" # as Ctrl+C does
-  local status=0
-  wait "$demo" || status=$?
-  [ "$status" = 130 ] || fail "status $status"
-  no_program_is_left "$demo"
-  until_true 20 is_gone "$demo"
-  grep -q Traceback demo.log && fail "$(cat demo.log)"
-  trap - EXIT
-}
-
-# The hosts of a demo, that is; shells that copy their messages end a moment after them.
-no_program_is_left () {
-  local left
-  left=$(ps -eo pgid=,stat=,comm= | awk -v group="$1" '$1 == group && $2 !~ /^Z/ && $3 ~ /^(rangecast-run|gst-launch)/')
-  [ -z "$left" ] || fail "demo.sh returned before: $left"
+  expect_error "the server for browsers failed" rangecast demo --input range --views 1 --size 64x48 --port $((ports + 30)) --out other --web "$port"
+  ends_demo INT 130
 }
 
 test_demo_can_be_interrupted_while_it_starts () {
   need_server
-  make_tree
-  local demo status wait_for
-  for wait_for in setup.txt demo/rig.yaml demo/log/parent.log; do
-    rm -rf setup.txt demo
-    set -m
-    env --default-signal=INT,TERM tree/pipelines/demo.sh --input range --views 2 --size 64x48 --fps 8 --port $((ports + 50)) --out demo --web 0 >demo.log 2>&1 &
-    demo=$!
-    set +m
-    trap 'kill -KILL -- -$demo 2>/dev/null || true' EXIT
+  local demo wait_for
+  for wait_for in demo/rig.yaml demo/log/parent.log; do
+    rm -rf demo
+    start_demo $((ports + 50)) --web 0
     until_true 40 test -e $wait_for
-    kill -INT -- "-$demo"
-    status=0
-    wait "$demo" || status=$?
-    [ "$status" = 130 ] || fail "after $wait_for: status $status: $(cat demo.log)"
-    no_program_is_left "$demo"
-    [ $wait_for = demo/log/parent.log ] || ! grep -q '^http' demo.log || fail "it went on: $(cat demo.log)"
-    until_true 20 is_gone "$demo"
-    trap - EXIT
+    ends_demo TERM 143
   done
-}
-
-test_demo_ends_with_term_and_says_when_the_server_failed () {
-  need_server
-  make_tree
-  local demo
-  expect_error "--web and --window cannot be combined" tree/pipelines/demo.sh --web --window
-  expect_error "--web: expected a whole number from 0 to 65535" tree/pipelines/demo.sh --web 65536
-  [ ! -e setup.txt ] || fail "setup.sh was run"
-  set -m
-  env --default-signal=INT,TERM tree/pipelines/demo.sh --input range --views 1 --size 64x48 --fps 8 --port $((ports + 20)) --out demo --web 0 >demo.log 2>&1 &
-  demo=$!
-  set +m
-  trap 'kill -KILL -- -$demo 2>/dev/null || true' EXIT
-  until_true 40 grep -q '^http.*/rig$' demo.log
-  local taken
-  taken=$(sed -nE 's|^http://127\.0\.0\.1:([0-9]+)/$|\1|p' demo.log)
-  expect_error "the server for browsers failed" tree/pipelines/demo.sh --input range --views 1 --size 64x48 --fps 8 \
-    --port $((ports + 30)) --out other --web "$taken"
-  kill -TERM "$demo"
-  local status=0
-  wait "$demo" || status=$?
-  [ "$status" = 143 ] || fail "status $status"
-  no_program_is_left "$demo"
-  until_true 20 is_gone "$demo"
-  trap - EXIT
 }

@@ -59,7 +59,7 @@ median_ms (FrameSet &set, int rounds, const Work &work)
   return ms[ms.size () / 2];
 }
 
-/** What pipelines/bunny-to-range.py wrote there. */
+/** What tests/bench/bunny-to-range.py wrote there. */
 rangecast::Status load_bunny (const std::string &folder, FrameSet &set);
 
 } // namespace bench

@@ -31,7 +31,7 @@ const char *const kUsage =
     "  --pose-mm MM, --pose-deg DEGREES  what the rig is told wrong of each camera's place and\n"
     "                  direction (default: nothing, 2 mm, 5 mm and 0.5 degrees in turn)\n"
     "  --overlap PIXELS  of the filter (default 1)\n"
-    "  --bunny DIR     what pipelines/bunny-to-range.py wrote there, instead of a head\n"
+    "  --bunny DIR     what tests/bench/bunny-to-range.py wrote there, instead of a head\n"
     "  --mesh FILE     the bunny's merged mesh, PLY\n"
     "  --rounds N      times are medians of so many (default 5)\n"
     "  --json FILE     an array of objects. scene; views; noise; pose_mm; pose_deg; method;\n"

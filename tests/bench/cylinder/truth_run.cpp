@@ -13,7 +13,7 @@ namespace bench {
 
 namespace {
 
-constexpr double kBunnyScale = 3; ///< of pipelines/bunny-to-range.py
+constexpr double kBunnyScale = 3; ///< of tests/bench/bunny-to-range.py
 
 struct Method {
   const char *name;

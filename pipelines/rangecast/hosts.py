@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The hosts of the main job: camera, parent and view."""
+
+import os
+import re
+from pathlib import Path
+
+from . import options, transport
+from .launch import Fail, Launch, fail_unless, has_display
+
+QUEUE = ["queue", "max-size-buffers=2"]
+# What a viewer does between decoder and renderer.
+PREPARE = ["rangealign"]
+
+
+def size_caps(size, fps=None, media="video/x-raw"):
+    return f"{media},width={size[0]},height={size[1]}" + (f",framerate={fps}/1" if fps else "")
+
+
+# ---- camera ----
+
+INPUT_HELP = """what the pair is:
+avatar (default): the built-in figure; avatar=MODEL: a glTF or OBJ model;
+range: its exact range images, without cameras and stereo matching;
+DIR: recorded pairs DIR/viewN-left.* and -right.*, videos or pictures viewN-left-%%05d.png from 0, which begin with the empty scene;
+side-by-side=SOURCE, top-bottom=SOURCE: a stereo camera that packs both pictures into one, in gst-launch-1.0 syntax;
+cameras: the machine-vision cameras that the rig names; cameras=LEFT,RIGHT[,THIRD]: by name, serial number or address"""
+
+
+def add_camera_options(parser):
+    parser.add_argument("--input", metavar="WHAT", default="avatar", help=INPUT_HELP)
+    options.add(parser, "--size", "--fps", "--loop", "--depth", "--encoder")
+    options.add(parser, "--learn", default=20)
+    parser.add_argument("--format", choices=("rgb", "bayer", "grey"), default="rgb", help="pixel format of cameras (default rgb)")
+
+
+def add_camera(parser):
+    options.add(parser, "--view", "--rig", required=True)
+    parser.add_argument("--to", type=options.addresses, metavar="HOST:PORT", required=True, help="where the parent listens for this host")
+    add_camera_options(parser)
+    options.add(parser, "--views", "--threads")
+    parser.add_argument("--trigger", choices=("free-run", "software", "hardware", "action"), default="software",
+                        help="how cameras are triggered (default software)")  # fmt: skip
+    parser.add_argument("--clock-server", type=options.address, metavar="HOST:PORT",
+                        help="trigger by the clock that 'rangecast parent --clock-port' publishes there (default: this machine's)")  # fmt: skip
+    parser.add_argument("--action-send", choices=("yes", "no"),
+                        help="with --trigger action: whether this host sends the commands, which reach all cameras (default: that of view 0)")  # fmt: skip
+    parser.add_argument("--reconnect", action="store_true", help="wait for missing or lost cameras instead of ending")
+    options.add(parser, "--microphone", "--audio-to", "--clock")
+    options.add_sender(parser)
+    parser.set_defaults(build=build_camera)
+
+
+def recorded_side(folder, view, side, fps):
+    """One side of a recorded pair at its own speed."""
+    start = ["!", "decodebin", "!", "videoconvert", "!", "clocksync", "!", "queue", "!", f"depth.{side}"]
+    films = [path for path in Path(folder).glob(f"view{view}-{side}.*")]
+    if films:
+        return ["filesrc", f"location={films[0]}", *start]
+    pictures = list(Path(folder).glob(f"view{view}-{side}-00000.*"))
+    fail_unless(pictures, f"--input: no view{view}-{side}.* and no view{view}-{side}-00000.* in '{folder}'")
+    suffix = pictures[0].suffix
+    media = {".jpg": "image/jpeg"}.get(suffix, f"image/{suffix[1:]}")
+    return ["multifilesrc", f"location={folder}/view{view}-{side}-%05d{suffix}", f"caps={media},framerate={fps}/1", *start]
+
+
+def machine_vision(args):
+    names = args.input.partition("=")[2].split(",") if "=" in args.input else []
+    fail_unless(not names or (2 <= len(names) <= 3 and all(names)), "--input: cameras= needs LEFT,RIGHT or LEFT,RIGHT,THIRD")
+    sends = args.action_send or ("yes" if args.view == 0 else "no")
+    words = ["stereocamsrc", "name=cameras", f"trigger={args.trigger}", f"reconnect={str(args.reconnect).lower()}",
+             f"action-send={'true' if sends == 'yes' else 'false'}"]  # fmt: skip
+    if args.clock_server:
+        words.append("clock-server={}:{}".format(*args.clock_server))
+    sides = ("left", "right", "third")[: len(names) or 2]
+    words += [f"{side}={name}" for side, name in zip(sides, names)] or [f"rig={args.rig}", f"view-id={args.view}"]
+    media, convert = {
+        "rgb": ("video/x-raw,format=RGB", []),
+        "grey": ("video/x-raw,format=GRAY8", []),
+        "bayer": ("video/x-bayer", ["!", "bayer2rgb"]),
+    }[args.format]
+    for side in sides:
+        words += [f"cameras.{side}", "!", size_caps(args.size, args.fps, media), *convert, "!", *QUEUE, "!", f"depth.{side}"]
+    return words
+
+
+def camera_source(args):
+    """Words up to stereodepth's pads, and the properties of stereodepth that the source needs; None: range images."""
+    kind, _, value = args.input.partition("=")
+    views = args.views or options.count_views(args.rig)
+    scene = ["avatartestsrc", "name=cameras", "is-live=true", f"views={views}", f"view-id={args.view}", f"empty-frames={args.learn + 5}"]
+    if kind == "range":
+        return [*scene, "!", size_caps(args.size, args.fps, "video/x-range"), "!", *QUEUE], None
+    if kind == "avatar":
+        words = [*scene, f"loop-frames={args.loop}", *([f"location={options.existing_file(value)}"] if value else [])]
+        for side in ("left", "right"):
+            words += [f"cameras.{side}", "!", size_caps(args.size, args.fps) + ",format=RGBx", "!", *QUEUE, "!", f"depth.{side}"]
+        return words, []
+    if kind in ("side-by-side", "top-bottom"):
+        return [*options.elements(value), "!", *QUEUE, "!", "depth.left"], [f"packing={kind}"]
+    if kind == "cameras":
+        return machine_vision(args), []
+    fail_unless(Path(args.input).is_dir(), f"--input: '{args.input}' is none of: avatar, avatar=MODEL, range, cameras, "
+                "cameras=LEFT,RIGHT, side-by-side=SOURCE, top-bottom=SOURCE, a folder of recorded pairs")  # fmt: skip
+    return recorded_side(args.input, args.view, "left", args.fps) + recorded_side(args.input, args.view, "right", args.fps), []
+
+
+def build_camera(args):
+    in_rig = options.count_views(args.rig)
+    fail_unless(not args.views or args.views == in_rig or not args.input.startswith(("avatar", "range")),
+                f"--views is {args.views}, but the rig '{args.rig}' has {in_rig} views")  # fmt: skip
+    fail_unless(not args.loop or args.input.startswith("avatar"), "--loop is for --input avatar")
+    fail_unless(not args.depth or args.input != "range", "--depth is for cameras: --input range has no stereodepth")
+    adaptive = any(re.fullmatch(r"adaptive-bitrate=(true|t|yes|1)", one, re.I) for one in args.encoder)
+    fail_unless(not adaptive or (args.feedback_port and len(args.to) == 1 and not transport.is_multicast(args.to)),
+                "--encoder: adaptive-bitrate needs --feedback-port, and one receiver in --to")  # fmt: skip
+    source, matching = camera_source(args)
+    launch = Launch(*source)
+    if args.threads:
+        launch.environment["OPENCV_FOR_THREADS_NUM"] = str(args.threads)  # OpenCV's own pool works for our loops, too
+    if matching is None:
+        launch.add("!")
+    else:
+        launch.add("stereodepth", "name=depth", f"rig={args.rig}", f"view-id={args.view}", *matching, *args.depth, "!")
+    launch.add("roiextract", f"background-frames={args.learn}", "!", *QUEUE, "leaky=downstream", "!", "neighbourcodeenc", *args.encoder)
+    transport.send(args, launch, adaptive)
+    fail_unless(bool(args.microphone) == bool(args.audio_to), "--microphone and --audio-to need each other")
+    if args.microphone:
+        check_apart(args)
+        transport.send_speech(args, launch, args.microphone, args.audio_to, args.clock)
+    return launch
+
+
+def check_apart(args):
+    taken = set(args.to)
+    for host, port in args.audio_to:
+        fail_unless(not {(host, port), (host, port + 1)} & taken, f"--audio-to: {host}:{port}, or the next port for RTCP, is in --to as well")
+
+
+# ---- parent ----
+
+
+def add_parent(parser):
+    options.add(parser, "--views", required=True)
+    parser.add_argument("--listen", type=options.port, metavar="PORT", required=True, help="view i is received at UDP port PORT + i")
+    parser.add_argument("--to", type=options.addresses, metavar="HOST:PORT[,...]", required=True, help="where viewers listen, or a multicast group")
+    options.add(parser, "--jitter")
+    parser.add_argument("--latency", type=options.number(0, 10000), metavar="MS", default=60, help="how long to wait for a late view (default 60)")
+    parser.add_argument("--clock-port", type=options.port, metavar="PORT", help="publish the clock at this UDP port, for --clock-server")
+    parser.add_argument("--rig", type=options.existing_file, metavar="FILE", help="refuse cameras that are not in this rig")
+    options.add(parser, "--audio-port", "--audio-to")
+    parser.add_argument("--cameras", type=options.addresses, metavar="HOST:PORT[,...]", default=[], help="host and --feedback-port of each camera host")
+    parser.add_argument("--camera-fec", action="store_true", help="the camera hosts run with --fec-percent")
+    parser.add_argument("--camera-rtx", action="store_true", help="the camera hosts run with --rtx; needs --cameras")
+    options.add_sender(parser)
+    parser.set_defaults(build=build_parent)
+
+
+def build_parent(args):
+    fail_unless(args.listen + args.views <= 65536, f"--listen: no room for {args.views} ports above {args.listen}")
+    fail_unless(not args.cameras or len(args.cameras) == args.views, f"--cameras needs {args.views} addresses")
+    fail_unless(not args.camera_rtx or args.cameras, "--camera-rtx needs --cameras")
+    fail_unless(bool(args.audio_port) == bool(args.audio_to), "--audio-port and --audio-to need each other")
+    taken = {args.listen + i: f"view {i}" for i in range(args.views)}
+    for name, port in (("--clock-port", args.clock_port), ("--feedback-port", args.feedback_port), ("--audio-port", args.audio_port),
+                       ("RTCP of --audio-port", args.audio_port and args.audio_port + 1)):  # fmt: skip
+        if port:
+            fail_unless(port not in taken, f"{name}: port {port} is that of {taken.get(port)}")
+            taken[port] = name
+    for host, port in args.to + (args.audio_to or []):
+        fail_unless(not (host == "localhost" or host.startswith("127.")) or port not in taken, f"'{host}:{port}' is a port of this parent itself")
+    launch = Launch("rangemux", "name=mux", f"latency={args.latency * 1000000}")
+    if args.clock_port:
+        launch.add(f"clock-port={args.clock_port}")
+    if args.rig:
+        launch.add(f"rig={args.rig}")
+    transport.send(args, launch)
+    for i in range(args.views):
+        transport.receive(launch, args.listen + i, number=i, jitter=args.jitter, buffer=1048576, key=args.key, fec=args.camera_fec,
+                          feedback=args.cameras[i] if args.cameras else None, rtx=args.camera_rtx)  # fmt: skip
+        launch.add("!", "mux.")
+    if args.audio_port:
+        check_apart(args)
+        transport.pass_speech_on(args, launch)
+    return launch
+
+
+# ---- view ----
+
+
+def add_view(parser):
+    parser.add_argument("--out", metavar="DIR", help="write a video to DIR/avatar.webm")
+    options.add(parser, "--window", "--orbit", "--render", "--speaker", "--microphone")
+    options.add(parser, "--picture", dest="picture")
+    parser.add_argument("--talk-to", type=options.addresses, metavar="HOST:PORT", help="where the other end listens for --microphone (a call)")
+    options.add(parser, "--clock")
+    parser.add_argument("--echo-cancel", action="store_true", help="remove from the microphone what the speaker plays")
+    options.add_receiver(parser)
+    parser.set_defaults(build=build_view, ttl=1)
+
+
+def build_view(args):
+    fail_unless(bool(args.microphone) == bool(args.talk_to), "--microphone and --talk-to need each other")
+    fail_unless(not args.echo_cancel or (args.microphone and args.audio_port), "--echo-cancel needs --microphone and --audio-port")
+    heard = args.speaker != ["none"]
+    launch = Launch()
+    transport.receive_stream(args, launch)
+    if args.audio_port:
+        launch.add(*"! sync.sink_0 capturesync name=sync sync.src_0".split())
+    launch.add("!", "queue", "max-size-buffers=4", "leaky=downstream", "!", "neighbourcodedec", "name=decoder")
+    launch.add("!", "queue", "max-size-buffers=1", "leaky=downstream", "!", *PREPARE)
+    launch.add("!", "striprender", "name=view", f"auto-orbit={args.orbit}", *args.render)
+    launch.add("!", size_caps(args.picture, media="video/x-raw(memory:GLMemory)"), "!", "gldownload")
+    launch.add(*"! identity name=rendered ! tee name=picture".split())
+    # Without speech, pictures are shown as soon as they are drawn, else when they are due.
+    sync = f"sync={str(bool(args.audio_port)).lower()}"
+    show = ["picture.", "!", *QUEUE, "leaky=downstream", "!"]
+    launch.add(*show, "fakesink", "name=snapshot", sync, "async=false")
+    if args.window:
+        fail_unless(has_display() or args.print, "--window: no display: neither DISPLAY nor WAYLAND_DISPLAY is set")
+        launch.add(*show, "videoconvert", "!", "autovideosink", sync)
+    if args.out:
+        Path(args.out).mkdir(parents=True, exist_ok=True)
+        launch.add(*"picture. ! queue max-size-buffers=8 leaky=downstream ! videoconvert ! vp8enc deadline=1 cpu-used=8".split())
+        launch.add(*"target-bitrate=2000000 keyframe-max-dist=60 ! webmmux name=film ! filesink".split(), f"location={args.out}/avatar.webm")
+        launch.option("--drop-empty", f"{args.out}/avatar.webm")
+    if args.audio_port:
+        transport.receive_speech(args, launch)
+        # Silence while no speech arrives, for which sinks and the muxer would wait.
+        launch.add("!", "sync.sink_1", "sync.src_1", *transport.HEAR, "!", "mixer.")
+        launch.add(*"audiotestsrc is-live=true wave=silence ! audio/x-raw,rate=48000 ! audiomixer name=mixer".split())
+        launch.add("!", "tee", "name=said", "allow-not-linked=true")
+        if heard:
+            launch.add(*"said. ! queue ! audioconvert ! audioresample".split())
+            if args.echo_cancel:
+                launch.add(*"! audio/x-raw,format=S16LE,rate=48000,channels=1 ! webrtcechoprobe name=heard".split())
+            launch.add("!", *args.speaker)
+        if args.out:
+            launch.add(*"said. ! queue ! audioconvert ! opusenc ! queue max-size-time=0 max-size-buffers=0 ! film.".split())
+    if args.microphone:
+        # The filter finds the delay between speaker and microphone itself.
+        filters = ["!", "webrtcdsp", "probe=heard"] if args.echo_cancel and heard else []
+        transport.send_speech(args, launch, args.microphone, args.talk_to, args.clock, [*filters, "!", "volume", "name=microphone"])
+    return launch

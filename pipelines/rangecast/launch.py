@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Launch strings: how they are printed and run, and where the elements and programs are found."""
+
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+
+class Fail(Exception):
+    """Ends the program with this message and status 1."""
+
+
+def fail_unless(condition, message):
+    if not condition:
+        raise Fail(message)
+
+
+def set_up_environment():
+    """Plugins and programs of the build tree, where there is one, and OpenGL without a display where there is none."""
+    build = Path(__file__).resolve().parents[2] / "build"
+    if (build / "gst").is_dir():
+        prepend("GST_PLUGIN_PATH", build / "gst")
+        prepend("PATH", build / "tests" / "simulators")
+        prepend("PATH", build / "pipelines")
+        os.environ.setdefault("GST_REGISTRY", str(build / "registry.bin"))
+    if not has_display():
+        os.environ.setdefault("GST_GL_PLATFORM", "egl")
+        os.environ.setdefault("GST_GL_WINDOW", "egl-device")
+    fail_unless(shutil.which("rangecast-run"), "rangecast-run not found: run setup.sh, or add its folder to PATH")
+
+
+def prepend(name, folder):
+    paths = os.environ.get(name, "").split(os.pathsep)
+    if str(folder) not in paths:
+        os.environ[name] = os.pathsep.join([str(folder), *filter(None, paths)])
+
+
+def has_display():
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def has_element(name):
+    command = ["gst-inspect-1.0", "--exists", "--atleast-version=0.0.0", name]
+    return subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False).returncode == 0
+
+
+def link(*parts):
+    """Joins lists of words by '!', leaving out empty ones."""
+    words = []
+    for part in filter(None, parts):
+        words += ["!", *part] if words else part
+    return words
+
+
+class Launch:
+    """A launch string with the options of rangecast-run that it needs."""
+
+    def __init__(self, *words):
+        self.words = [str(word) for word in words]
+        self.options = []
+        self.environment = {}
+        self.print_only = False
+
+    def add(self, *words):
+        self.words += [str(word) for word in words]
+
+    def option(self, *words):
+        """Options of rangecast-run; a later one of the same name wins."""
+        self.options += [str(word) for word in words]
+
+    def command(self):
+        return ["rangecast-run", *self.options, *self.words]
+
+    def text(self):
+        """For a shell: rangecast-run where options need it, else gst-launch-1.0."""
+        words = self.command() if self.options else ["gst-launch-1.0", "-e", *self.words]
+        setting = [f"{name}={shlex.quote(value)}" for name, value in self.environment.items()]
+        return " ".join([*setting, *(word if word == "!" else shlex.quote(word) for word in words)]).replace(" ! ", " \\\n  ! ")
+
+    def run(self):
+        """Replaces this process, so that signals reach the pipeline."""
+        if self.print_only:
+            print(self.text())
+            return 0
+        os.environ.update(self.environment)
+        sys.stdout.flush()
+        os.execvp("rangecast-run", self.command())
+
+    def spawn(self, **options):
+        return subprocess.Popen(self.command(), env={**os.environ, **self.environment}, **options)

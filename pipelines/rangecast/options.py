@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Types of options, and those that several subcommands share. Each is declared once."""
+
+import argparse
+import ipaddress
+import re
+import shlex
+import socket
+from pathlib import Path
+
+Wrong = argparse.ArgumentTypeError
+
+
+def number(least, most):
+    def parse(text):
+        if not re.fullmatch(r"\d{1,18}", text) or not least <= int(text) <= most:
+            raise Wrong(f"'{text}' is not a whole number from {least} to {most}")
+        return int(text)
+
+    return parse
+
+
+port = number(1, 65535)
+even_port = number(1, 65534)  # the next one is for RTCP
+
+
+def size(text, least=16, most=4096):
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
+    if not match or not all(least <= int(n) <= most for n in match.groups()):
+        raise Wrong(f"'{text}' is not WIDTHxHEIGHT from {least}x{least} to {most}x{most}")
+    return int(match[1]), int(match[2])
+
+
+def picture(text):
+    return size(text, most=8192)
+
+
+def degrees(text):
+    if not re.fullmatch(r"-?\d{1,4}(\.\d+)?", text) or abs(float(text)) >= 3600:
+        raise Wrong(f"'{text}' is not a number of degrees a second, e.g. 30 or -7.5")
+    return text
+
+
+def metres(text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1
+    if not 0 < value < 65:
+        raise Wrong(f"'{text}' is not a distance in metres")
+    return text
+
+
+def address(text):
+    """HOST:PORT as a pair."""
+    host, colon, number_text = text.rpartition(":")
+    if not colon or not host or ":" in host:
+        raise Wrong(f"'{text}' is not HOST:PORT with a name or an IPv4 address")
+    try:
+        socket.getaddrinfo(host, None, socket.AF_INET)
+        if re.fullmatch(r"[\d.]+", host):
+            ipaddress.IPv4Address(host)
+    except (OSError, ValueError):
+        raise Wrong(f"no host '{host}'") from None
+    return host, port(number_text)
+
+
+def addresses(text):
+    return [address(one) for one in text.split(",")]
+
+
+def group(text):
+    try:
+        if ipaddress.IPv4Address(text).is_multicast:
+            return text
+    except ValueError:
+        pass
+    raise Wrong(f"'{text}' is not a group from 224.0.0.0 to 239.255.255.255")
+
+
+def interface(text):
+    if not Path("/sys/class/net", text).exists():  # elements would silently take another one
+        raise Wrong(f"no interface '{text}'")
+    return text
+
+
+def words(text):
+    try:
+        return shlex.split(text)
+    except ValueError:
+        raise Wrong(f"a quote is not closed in '{text}'") from None
+
+
+def elements(text):
+    """A launch string without its other end, such as a source, as words."""
+    found = words(text)
+    if not found or "! !" in " ".join(["!", *found, "!"]):
+        raise Wrong(f"'{text}' is not elements in gst-launch-1.0 syntax, such as pulsesrc or 'v4l2src ! jpegdec'")
+    return found
+
+
+def properties(text):
+    found = words(text)
+    for one in found:
+        if not re.fullmatch(r"[a-z][a-z0-9-]*=.+", one, re.S):
+            raise Wrong(f"'{one}' is not NAME=VALUE")
+    return found
+
+
+def existing_file(text):
+    if not Path(text).is_file():
+        raise Wrong(f"no file '{text}'")
+    return text
+
+
+def output_file(text):
+    path = Path(text)
+    if path.is_dir() or not path.parent.is_dir():
+        raise Wrong(f"'{text}' is a folder" if path.is_dir() else f"no folder '{path.parent}'")
+    return text
+
+
+def key_file(text):
+    if not re.fullmatch(r"[0-9a-fA-F]{60}\s*", Path(existing_file(text)).read_text(errors="replace")):
+        raise Wrong(f"'{text}' does not hold 60 hexadecimal digits")
+    return str(Path(text).resolve())
+
+
+def numbered(text):
+    """Whether multifilesink writes one file for each frame set, as for out-%05d.ply."""
+    return re.search(r"%\d*[diu]", text) is not None
+
+
+def count_views(rig):
+    """How many views a rig file (YAML or JSON) has."""
+    return len(re.findall(r'^[\s{-]*"?id"? *:', Path(rig).read_text(errors="replace"), re.M))
+
+
+# ---- options of several subcommands ----
+
+SHARED = {
+    "--size": dict(type=size, metavar="WxH", default="320x240", help="size of the camera pictures (default 320x240)"),
+    "--picture": dict(type=picture, metavar="WxH", default="640x480", help="size of the rendered picture (default 640x480)"),
+    "--fps": dict(type=number(1, 1000), metavar="N", default=15, help="frame sets per second (default 15)"),
+    "--frames": dict(type=number(1, 1000000), metavar="N", help="end after so many frame sets"),
+    "--views": dict(type=number(1, 64), metavar="N", help="number of stereo cameras around the person"),
+    "--view": dict(type=number(0, 63), metavar="N", help="view-id in the rig"),
+    "--rig": dict(type=existing_file, metavar="FILE", help="rig file: the calibration of all views"),
+    "--learn": dict(type=number(0, 100000), metavar="N", help="frames from which the background is learnt"),
+    "--settle": dict(type=number(0, 100000), metavar="N", help="frames to skip before that, while exposure settles"),
+    "--loop": dict(type=number(0, 100000), metavar="N", default=0,
+                   help="draw only the first N simulated pictures and repeat them, so that cameras take hardly any CPU time"),
+    "--depth": dict(type=properties, metavar="WHAT", default=[], help="properties of stereodepth, e.g. 'near=0.4 far=1.5'"),
+    "--encoder": dict(type=properties, metavar="WHAT", default=[], help="properties of neighbourcodeenc, e.g. 'profile=entropy temporal=true'"),
+    "--render": dict(type=properties, metavar="WHAT", default=[], help="properties of striprender, e.g. 'mode=strips', which is faster"),
+    "--orbit": dict(type=degrees, metavar="DEG", default="0", help="orbit, degrees per second (default 0)"),
+    "--near": dict(type=metres, metavar="M", help="nearest depth, metres"),
+    "--far": dict(type=metres, metavar="M", help="farthest depth, metres"),
+    "--turn": dict(type=degrees, metavar="DEG", default="20", help="azimuth of the rendered view from the camera's (default 20)"),
+    "--jitter": dict(type=number(0, 10000), metavar="MS", default=30, help="jitter buffer (default 30)"),
+    "--key": dict(type=key_file, metavar="FILE", help="encrypt all streams (SRTP) with the key in FILE: 60 hexadecimal digits"),
+    "--threads": dict(type=number(1, 1024), metavar="N", help="maximum number of CPU cores for stereo matching"),
+    "--window": dict(action="store_true", help="show it in a window"),
+    "--multicast": dict(type=group, metavar="GROUP", help="receive from this multicast group"),
+    "--interface": dict(type=interface, metavar="IF", help="network interface of the multicast group (default: the system's choice)"),
+    "--ttl": dict(type=number(0, 255), metavar="N", default=1, help="multicast TTL: routers to pass, plus one (default 1: this network)"),
+    "--speaker": dict(type=elements, metavar="SINK", default="autoaudiosink",
+                      help="where speech is heard, in gst-launch-1.0 syntax (default autoaudiosink; none: nowhere)"),
+    "--microphone": dict(type=elements, metavar="SOURCE", help="send speech: a source in gst-launch-1.0 syntax, e.g. pulsesrc"),
+    "--audio-to": dict(type=addresses, metavar="HOST:PORT[,...]", help="where speech goes; RTCP goes to PORT + 1"),
+    "--audio-port": dict(type=even_port, metavar="PORT", help="receive speech at this UDP port; RTCP at PORT + 1"),
+    "--clock": dict(type=lambda text: text if text == "system" else ":".join(map(str, address(text))), metavar="CLOCK", default="system",
+                    help="HOST:PORT where 'rangecast parent --clock-port' publishes the camera hosts' clock (default: this machine's)"),
+    "--out": dict(metavar="DIR", help="folder to write to"),
+}  # fmt: skip
+
+
+def add(parser, *names, **changes):
+    """Adds shared options; `changes` such as required=True apply to all of them."""
+    for name in names:
+        parser.add_argument(name, **{**SHARED[name], **changes})
+
+
+def add_sender(parser):
+    """How coded frame sets leave a host."""
+    rtp = parser.add_argument_group("RTP, to the receivers")
+    rtp.add_argument("--fec-percent", type=number(1, 100), metavar="N", help="redundant packets, from which receivers with --fec restore lost ones")
+    rtp.add_argument("--feedback-port", type=port, metavar="PORT", help="UDP port for RTCP: requests for key frame sets and lost packets")
+    rtp.add_argument("--rtx", action="store_true", help="retransmit lost packets; needs --feedback-port")
+    rtp.add_argument("--mtu", type=number(256, 65000), metavar="BYTES", help="maximum packet size (default 1400)")
+    add(rtp, "--key", "--interface", "--ttl")
+
+
+def add_receiver(parser, listen_required=True):
+    """How coded frame sets come to a host."""
+    rtp = parser.add_argument_group("RTP, from the sender")
+    rtp.add_argument("--listen", type=port, metavar="PORT", required=listen_required, help="UDP port of the stream")
+    rtp.add_argument("--fec", action="store_true", help="restore lost packets; the sender needs --fec-percent")
+    rtp.add_argument("--feedback-to", type=address, metavar="HOST:PORT", help="send RTCP there: the sender's host and its --feedback-port")
+    rtp.add_argument("--rtx", action="store_true", help="request lost packets again; needs --feedback-to, and --rtx of the sender")
+    add(rtp, "--jitter", "--key", "--multicast", "--interface", "--audio-port")

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The parts of launch strings between coded frame sets or speech and UDP. docs/guide/streaming.md and speech.md explain them."""
+
+from .launch import fail_unless
+
+FIELDS = "media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE"
+FEEDBACK = "rtcp-fb-nack-pli=(boolean)true,rtcp-fb-nack=(boolean)true"
+# Transport-wide feedback, from which neighbourcodeenc adaptive-bitrate=true detects congestion.
+TWCC = "extmap-1=(string)http://www.ietf.org/id/draft-holmer-rmcat-transport-wide-cc-extensions-01"
+RTX_MAP = "application/x-rtp-pt-map,96=(uint)97,122=(uint)123"
+# Every packet of speech says when it was captured (RFC 6051), on the clock of the camera hosts; so does RTCP.
+SPEECH = (
+    "media=audio,clock-rate=48000,encoding-name=OPUS,payload=111,extmap-2=(string)urn:ietf:params:rtp-hdrext:ntp-64"
+)
+# opusdec hides lost packets; its default tolerance would let sound be 40 ms away from its time.
+HEAR = "! queue max-size-time=2000000000 max-size-buffers=0 ! opusdec plc=true tolerance=5000000 ! audioconvert ! audioresample".split()
+
+
+def join(addresses, plus=0):
+    return ",".join(f"{host}:{port + plus}" for host, port in addresses)
+
+
+def is_multicast(addresses):
+    return any(host.split(".")[0].isdigit() and 224 <= int(host.split(".")[0]) < 240 for host, _ in addresses)
+
+
+def check_sender(args):
+    fail_unless(not args.rtx or args.feedback_port, "--rtx needs --feedback-port")
+    fail_unless(not args.interface or is_multicast(args.to), "--interface is for a multicast group in --to")
+
+
+def check_receiver(args):
+    fail_unless(not args.rtx or args.feedback_to, "--rtx needs --feedback-to")
+    fail_unless(not args.interface or args.multicast, "--interface is for --multicast")
+    fail_unless(args.audio_port is None or args.listen not in (args.audio_port, args.audio_port + 1),
+                f"--audio-port {args.audio_port}, or the next one for RTCP, is that of --listen")  # fmt: skip
+
+
+def sink(addresses, args, plus=0):
+    words = ["multiudpsink", f"clients={join(addresses, plus)}", "sync=false", "async=false", f"ttl-mc={args.ttl}"]
+    return words + ([f"multicast-iface={args.interface}"] if args.interface else [])
+
+
+def send(args, launch, adaptive=False):
+    """Adds the elements that send coded frame sets to args.to."""
+    check_sender(args)
+    launch.add("!", "rtpneighbourcodepay", *([f"mtu={args.mtu}"] if args.mtu else []))
+    if args.feedback_port:
+        # rtpsession would mix the transport-wide feedback of several receivers, and remembers every packet until feedback comes.
+        twcc = adaptive and len(args.to) == 1 and not is_multicast(args.to)
+        launch.add("!", f"application/x-rtp,{FEEDBACK}" + (f",{TWCC}" if twcc else ""))
+    if args.fec_percent:
+        launch.add("!", "rtpulpfecenc", f"percentage={args.fec_percent}", "pt=122")
+    if args.rtx:
+        launch.add("!", "rtprtxsend", "max-size-time=500", f"payload-type-map={RTX_MAP}")
+    if args.feedback_port:
+        launch.add("!", "session.send_rtp_sink", "session.send_rtp_src")
+    if args.key:
+        launch.add("!", "encrypt.rtp_sink_0", "srtpenc", "name=encrypt", "encrypt.rtp_src_0")
+        launch.option("--srtp-key", args.key)
+    launch.add("!", *sink(args.to, args))
+    if args.feedback_port:
+        launch.add("rtpsession", "name=session", "rtp-profile=avpf", "udpsrc", f"port={args.feedback_port}", "reuse=false")
+        if args.key:
+            launch.add("caps=application/x-srtcp", "!", "decrypt.rtcp_sink", "srtpdec", "name=decrypt", "decrypt.rtcp_src")
+        else:
+            launch.add("caps=application/x-rtcp")
+        launch.add("!", "session.recv_rtcp_sink")
+
+
+def receive(launch, port, *, number=0, jitter, buffer=4194304, group=None, interface=None, key=None, fec=False, feedback=None, rtx=False):
+    """Adds the elements that receive coded frame sets from a port. `number` makes names unique among several receivers."""
+    kind = "application/x-srtp" if key else "application/x-rtp"
+    launch.add("udpsrc", f"port={port}", f"buffer-size={buffer}", f"caps={kind},{FIELDS},payload=96,{FEEDBACK},{TWCC}")
+    launch.add(*udp_group(group, interface))
+    if key:
+        launch.add("!", f"decrypt{number}.rtp_sink", "srtpdec", f"name=decrypt{number}", f"decrypt{number}.rtp_src")
+        launch.option("--srtp-key", key)
+    launch.add("!", "rtpneighbourcodeguard")
+    if feedback:
+        launch.add("!", "capssetter", "caps=application/x-rtp,payload=96", "!", f"session{number}.recv_rtp_sink", "rtpsession",
+                   f"name=session{number}", "rtp-profile=avpf", "rtcp-min-interval=20000000", f"session{number}.send_rtcp_src")  # fmt: skip
+        if key:
+            launch.add("!", f"encrypt{number}.rtcp_sink_0", "srtpenc", f"name=encrypt{number}", f"encrypt{number}.rtcp_src_0")
+        launch.add("!", "udpsink", f"host={feedback[0]}", f"port={feedback[1]}", "sync=false", "async=false", f"session{number}.recv_rtp_src")
+    # Also without --rtx: it drops retransmissions that another receiver requested.
+    launch.add("!", "rtprtxreceive", f"payload-type-map={RTX_MAP}")
+    if feedback:
+        launch.add("!", "rtpneighbourcodeguard")  # names the stream in requests
+    if fec:
+        launch.add("!", "rtpstorage", "size-time=500000000")
+    # A restarted sender begins at a random sequence number: accept a second of loss at most.
+    launch.add("!", "rtpjitterbuffer", f"latency={jitter}", "max-dropout-time=1000", "max-misorder-time=500")
+    if rtx:  # without rtx-next-seqnum=false the first packet of a frame set later than the one before counts as lost
+        launch.add("do-retransmission=true", "rtx-next-seqnum=false")
+    if fec:
+        launch.add("do-lost=true", "!", "rtpulpfecdec", "pt=122")
+    launch.add("!", "rtpneighbourcodedepay")
+
+
+def receive_stream(args, launch):
+    """The same, as options.add_receiver() has it."""
+    check_receiver(args)
+    receive(launch, args.listen, jitter=args.jitter, group=args.multicast, interface=args.interface, key=args.key, fec=args.fec,
+            feedback=args.feedback_to, rtx=args.rtx)  # fmt: skip
+
+
+def udp_group(group, interface):
+    if not group:
+        return ["reuse=false"]
+    return [f"address={group}", "reuse=true", *([f"multicast-iface={interface}"] if interface else [])]  # several viewers on a host
+
+
+def send_speech(args, launch, source, to, clock, filters=()):
+    """Adds the elements from a microphone to UDP. The pipeline's clock has to be that of the camera hosts."""
+    launch.option("--clock", clock)
+    launch.add(*source)
+    if any(word == "filesrc" or word == "audiotestsrc" or word.startswith("uri") for word in source):
+        launch.add("!", "identity", "sync=true")  # these would be read as fast as the disk allows; others are live
+    launch.add(*"! queue max-size-time=200000000 max-size-buffers=0 leaky=downstream ! audioconvert ! audioresample".split())
+    launch.add("!", "audio/x-raw,format=S16LE,rate=48000,channels=1", *filters)
+    launch.add(*"! opusenc audio-type=voice tolerance=5000000 bitrate=32000 ! rtpopuspay pt=111".split())
+    launch.add("!", f"application/x-rtp,{SPEECH}", "!", "speech.send_rtp_sink")
+    launch.add(*"rtpsession name=speech ntp-time-source=clock-time rtcp-sync-send-time=false speech.send_rtp_src".split())
+    if args.key:
+        launch.add(*"! encrypt-speech.rtp_sink_0 srtpenc name=encrypt-speech encrypt-speech.rtp_src_0".split())
+        launch.option("--srtp-key", args.key)
+    launch.add("!", *sink(to, args), "speech.send_rtcp_src")
+    if args.key:
+        launch.add("!", "encrypt-speech.rtcp_sink_0", "encrypt-speech.rtcp_src_0")
+    # rtpsession ends its RTCP only if sending BYE takes longer than its handling of EOS (GStreamer 1.22).
+    launch.add("!", "identity", "sleep-time=5000", "!", *sink(to, args, 1))
+
+
+def receive_speech(args, launch):
+    """Adds the elements that receive Opus packets from args.audio_port."""
+    kind = "application/x-srtp" if args.key else "application/x-rtp"
+    launch.add("udpsrc", f"port={args.audio_port}", f"caps={kind},{SPEECH}", *udp_group(args.multicast, args.interface))
+    if args.key:
+        launch.add(*"! decrypt-speech.rtp_sink srtpdec name=decrypt-speech decrypt-speech.rtp_src".split())
+        launch.option("--srtp-key", args.key)
+    launch.add("!", "rtpneighbourcodeguard", "!", "rtpjitterbuffer", f"latency={args.jitter}", "max-dropout-time=1000",
+               "max-misorder-time=500", "do-lost=true", "!", "rtpopusdepay")  # fmt: skip
+
+
+def pass_speech_on(args, launch):
+    """Adds the elements that send the packets of both ports on as they are."""
+    launch.add("udpsrc", f"port={args.audio_port}", "reuse=false", f"caps=application/x-rtp,{SPEECH}", "!", "rtpneighbourcodeguard")
+    launch.add("!", *sink(args.audio_to, args), "udpsrc", f"port={args.audio_port + 1}", "reuse=false", "caps=application/x-rtcp")
+    launch.add("!", *sink(args.audio_to, args, 1))

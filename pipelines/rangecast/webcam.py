@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""webcam: a USB stereo camera, plugged in, to an avatar in a window."""
+
+import os
+import subprocess
+import sys
+
+from . import options
+from .launch import Launch, fail_unless, has_display
+
+
+def add_webcam(parser):
+    parser.add_argument("--device", default="/dev/video0", metavar="FILE", help="the camera (default /dev/video0): packs both pictures into one")
+    parser.add_argument("--input", type=options.elements, metavar="SOURCE", help="another source of packed pictures, in gst-launch-1.0 syntax")
+    parser.add_argument("--packing", choices=("side-by-side", "top-bottom"), default="side-by-side", help="default side-by-side")
+    parser.add_argument("--size", type=options.size, metavar="WxH", default="1280x480", help="size of the packed pictures (default 1280x480)")
+    options.add(parser, "--fps", default=30)
+    parser.add_argument("--rig", default="webcam.yaml", metavar="FILE",
+                        help="the camera's calibration (default webcam.yaml); if there is none, 'rangecast calibrate' makes it first")  # fmt: skip
+    parser.add_argument("--calibrate", type=options.words, metavar="OPTIONS", default=[], help="options of that, e.g. '--square 0.03'")
+    options.add(parser, "--learn", default=0)
+    options.add(parser, "--settle", "--depth")
+    parser.add_argument("--png", type=options.output_file, metavar="FILE",
+                        help="write one picture instead of opening a window: the first one, or with --learn the 30th with somebody in it")  # fmt: skip
+    parser.set_defaults(build=build_webcam)
+
+
+def build_webcam(args):
+    fail_unless(args.png or args.print or has_display(), "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --png FILE")
+    source = args.input
+    if not source:
+        fail_unless(args.print or os.path.exists(args.device),
+                    f"--device: no camera '{args.device}'; gst-device-monitor-1.0 Source/Video/Stereo lists those with two lenses")  # fmt: skip
+        pixels = f"width={args.size[0]},height={args.size[1]},framerate={args.fps}/1"  # larger sizes are often JPEG only
+        source = ["v4l2src", f"device={args.device}", "!", f"image/jpeg,{pixels};video/x-raw,{pixels}", "!", "decodebin", "!", "videoconvert"]
+    if not args.print and not os.path.exists(args.rig):
+        calibrate(args, source)
+    launch = Launch(*source, *"! queue max-size-buffers=2 ! depth.left stereodepth name=depth".split())
+    launch.add(f"packing={args.packing}", f"rig={args.rig}", *args.depth)
+    settle = args.settle if args.settle is not None else 0 if args.input else 10 * args.fps
+    if args.learn:
+        launch.add("!", "roiextract", f"settle-frames={settle}", f"background-frames={args.learn}")
+        if settle and not args.print:
+            print(f"leave the picture now; learning the background begins in about {settle // args.fps} s", flush=True)
+    picture = "! rangerender ! video/x-raw,width=640,height=480"
+    if not args.png:
+        launch.add(*f"{picture} ! queue ! videoconvert ! autovideosink".split())
+        return launch
+    # rangecast-run counts from the first frame set with points at the element named decoder, and writes the last picture.
+    launch.add(*f"! identity name=decoder {picture} ! identity name=rendered ! videoconvert ! fakesink name=snapshot".split())
+    patience = 60 + 2 * (args.learn + settle) // args.fps if args.learn else 30
+    launch.option("--frames", 30 if args.learn else 1, "--timeout", patience, "--snapshot", args.png)
+    return launch
+
+
+def calibrate(args, source):
+    options.output_file(args.rig)
+    command = [sys.executable, sys.argv[0], "calibrate", f"--{args.packing}", " ".join(source), "--out", args.rig, "--far", "1.2"]
+    command += ["--auto-finish", *([] if args.png else ["--window"]), *args.calibrate]
+    print(f"no '{args.rig}' yet: calibrating; show the camera a chessboard in all parts of the picture (Ctrl-C finishes)", flush=True)
+    fail_unless(subprocess.run(command, check=False).returncode == 0, "the calibration failed")

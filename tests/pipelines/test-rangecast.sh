@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+# The program rangecast: what it refuses, what it prints, and that what it prints runs. Its commands in real use: test-demo,
+# test-files, test-speech, test-calibrate, test-cameras, test-web-server.
+side_by_side=4
+
+make_rig () { gst-launch-1.0 -q avatartestsrc views=2 num-buffers=1 rig-export=rig.yaml ! fakesink; }
+
+# usage: refuses TEXT command options...: status 1 or 2 and one line that holds TEXT
+refuses () {
+  expect_error "$1" rangecast "${@:2}"
+}
+
+test_each_command_has_help () {
+  local command
+  rangecast --help >help.txt
+  for command in demo camera parent view record play webcam calibrate call serve convert check; do
+    grep -q "^    $command " help.txt || fail "$command is not in: $(cat help.txt)"
+    rangecast "$command" --help | grep -q "^usage: rangecast $command" || fail "no help of $command"
+  done
+}
+
+test_values_out_of_range_are_named () {
+  refuses "argument --views: '99' is not a whole number from 1 to 64" demo --views 99
+  refuses "argument --size: 'big' is not WIDTHxHEIGHT" record x.rcnc --size big
+  refuses "argument --size: '16384x16384' is not WIDTHxHEIGHT from 16x16 to 4096x4096" record x.rcnc --size 16384x16384
+  refuses "argument --listen: '70000' is not a whole number from 1 to 65535" view --listen 70000
+  refuses "argument --orbit: '4000' is not a number of degrees" view --listen 5000 --orbit 4000
+  refuses "argument --jitter: expected one argument" view --listen 5000 --jitter
+  refuses "the following arguments are required: --view, --rig, --to" camera
+  refuses "unrecognized arguments: --loop" view --listen 5000 --loop
+}
+
+test_addresses_are_checked () {
+  local one
+  for one in ::1:5901 127.0.0.1 :5901 127.0.0.1:70000 239.255.7.300:5000 127.0.0.1:6000, nosuchhost.invalid:5; do
+    refuses "argument --to: " parent --views 1 --listen 5000 --to "$one"
+  done
+  refuses "'10.0.0.1' is not a group" view --listen 5000 --multicast 10.0.0.1
+  refuses "no interface 'nosuch0'" view --listen 5000 --multicast 239.255.7.1 --interface nosuch0
+}
+
+test_files_are_checked () {
+  refuses "no folder 'nowhere'" record nowhere/x.rcnc
+  refuses "'.' is a folder" record .
+  refuses "no file 'none.rcnc'" play none.rcnc --film x.webm
+  refuses "no file 'none.yaml'" camera --view 0 --rig none.yaml --to 127.0.0.1:5000
+  echo 123 >key
+  refuses "'key' does not hold 60 hexadecimal digits" view --listen 5000 --key key
+  echo "no recording" >text.rcnc
+  refuses "No access unit found" play text.rcnc --film film.webm
+  [ ! -e film.webm ] || fail "an empty film is left"
+}
+
+test_elements_and_properties_in_options_are_words () {
+  make_rig
+  local camera=(camera --view 0 --rig rig.yaml --to 127.0.0.1:6000)
+  refuses "a quote is not closed" "${camera[@]}" --depth 'a "'
+  refuses "'strips' is not NAME=VALUE" view --listen 5000 --render strips
+  refuses "'!' is not NAME=VALUE" "${camera[@]}" --depth 'near=1 ! fakesink'
+  refuses "is not elements in gst-launch-1.0 syntax" "${camera[@]}" --microphone 'pulsesrc !' --audio-to 127.0.0.1:7000
+  rangecast "${camera[@]}" --print --input 'side-by-side=filesrc location="a b" ! $(touch run) ! `touch run`; touch run' >words.txt
+  [ ! -e run ] || fail "a shell has run what the option holds"
+  grep -qF "'location=a b'" words.txt || fail "$(cat words.txt)"
+  refuses "out of range for property 'n-threads'" "${camera[@]}" --input range --encoder n-threads=1000
+}
+
+test_options_that_need_each_other_say_so () {
+  make_rig
+  local camera=(camera --view 0 --rig rig.yaml --to 127.0.0.1:6000) parent=(parent --views 4 --listen 5000 --to 127.0.0.1:6000)
+  refuses "--rtx needs --feedback-port" "${camera[@]}" --rtx
+  refuses "adaptive-bitrate needs --feedback-port" "${camera[@]}" --encoder adaptive-bitrate=true
+  refuses "--loop is for --input avatar" "${camera[@]}" --loop 3 --input range
+  refuses "--views is 3, but the rig 'rig.yaml' has 2 views" "${camera[@]}" --views 3
+  refuses "--input: 'nowhere' is none of" "${camera[@]}" --input nowhere
+  refuses "cameras= needs LEFT,RIGHT" "${camera[@]}" --input cameras=one
+  refuses "127.0.0.1:6000, or the next port for RTCP, is in --to" "${camera[@]}" --microphone audiotestsrc --audio-to 127.0.0.1:6000
+  refuses "--camera-rtx needs --cameras" "${parent[@]}" --camera-rtx
+  refuses "--cameras needs 4 addresses" "${parent[@]}" --cameras 127.0.0.1:1
+  refuses "--feedback-port: port 5002 is that of view 2" "${parent[@]}" --feedback-port 5002
+  refuses "--feedback-port: port 5100 is that of --clock-port" "${parent[@]}" --clock-port 5100 --feedback-port 5100
+  refuses "'127.0.0.1:5002' is a port of this parent itself" parent --views 4 --listen 5000 --to 127.0.0.1:5002
+  refuses "--rtx needs --feedback-to" view --listen 5000 --rtx
+  refuses "--interface is for --multicast" view --listen 5000 --interface lo
+  refuses "--echo-cancel needs" view --listen 5000 --echo-cancel
+  refuses "options of RTP need --listen" record x.rcnc --audio-port 5000
+  refuses "exclude each other" serve --anonymous --token x
+  refuses "--private-key needs --certificate" serve --private-key rig.yaml
+  refuses "needs RECORDING OUT" convert one
+  refuses "needs --rig, or --focal-length" convert rig.yaml rig.yaml out.png
+  ! compgen -G 'x.rcnc*' || fail "a file was written"
+}
+
+test_printed_strings_run_in_a_shell () {
+  rangecast record "a b.rcnc" --frames 4 --size 64x48 --views 1 --print >string.sh
+  grep -q "^rangecast-run --drop-empty 'a b.rcnc'" string.sh || fail "$(cat string.sh)"
+  bash string.sh
+  expect_file "a b.rcnc" 500
+  rangecast convert "a b.rcnc" 'cloud-%d.ply' --print >string.sh
+  grep -q '^gst-launch-1.0 -e ' string.sh || fail "$(cat string.sh)"
+  bash string.sh >/dev/null
+  expect_file cloud-3.ply 500
+}
+
+test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
+  make_rig
+  local camera=(camera --view 0 --rig rig.yaml --input range --to 127.0.0.1:6000 --feedback-port 5100 --print)
+  rangecast "${camera[@]}" >fixed.txt
+  rangecast "${camera[@]}" --encoder adaptive-bitrate=true >adaptive.txt
+  ! grep -q transport-wide fixed.txt && grep -q transport-wide adaptive.txt || fail "$(cat fixed.txt adaptive.txt)"
+}
+
+test_ports_in_use_are_named () {
+  python3 -c 'import socket, time
+s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", 20200)); print("bound", flush=True); time.sleep(100)' >blocker.txt &
+  until_true 20 grep -q bound blocker.txt
+  refuses 20200 view --listen 20200
+  refuses 20200 parent --views 1 --listen 20200 --to 127.0.0.1:20201
+  refuses 20200 record none.rcnc --listen 20200
+  [ ! -e none.rcnc ] || fail "an empty file is left"
+}
+
+test_recordings_are_kept () {
+  rangecast record good.rcnc --frames 3 --size 160x120 --views 1
+  cp good.rcnc before.rcnc
+  refuses "'good.rcnc' is what is played" play good.rcnc --film good.rcnc
+  rangecast record good.rcnc --listen 20300 >record.log 2>&1 &
+  until_true 60 takes_interrupt $!
+  refuses "'good.rcnc' is being recorded by another program" record good.rcnc --listen 20301
+  kill -INT $!
+  ! wait $! || fail "nothing came, but no error"
+  cmp good.rcnc~ before.rcnc || fail "the recording before is gone"
+  [ ! -e good.rcnc ] || fail "an empty file is left"
+}
+
+test_check_says_what_this_machine_lacks () {
+  rangecast check >said.txt || true
+  grep -q '^ok .*neighbourcodeenc' said.txt || fail "$(cat said.txt)"
+  grep -qE '^(ok|missing) .*UDP receive buffers' said.txt || fail "$(cat said.txt)"
+  make_rig
+  rangecast check rig.yaml | grep -q 'view' || fail "no geometry"
+  echo "views: [[[" >bad.yaml
+  refuses bad.yaml check bad.yaml
+}
+
+test_bash_completes_commands_and_options () {
+  source "$pipelines/rangecast/completion.bash"
+  COMP_WORDS=(rangecast ca) COMP_CWORD=1
+  _rangecast
+  [ "${COMPREPLY[*]}" = "camera calibrate call" ] || fail "${COMPREPLY[*]}"
+  COMP_WORDS=(rangecast view --mu) COMP_CWORD=2
+  _rangecast
+  [ "${COMPREPLY[*]}" = --multicast ] || fail "${COMPREPLY[*]}"
+}
