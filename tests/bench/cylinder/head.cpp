@@ -51,7 +51,7 @@ make_surface (const HeadSettings &settings, Head &head)
   Figure figure;
   if (settings.model.empty ())
     figure = make_figure (SceneSettings{}.seed, settings.dress);
-  else if (Status s = load_model ({settings.model, "", false}, figure); !s.ok ())
+  else if (Status s = load_model ({settings.model}, figure); !s.ok ())
     return s;
   std::vector<Vec3> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
