@@ -270,7 +270,7 @@ ViewEncoder::code (PartitionId id, PartitionEncoder &memory)
   const PlainSettings plain = {
       settings_.depth_threshold, settings_.colour_threshold, settings_.max_slice_size};
   if (settings_.profile != Profile::kPlain) {
-    const CompactPicture picture = {image_, reference_, {depth_, colour_}, plain_codes_,
+    const CompactPicture picture = {image_, reference_, {depth_, colour_},
         compact_settings (band.plan.fine), motions_, refresh_.band_rows ()};
     if (!memory.compact.code_partition (
             picture, band.plan.rows, header, partition.bytes, partition.result))

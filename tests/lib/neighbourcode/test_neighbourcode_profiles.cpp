@@ -356,56 +356,6 @@ TEST_P (Profiles, code_for_every_cpu_and_for_this_one_do_the_same)
   }
 }
 
-/* AVX2 codes several rows of packed key slices at once, where the outline and the slices allow it.
- */
-TEST_P (Profiles, ragged_outlines_and_deep_steps_are_the_same_with_code_for_every_cpu)
-{
-  if (cpu_supports () < CpuLevel::kAvx2)
-    GTEST_SKIP () << "this CPU has no AVX2";
-  std::mt19937 random (11);
-  const auto below = [&] (int n) { return static_cast<int> (random () % unsigned (n)); };
-  Rig wide = ring_rig (1); /* with depths whose differences exceed 16 bits */
-  wide.views[0].near_m = wide.views[0].depth_unit_m;
-  wide.views[0].far_m = 65535 * wide.views[0].depth_unit_m;
-  AccessUnitDecoder wide_decoder;
-  ASSERT_TRUE (wide_decoder.set_rig (wide).ok ());
-  for (int i = 0; i < 200; i++) {
-    const bool is_wide = i % 2;
-    const Rig &the_rig = is_wide ? wide : rig ();
-    const Roi roi = {below (9), below (9), 1 + i % 75, 1 + below (40)};
-    std::vector<Picture> pictures;
-    pictures.emplace_back (0, roi, random (), below (30));
-    int left = below (roi.width), right = left + below (roi.width);
-    const int islands = 2 + below (40),
-              step = below (2) ? 1 : 1 + below (i % 8 == 1 ? 20000 : 5000);
-    for (int y = 0; y < roi.height; y++) {
-      left += below (7) - 3;
-      right += below (7) - 3;
-      for (int x = 0; x < roi.width; x++) {
-        const bool valid = below (islands) == 0 || (x >= left && x < right && below (25) > 0);
-        std::uint16_t &depth = pictures[0].depth.view ().at (x, y);
-        depth = static_cast<std::uint16_t> (valid ? 3500 + x + 2 * y + step * below (3) : 0);
-        if (below (6) == 0)
-          pictures[0].colour.view ().at (x, y).g = static_cast<std::uint8_t> (below (256));
-      }
-    }
-    const EncoderSettings s =
-        settings (6 + below (11), 4 + below (5), below (3) ? below (40) : below (65536),
-            below (3) ? below (20) : below (256), 256 + (i % 3 ? below (400) : below (9000)));
-    const auto bytes = encode (the_rig, pictures, s);
-    Decoded here = decode_exact (is_wide ? wide_decoder : decoder, bytes);
-    limit_cpu (CpuLevel::kScalar);
-    const auto other_bytes = encode (the_rig, pictures, s);
-    AccessUnitDecoder other;
-    ASSERT_TRUE (other.set_rig (the_rig).ok ());
-    Decoded there = decode_exact (other, bytes);
-    limit_cpu (CpuLevel::kAvx2);
-    ASSERT_EQ (bytes, other_bytes) << i;
-    ASSERT_EQ (here.result.bad_slices + there.result.bad_slices, 0u) << i;
-    expect_same (here.pictures[0], there.pictures[0]);
-  }
-}
-
 /* Of a noisy surface that moves and comes nearer. */
 TEST_P (Profiles, slices_with_references_are_the_same_with_code_for_every_cpu)
 {

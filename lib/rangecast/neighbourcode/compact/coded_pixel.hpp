@@ -222,15 +222,6 @@ predict (const Neighbours &n, PixelCode last, Components max)
   return (mean & ~depth_only) | (clamped (plane, Components{}, max) & depth_only);
 }
 
-/** The same from codes alone, which are kNoPixel for invalid pixels only.
- *  @param upper  the pixel above, between its neighbours */
-[[gnu::always_inline]] inline Components
-predict (PixelCode left, const PixelCode *upper, PixelCode last, Components max)
-{
-  const PixelState states[] = {upper[-1] != kNoPixel, upper[0] != kNoPixel, upper[1] != kNoPixel};
-  return predict ({{left, PixelState{left != kNoPixel}}, upper, states + 1}, last, max);
-}
-
 /** Whether predict () uses only pixels that were received. */
 inline bool
 can_predict (const Neighbours &n, PixelCode last)

@@ -94,7 +94,7 @@ write_row (const std::uint64_t *row, std::size_t columns, std::uint16_t *depth, 
 
 } // namespace
 
-/* ---- packed, slices without key ---- */
+/* ---- packed ---- */
 
 /* A pixel that equals no neighbour. */
 inline bool
@@ -108,7 +108,7 @@ CompactDecoder::decode_full (
     return true;
   }
   Components residual;
-  if (!code.residual (n, n.any (), residual))
+  if (!code.residual (n.any (), residual))
     return false;
   const Components made = correct (expected, residual, steps_, limits_);
   pixel = {known ? pack_components (made) : kNoPixel, state_of (Origin::kCorrected)};
@@ -117,6 +117,7 @@ CompactDecoder::decode_full (
 
 /* Decodes a run of valid pixels, which follows an invalid one. The loop keeps what it needs of this
  * object in local variables, the code too, so that it stays in registers. */
+template <bool Delta>
 inline bool
 CompactDecoder::decode_run (PackedReader &slice_code, const CompactQuantisers &quantisers,
     std::size_t begin, std::size_t end)
@@ -132,7 +133,7 @@ CompactDecoder::decode_run (PackedReader &slice_code, const CompactQuantisers &q
   PackedReader code = slice_code;
   for (std::size_t x = begin; x < end; x++) {
     const Neighbours n = {left, upper_codes + x, upper_states + x};
-    if (row_.earlier ()[x]) {
+    if (Delta && row_.earlier ()[x]) {
       codes[x] = left.code = earlier_codes_[x];
       states[x] = left.state = copy_state (kTakeEarlier);
       shown[x] = left_shown = left.code == kNoPixel ? 0 : shown_as (left.code, quantisers, limits_);
@@ -173,101 +174,6 @@ predict_between (PixelCode left, const PixelCode *upper, Components max)
   return (mean & ~depth_only) | (plane & depth_only);
 }
 
-/* ---- packed, key slices ---- */
-
-/* predict() for waves' contexts.
- * @param above  context of the two pixels above and to the right */
-[[gnu::always_inline]] inline Components
-predict_packed (
-    PixelCode left, const PixelCode *upper, unsigned above, PixelCode last, Components max)
-{
-  if (left == kNoPixel || upper[-1] == kNoPixel || (above & PackedStep::context (0xc)) == 0 ||
-      (above & PackedStep::context (0x30)) == 0) [[unlikely]]
-    return predict (left, upper, last, max);
-  return predict_between (left, upper, max);
-}
-
-/* Decodes a run of valid pixels, which follows an invalid one: as decode_run(), but of the
- * neighbours there are only their kinds, and shown pixels come later. */
-inline bool
-CompactDecoder::decode_packed_run (PackedReader &slice_code, std::size_t begin, std::size_t end)
-{
-  PixelCode *const codes = row_.codes ();
-  const PixelCode *const upper = upper_.codes ();
-  std::uint8_t *const kinds = kinds_.data () + 1;
-  const std::uint16_t *const contexts = contexts_.data ();
-  const PixelCode upper_left = upper[static_cast<std::ptrdiff_t> (begin) - 1];
-  const Components steps = steps_;
-  const PixelLimits limits = limits_;
-  PixelCode left = kNoPixel;
-  std::uint32_t left_kind = 0;
-  bool no_code = contexts[begin] == 0 && upper_left == kNoPixel; /* no neighbour: no choice */
-  PackedReader code = slice_code;
-  for (std::size_t x = begin; x < end; x++) {
-    const std::uint32_t context = contexts[x] + left_kind;
-    const PackedStep step = code.next_step (context);
-    const unsigned chosen = no_code ? unsigned{kCorrect} : step.chosen ();
-    if (chosen < kPredict) [[likely]] {
-      code.take_step (step);
-      left = select (
-          zero_mask (chosen), left, upper[static_cast<std::ptrdiff_t> (x + chosen) - kTakeUpper]);
-      if (left == kNoPixel) /* equals an invalid one */
-        return false;
-      left_kind = step.kind ();
-    } else {
-      if (chosen > kCorrect)
-        return false;
-      Components made = predict_packed (left, upper + x, contexts[x], last_, limits.max);
-      if (chosen == kCorrect) {
-        if (!no_code)
-          code.take_correct (context);
-        Components residual;
-        if (!code.residual (!no_code, residual))
-          return false;
-        made = correct (made, residual, steps, limits);
-      } else {
-        code.take_step (step);
-      }
-      left = pack_components (made);
-      left_kind = PackedStep::context (3);
-      no_code = false;
-    }
-    codes[x] = left;
-    kinds[x] = static_cast<std::uint8_t> (left_kind >> kMaxChoiceBits);
-  }
-  last_ = left;
-  slice_code = code;
-  return true;
-}
-
-bool
-CompactDecoder::decode_packed_row (PackedReader &code, const CompactQuantisers &quantisers,
-    int columns, std::uint16_t *depth, Rgbx *colour, std::uint64_t &points)
-{
-  if (!decode_valid_bits (code, columns))
-    return false;
-  return for_this_cpu ([&, width = static_cast<std::size_t> (columns)] {
-    std::uint8_t *const kinds = kinds_.data () + 1;
-    std::uint16_t *const contexts = contexts_.data ();
-    for (std::size_t x = 0, n = width; x < n; x++) /* a copy: bytes may alias what is captured */
-      contexts[x] = static_cast<std::uint16_t> (
-          PackedStep::context (unsigned{kinds[x]} << 2 | unsigned{kinds[x + 1]} << 4));
-    std::fill_n (row_.codes (), width, kNoPixel);
-    std::fill_n (kinds, width, std::uint8_t{0});
-    std::fill_n (depth, width, std::uint16_t{0});
-    std::fill_n (colour, width, Rgbx{});
-    for (std::size_t i = 1; i < runs_.size (); i += 2) { /* of valid pixels */
-      const auto begin = static_cast<std::size_t> (runs_[i - 1]);
-      const auto end = static_cast<std::size_t> (runs_[i]);
-      if (!decode_packed_run (code, begin, end))
-        return false;
-      points += end - begin;
-      show (row_.codes (), begin, end, width, quantisers, limits_, depth, colour);
-    }
-    return !code.overrun ();
-  });
-}
-
 /* Reads the ends of alternating runs from begin to end, as rule R21 has it; the first may be empty.
  * @param expected  expected (x, value) is where the run from x on is expected to end
  * @param use       use (x, end, value) is called for each run */
@@ -292,7 +198,7 @@ decode_runs (Code &code, int begin, int end, const Expected &expected, const Use
 /* Reads which pixels of a row are valid as bits, and the ends of its runs. */
 template <class Code>
 bool
-CompactDecoder::decode_valid_bits (Code &slice_code, int columns)
+CompactDecoder::decode_valid (Code &slice_code, int columns)
 {
   Code code = slice_code;
   std::ranges::fill (valid_, std::uint32_t{0});
@@ -308,6 +214,42 @@ CompactDecoder::decode_valid_bits (Code &slice_code, int columns)
   std::swap (valid_, upper_valid_);
   slice_code = code;
   return good;
+}
+
+/* Reads which pixels of a run of valid ones equal those of the earlier frame set. */
+bool
+CompactDecoder::decode_earlier_runs (PackedReader &code, std::size_t begin, std::size_t end)
+{
+  const std::span<const std::uint8_t> upper (upper_.earlier ().data (), end);
+  return decode_runs (
+      code, static_cast<int> (begin), static_cast<int> (end),
+      [&] (int x, bool value) { return run_end (upper, x, value); },
+      [&] (int x, int to, bool value) {
+        std::fill_n (row_.earlier ().begin () + x, to - x, std::uint8_t{value});
+      });
+}
+
+template <bool Delta>
+bool
+CompactDecoder::decode_packed_row (
+    PackedReader &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points)
+{
+  if (!decode_valid (code, columns))
+    return false;
+  std::size_t begin = 0;
+  bool valid = false;
+  for (int run : runs_) {
+    const auto end = static_cast<std::size_t> (run);
+    if (!valid)
+      row_.invalidate (begin, end, 0);
+    else if ((Delta && !decode_earlier_runs (code, begin, end)) ||
+             !for_this_cpu ([&] { return decode_run<Delta> (code, quantisers, begin, end); }))
+      return false;
+    points += valid ? end - begin : 0;
+    begin = end;
+    valid = !valid;
+  }
+  return !code.overrun ();
 }
 
 /* ---- entropy ---- */
@@ -365,7 +307,7 @@ bool
 CompactDecoder::decode_entropy_row (EntropyReader &code, const CompactQuantisers &quantisers,
     int columns, std::uint16_t *depth, Rgbx *colour, std::uint64_t &points)
 {
-  if (!decode_valid_bits (code, columns))
+  if (!decode_valid (code, columns))
     return false;
   const EntropyRow row = entropy_.row (runs_);
   has_unknown_ = false;
@@ -394,56 +336,6 @@ CompactDecoder::decode_entropy_row (EntropyReader &code, const CompactQuantisers
     });
     return sound;
   });
-}
-
-/* ---- packed, slices without key ---- */
-
-/* Reads which pixels of a row are valid, and the ends of its runs. */
-bool
-CompactDecoder::decode_valid (PackedReader &code, int columns)
-{
-  runs_.clear ();
-  return decode_runs (
-      code, 0, columns, [&] (int x, bool value) { return run_end (upper_.valid (), x, value); },
-      [&] (int x, int end, bool value) {
-        std::fill_n (row_.valid ().begin () + x, end - x, std::uint8_t{value});
-        runs_.push_back (end);
-      });
-}
-
-/* Reads which pixels of a run of valid ones equal those of the earlier frame set. */
-bool
-CompactDecoder::decode_earlier_runs (PackedReader &code, std::size_t begin, std::size_t end)
-{
-  const std::span<const std::uint8_t> upper (upper_.earlier ().data (), end);
-  return decode_runs (
-      code, static_cast<int> (begin), static_cast<int> (end),
-      [&] (int x, bool value) { return run_end (upper, x, value); },
-      [&] (int x, int to, bool value) {
-        std::fill_n (row_.earlier ().begin () + x, to - x, std::uint8_t{value});
-      });
-}
-
-bool
-CompactDecoder::decode_row (
-    PackedReader &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points)
-{
-  if (!decode_valid (code, columns))
-    return false;
-  std::size_t begin = 0;
-  bool valid = false;
-  for (int run : runs_) {
-    const auto end = static_cast<std::size_t> (run);
-    if (!valid)
-      row_.invalidate (begin, end, 0);
-    else if (!decode_earlier_runs (code, begin, end) ||
-             !for_this_cpu ([&] { return decode_run (code, quantisers, begin, end); }))
-      return false;
-    points += valid ? end - begin : 0;
-    begin = end;
-    valid = !valid;
-  }
-  return !code.overrun ();
 }
 
 /* Reads the motion of the blocks that begin in row y of the slice, and fetches the pixels of the
@@ -487,13 +379,10 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
   row_.reset (columns, 0);
   upper_.reset (columns, 0);
   runs_.reserve (most + 1);
-  kinds_.reserve (most + 2);
-  kinds_.assign (columns + 2, 0);
   for (auto *valid : {&valid_, &upper_valid_}) {
     valid->reserve (bit_words (most));
     valid->assign (bit_words (columns), 0);
   }
-  contexts_.resize (std::max (contexts_.size (), most));
   if constexpr (Delta) {
     earlier_codes_.reserve (most);
     motions_.reserve (most / kMotionBlock + 2);
@@ -515,11 +404,8 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
     if constexpr (kIsEntropy) {
       if (!decode_entropy_row<Delta> (code, quantisers, header.columns, depth, colour, points))
         return false;
-    } else if constexpr (!Delta) {
-      if (!decode_packed_row (code, quantisers, header.columns, depth, colour, points))
-        return false;
     } else {
-      if (!decode_row (code, quantisers, header.columns, points))
+      if (!decode_packed_row<Delta> (code, quantisers, header.columns, points))
         return false;
       write_row (row_.shown (), columns, depth, colour);
     }

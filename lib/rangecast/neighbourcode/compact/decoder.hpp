@@ -32,16 +32,13 @@ private:
   bool load_earlier (
       Code &code, const SliceHeader &header, const DecoderReference &reference, int y);
   bool decode_earlier_runs (PackedReader &code, std::size_t begin, std::size_t end);
-  bool decode_valid (PackedReader &code, int columns);
-  bool decode_row (
+  template <class Code> bool decode_valid (Code &code, int columns);
+  template <bool Delta>
+  bool decode_packed_row (
       PackedReader &code, const CompactQuantisers &quantisers, int columns, std::uint64_t &points);
+  template <bool Delta>
   [[gnu::always_inline]] bool decode_run (PackedReader &slice_code,
       const CompactQuantisers &quantisers, std::size_t begin, std::size_t end);
-  [[gnu::always_inline]] bool decode_packed_run (
-      PackedReader &slice_code, std::size_t begin, std::size_t end);
-  template <class Code> bool decode_valid_bits (Code &code, int columns);
-  bool decode_packed_row (PackedReader &code, const CompactQuantisers &quantisers, int columns,
-      std::uint16_t *depth, Rgbx *colour, std::uint64_t &points);
   template <bool Delta>
   [[gnu::always_inline]] bool make_run (
       const EntropyRow &row, std::size_t begin, std::size_t end, const Components *&residuals);
@@ -52,9 +49,6 @@ private:
       PackedReader &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
 
   CompactRow row_, upper_;
-  std::vector<std::uint8_t> kinds_;      /* of the row and, before it is decoded, the one above: see
-                                            PixelState; with one before and after it */
-  std::vector<std::uint16_t> contexts_;  /* of the row above, see PackedStep */
   PixelBits valid_, upper_valid_;        /* of the row and of the one above */
   std::vector<int> runs_;                /* ends of the row's runs */
   std::vector<PixelCode> earlier_codes_; /* pixels of the earlier frame set for the row */

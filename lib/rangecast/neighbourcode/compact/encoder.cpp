@@ -516,23 +516,11 @@ CompactEncoder::resize (int columns)
   earlier_keys_.resize (own_.size ());
   runs_.reserve (most + 1);
   motions_.reserve (most / kMotionBlock + 2);
-  reserve_bytes ();
-}
-
-/* Makes room for a slice. A row is coded completely before its size is checked. */
-void
-CompactEncoder::reserve_bytes ()
-{
-  const std::size_t size =
-      static_cast<std::size_t> (settings_.max_slice_size) +
-      (kMaxBytesOfPixel + kMaxBytesOfRun) * (static_cast<std::size_t> (header_.roi.width) + 1);
+  /* A row is coded completely before the size of its slice is checked. */
+  const std::size_t size = static_cast<std::size_t> (settings_.max_slice_size) +
+                           (kMaxBytesOfPixel + kMaxBytesOfRun) * (most + 1);
   bytes_.resize (std::max (bytes_.size (), size));
 }
-
-template PackedWriter CompactEncoder::begin_slice<PackedWriter, false> (int);
-template void CompactEncoder::close_slice (PackedWriter &, std::vector<std::uint8_t> &);
-template EntropyWriter CompactEncoder::begin_slice<EntropyWriter, false> (int);
-template void CompactEncoder::close_slice (EntropyWriter &, std::vector<std::uint8_t> &);
 
 /* Codes all rows of a band in the header's columns.
  * @return false if one row is longer than a slice may be */
@@ -622,25 +610,12 @@ CompactEncoder::code_partition (const CompactPicture &picture, const RowBand &ba
   size_sums_ = size_counts_ = Components{};
   const ConstRangeImage &image = picture.image;
   const bool packed = header.profile == Profile::kPacked;
-  std::optional<bool> fits;
-  if (can_do_waves (picture, band.key)) {
-    const std::size_t size = to.size ();
-    fits = packed ? code_waves<PackedWriter> (picture, band, to)
-                  : code_waves<EntropyWriter> (picture, band, to);
-    if (!fits) { /* never mind what was coded */
-      to.resize (size);
-      result_ = {};
-      orders_ = {};
-      size_sums_ = size_counts_ = Components{};
-    }
-  }
-  if (!fits)
-    fits = packed && band.key ? code_rows<PackedWriter, false> (image, band, to)
-           : packed           ? code_rows<PackedWriter, true> (image, band, to)
-           : band.key         ? code_rows<EntropyWriter, false> (image, band, to)
-                              : code_rows<EntropyWriter, true> (image, band, to);
+  const bool fits = packed && band.key ? code_rows<PackedWriter, false> (image, band, to)
+                    : packed           ? code_rows<PackedWriter, true> (image, band, to)
+                    : band.key         ? code_rows<EntropyWriter, false> (image, band, to)
+                                       : code_rows<EntropyWriter, true> (image, band, to);
   result += result_;
-  return *fits;
+  return fits;
 }
 
 } // namespace rangecast

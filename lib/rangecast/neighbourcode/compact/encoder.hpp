@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,7 +13,6 @@
 #include "packed_code.hpp"
 #include "pixel_key.hpp"
 #include "row.hpp"
-#include "wave_memory.hpp"
 
 namespace rangecast {
 
@@ -41,7 +39,6 @@ struct CompactPicture {
   const ConstRangeImage &image;
   CodingReference reference;
   CompactQuantisers quantisers;
-  const PlainCodes &codes; ///< the same as quantisers
   CompactSettings settings;
   MotionMemory &motions; ///< of the view
   int refresh_rows;      ///< of the bands of its full image that refer to their own pixels only
@@ -88,21 +85,8 @@ private:
   void load_earlier (int y);
   void find_motions (const ConstRangeImage &image, int y, const RowBand &band);
   void resize (int columns);
-  void reserve_bytes ();
   void reserve_entries (EntropyWriter &code);
   [[nodiscard]] std::size_t header_size () const;
-
-  /* Waves: wave_encoder.cpp */
-  [[nodiscard]] bool can_do_waves (const CompactPicture &picture, bool key) const;
-  template <class Code>
-  std::optional<bool> code_waves (
-      const CompactPicture &picture, const RowBand &band, std::vector<std::uint8_t> &to);
-  void begin_waves ();
-  int load_wave (const CompactPicture &picture, int y, int end);
-  void run_wave (int y, int rows);
-  template <class Code> WaveRow code_wave_runs (Code &slice_code, int y);
-  void code_wave_row (PackedWriter &slice_code, int y, int row);
-  void code_wave_row (EntropyWriter &slice_code, int y, int row);
 
   CompactSettings settings_{};
   const CompactQuantisers *quantisers_ =
@@ -126,7 +110,6 @@ private:
   std::vector<PixelKey> earlier_keys_;
   std::vector<BlockMotion> motions_; /* of the blocks that the row touches */
   MotionSearch search_;
-  EncoderWaveMemory waves_;
   PixelCode last_ = kNoPixel;
   int refresh_rows_ = 1;
   int columns_ = 0;

@@ -36,19 +36,6 @@ invert (const std::array<PrefixCode, N> &codes, std::array<PackedTables::Entry, 
         table[i] = {static_cast<std::uint8_t> (symbol), codes[symbol].length};
 }
 
-void
-build_steps (PackedTables &tables, std::size_t context)
-{
-  constexpr std::uint32_t kKinds[] = {1, 2, 2, 2, 3, 3};
-  for (std::size_t i = 0; i < tables.choice_of[context].size (); i++) {
-    const PackedTables::Entry e = tables.choice_of[context][i];
-    const std::uint32_t kind = e.symbol < kChoices ? kKinds[e.symbol] : 0;
-    tables.steps[(context << kMaxChoiceBits) + i] =
-        e.length | std::uint32_t{e.symbol} << 8 | PackedStep::context (kind) << 16;
-  }
-  tables.correct_lengths[context] = tables.choice[context][kCorrect].length;
-}
-
 /* Sign and size of residuals, as PackedWriter::long_residual() writes them. */
 void
 build_quick (PackedTables &tables, std::size_t order)
@@ -72,38 +59,6 @@ build_quick (PackedTables &tables, std::size_t order)
   }
 }
 
-/* The same codes for waves. */
-void
-build_wave_codes (PackedTables &tables)
-{
-  const auto with_length = [] (std::uint32_t bits, std::uint32_t length) {
-    return bits << kLengthBits | length;
-  };
-  for (std::size_t context = 0; context <= kPackedContexts; context++) {
-    const bool has_neighbour = context != kNoNeighbour;
-    for (std::size_t choice = kTakeLeft; choice <= kTakeUpperRight && has_neighbour; choice++) {
-      const PrefixCode code = tables.choice[context][choice];
-      tables.copies[8 * context + choice] =
-          static_cast<std::uint16_t> (with_length (code.bits, code.length));
-    }
-    for (std::size_t pattern = 0; pattern < 16; pattern++)
-      for (const bool exact : {false, true}) {
-        const PrefixCode choice = has_neighbour
-                                      ? tables.choice[context][pattern == 0 ? kPredict : kCorrect]
-                                      : PrefixCode{};
-        const PrefixCode code = tables.pattern[pattern_code (has_neighbour, exact)][pattern];
-        tables.full[exact][16 * context + pattern] =
-            with_length (std::uint32_t{code.bits} << choice.length | choice.bits,
-                std::uint32_t{choice.length} + code.length);
-      }
-  }
-  for (std::size_t order = 0; order < tables.quick.size (); order++)
-    for (std::size_t i = 0; i < tables.quick[order].size (); i++) {
-      const PackedTables::QuickCode code = tables.quick[order][i];
-      tables.residual[order][i] = with_length (code.bits, code.length);
-    }
-}
-
 PackedTables
 build ()
 {
@@ -111,7 +66,6 @@ build ()
   for (std::size_t i = 0; i < kPackedContexts; i++) {
     tables.choice[i] = codes_of (kChoiceLengths[i]);
     invert (tables.choice[i], tables.choice_of[i]);
-    build_steps (tables, i);
   }
   for (std::size_t i = 0; i < kPatternCodes; i++) {
     tables.pattern[i] = codes_of (kPatternLengths[i]);
@@ -119,7 +73,6 @@ build ()
   }
   for (std::size_t order = 0; order < tables.quick.size (); order++)
     build_quick (tables, order);
-  build_wave_codes (tables);
   return tables;
 }
 

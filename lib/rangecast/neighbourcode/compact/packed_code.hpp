@@ -6,7 +6,6 @@
 
 #include "../bitstream/symbols.hpp"
 #include "entropy_code.hpp"
-#include "wave.hpp"
 
 namespace rangecast {
 
@@ -67,21 +66,6 @@ inline constexpr int kNoSymbol = 16;
  */
 inline constexpr int kMaxQuickSize = 31, kQuickBits = 9;
 
-/** Bits that PackedWriter writes at once, and those that hold such a number. */
-inline constexpr int kMaxPut = 56, kLengthBits = 6;
-
-/** A choice as loops read it: from bit 0 the length of its code, from bit 8 a PixelChoice or
- * kNoSymbol, from bit 16 the pixel's kind, as part of the next context. */
-struct PackedStep {
-  std::uint32_t bits;
-
-  /** The place of a context's steps: the kind of the left pixel is its lowest part. */
-  static constexpr std::uint32_t context (std::uint32_t kinds) { return kinds << kMaxChoiceBits; }
-  [[nodiscard]] int length () const { return static_cast<int> (bits & 63); }
-  [[nodiscard]] unsigned chosen () const { return bits >> 8 & 0xff; }
-  [[nodiscard]] std::uint32_t kind () const { return bits >> 16; }
-};
-
 /** The codes and the tables to read them, built once from the lengths. */
 struct PackedTables {
   /** Sign and size of a residual; no bits for 0. */
@@ -100,15 +84,6 @@ struct PackedTables {
   std::array<std::array<PrefixCode, 16>, kPatternCodes> pattern;
   std::array<std::array<Entry, 1 << kMaxChoiceBits>, kPackedContexts> choice_of;
   std::array<std::array<Entry, 1 << kMaxPatternBits>, kPatternCodes> pattern_of;
-  /* choice_of for loops: PackedStep by context and next bits, and the lengths of kCorrect. */
-  std::array<std::uint32_t, kPackedContexts << kMaxChoiceBits> steps{};
-  std::array<std::uint8_t, kPackedContexts> correct_lengths{};
-  /* Codes of waves, above kLengthBits bits of length. Copies by context and symbol; choice and
-   * pattern of full pixels by context and pattern, the second where all steps are 1; residuals, see
-   * quick. */
-  std::array<std::uint16_t, 8 * (kPackedContexts + 1)> copies{};
-  std::array<std::array<std::uint32_t, 16 * (kPackedContexts + 1)>, 2> full{};
-  std::array<std::array<std::uint32_t, 2 * kMaxQuickSize + 1>, 16> residual{};
   /* For each order. */
   std::array<std::array<QuickCode, 2 * kMaxQuickSize + 1>, 16> quick;
   std::array<std::array<QuickEntry, 1 << kQuickBits>, 16> quick_of;
@@ -126,29 +101,6 @@ unzigzag (std::uint32_t v)
 {
   return static_cast<std::int32_t> (v >> 1) ^ -static_cast<std::int32_t> (v & 1);
 }
-
-/** A row of which the symbols are known. Up to a word of columns more may be read. */
-struct PackedRow {
-  const std::uint16_t *contexts; ///< as WaveRow has them
-  const WaveCode *residuals;     ///< the next pixel's are kWaveRows numbers on
-  const std::uint32_t *full;     ///< a bit for each column
-  std::uint64_t *codes;          ///< memory for a number for each column
-  int begin, end;                ///< columns; begin is a multiple of kWaveWord
-};
-
-/** Y, Co, Cg, depth. */
-typedef std::int16_t ResidualHalves __attribute__ ((vector_size (8)));
-
-/** Of residuals that are not 0: the sums of their sizes, less 1 each, and how many there are. */
-struct ResidualSizes {
-  Components sums{}, counts{};
-
-  void add (ResidualHalves s, ResidualHalves c)
-  {
-    sums += Components{s[3], s[0], s[1], s[2]};
-    counts += Components{c[3], c[0], c[1], c[2]};
-  }
-};
 
 /** Writes the choices and residuals of a slice. A copy continues from where it was taken. */
 class PackedWriter {
@@ -217,41 +169,6 @@ public:
     quick (3);
     put (bits, length);
   }
-  /** All pixels of a row. @return how many equal no neighbour.
-   *  Finds the codes of all pixels first, then puts them together: neither of
-   *  these loops has a jump that depends on pixels. */
-  [[gnu::always_inline]] std::uint64_t row (const PackedRow &row, ResidualSizes &sizes)
-  {
-    const std::uint16_t *const contexts = row.contexts;
-    std::uint64_t *const codes = row.codes;
-    std::uint64_t full_pixels = 0;
-    for (int first = row.begin; first < row.end; first += kWaveWord) {
-      for (int x = first; x < first + kWaveWord; x++)
-        codes[x] = tables_->copies[contexts[x]];
-      std::uint32_t full = row.full[first / kWaveWord];
-      full_pixels += static_cast<std::uint64_t> (std::popcount (full));
-      ResidualHalves sums{}, counts{};
-      for (; full != 0; full &= full - 1) {
-        const int x = first + std::countr_zero (full);
-        codes[x] = full_code (contexts[x] >> 3, row.residuals[kWaveRows * x], sums, counts);
-      }
-      sizes.add (sums, counts);
-    }
-    int x = row.begin;
-    for (; x + 1 < row.end; x += 2) {
-      const std::uint64_t a = codes[x], b = codes[x + 1];
-      const int first = length_of (a), both = first + length_of (b);
-      if (both <= kMaxPut) [[likely]] {
-        put (a >> kLengthBits | b >> kLengthBits << first, both);
-      } else {
-        put_one (row, x, sizes);
-        put_one (row, x + 1, sizes);
-      }
-    }
-    if (x < row.end)
-      put_one (row, x, sizes);
-    return full_pixels;
-  }
   /** @name What choices and residuals would cost, bits @{ */
   /** Of the left neighbour, which is valid: to take it, and at least to take another. */
   [[nodiscard]] std::pair<float, float> left_bits (const Neighbours &n) const
@@ -295,64 +212,6 @@ public:
   }
 
 private:
-  static constexpr std::uint64_t kLongCode = ~std::uint64_t{0}; /* longer than kMaxPut */
-
-  static int length_of (std::uint64_t code)
-  {
-    return static_cast<int> (code & ((1 << kLengthBits) - 1));
-  }
-  /* The code of a pixel that equals no neighbour, above kLengthBits bits of its length; or
-   * kLongCode if it has to be written by long_full(). */
-  [[gnu::always_inline]] std::uint64_t full_code (
-      unsigned context, WaveCode residual, ResidualHalves &sums, ResidualHalves &counts) const
-  {
-    /* Four numbers of 16 bits at once. */
-    constexpr std::uint64_t ones = 0x0001000100010001, tops = ones << 15, rests = tops - ones;
-    const std::uint64_t index = ((residual & ~tops) + ones * kMaxQuickSize) ^ (residual & tops);
-    if (((index | (index + ones)) & ones * 0xffc0) != 0) [[unlikely]]
-      return kLongCode;
-    const auto r = std::bit_cast<ResidualHalves> (residual);
-    const ResidualHalves size = r < 0 ? -r : r;
-    sums += size + (size > 0);
-    counts -= size > 0;
-    const std::uint64_t not_zero = ((residual & ~tops) + rests) | residual;
-    const auto pattern =
-        static_cast<std::size_t> ((not_zero >> 15 & ones) * 0x2000400080001 >> 48 & 15);
-    const std::uint64_t begin = tables_->full[exact_][16 * context + pattern];
-    std::uint64_t bits = begin >> kLengthBits;
-    int length = length_of (begin);
-    for (const int i : {3, 0, 1, 2}) {
-      const std::uint64_t more =
-          tables_->residual[orders_[static_cast<std::size_t> (i + 1) % 4]][index >> 16 * i & 63];
-      bits |= more >> kLengthBits << (length & 63); /* lengths that do not fit are found below */
-      length += length_of (more);
-    }
-    if (length > kMaxPut) [[unlikely]] {
-      sums -= size + (size > 0);
-      counts += size > 0;
-      return kLongCode;
-    }
-    return bits << kLengthBits | static_cast<std::uint64_t> (length);
-  }
-  [[gnu::always_inline]] void put_one (const PackedRow &row, int x, ResidualSizes &sizes)
-  {
-    const std::uint64_t code = row.codes[x];
-    if (code == kLongCode)
-      long_full (row.contexts[x] >> 3, components_of_wave (row.residuals[kWaveRows * x]), sizes);
-    else
-      put (code >> kLengthBits, length_of (code));
-  }
-  void long_full (unsigned context, Components r, ResidualSizes &sizes)
-  {
-    const Components size = r < 0 ? -r : r;
-    sizes.sums += size + (size > 0);
-    sizes.counts -= size > 0;
-    const auto pattern = static_cast<unsigned> (
-        (r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3);
-    const std::uint64_t code = tables_->full[exact_][16 * context + pattern];
-    put (code >> kLengthBits, length_of (code));
-    long_residual (r, pattern);
-  }
   /* Up to 56 bits. Writes eight bytes; the next call overwrites those that are not full. */
   [[gnu::always_inline]] void put (std::uint64_t value, int bits)
   {
@@ -424,23 +283,6 @@ public:
   [[gnu::always_inline]] int choice (const Neighbours &n)
   {
     return get (tables_->choice_of[n.kinds ()], kMaxChoiceBits);
-  }
-  /** The next choice, which remains to be taken. @param context  see PackedStep */
-  [[gnu::always_inline]] PackedStep next_step (std::uint32_t context)
-  {
-    if (count_ < kMaxChoiceBits)
-      refill ();
-    return {tables_->steps[context + (held_ & ((1u << kMaxChoiceBits) - 1))]};
-  }
-  [[gnu::always_inline]] void take_step (PackedStep step) { consume (step.length ()); }
-  /** Takes kCorrect. Its length comes from a table of its own, which processors can read early. */
-  [[gnu::always_inline]] void take_correct (std::uint32_t context)
-  {
-    consume (tables_->correct_lengths[context >> kMaxChoiceBits]);
-  }
-  [[gnu::always_inline]] bool residual (const Neighbours &, bool has_neighbour, Components &r)
-  {
-    return residual (has_neighbour, r);
   }
   [[gnu::always_inline]] bool residual (bool has_neighbour, Components &r)
   {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Asymmetric numeral systems (rANS) with several states, so that a processor decodes several symbols
- * at a time. docs/formats/bitstream.md defines what is read; the writer starts at its end. */
+/* Asymmetric numeral systems (rANS) with several states, so that a processor decodes several
+ * symbols at a time. docs/formats/bitstream.md defines what is read; the writer starts at its end.
+ */
 #pragma once
 
 #include <cmath>
