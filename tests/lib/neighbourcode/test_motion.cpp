@@ -267,3 +267,11 @@ TEST (MotionLimits, a_slice_with_a_motion_that_is_not_sound_is_damaged)
 }
 
 } // namespace
+
+TEST (CpuLevel, is_limited_by_limit_cpu_and_by_the_machine)
+{
+  EXPECT_LE (cpu_level (), cpu_supports ());
+  limit_cpu (CpuLevel::kScalar);
+  EXPECT_EQ (cpu_level (), CpuLevel::kScalar);
+  limit_cpu (kCpuLevels[std::size (kCpuLevels) - 1]);
+}

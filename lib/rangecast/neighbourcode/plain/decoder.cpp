@@ -92,14 +92,13 @@ PlainDecoder::decode (std::span<const std::uint8_t> body, const SliceHeader &hea
     const DepthQuantiser &depth, const ColourQuantiser &colour, const RangeImage &image,
     std::uint64_t &points)
 {
-  const PlainFunctions &functions = plain_functions (cpu_level ());
   const auto columns = static_cast<std::size_t> (header.columns);
   const std::size_t pixels = static_cast<std::size_t> (header.rows) * columns;
   const std::size_t size = symbol_bytes (pixels);
   const LittleEndianBits symbols (body.first (size)), full_bits (body.subspan (size));
   if (!symbols.end_after (pixels * kSymbolBits))
     return false;
-  const PlainCounts counts = functions.count_symbols (body.data (), size);
+  const PlainCounts counts = count_symbols (body.data (), size);
   const auto bits = static_cast<std::size_t> (header.depth_bits + 3 * header.colour_bits);
   if (!full_bits.end_after (counts.full * bits))
     return false;
@@ -114,7 +113,7 @@ PlainDecoder::decode (std::span<const std::uint8_t> body, const SliceHeader &hea
   std::size_t at = 0, valid = 0;
   for (int y = header.first_row; y < header.first_row + header.rows; y++) {
     decode_row (symbols, at, upper, row, header.columns, full);
-    valid += functions.show_row (row, header.columns, image.depth.row (y) + header.first_column,
+    valid += show_plain_row (row, header.columns, image.depth.row (y) + header.first_column,
         image.colour.row (y) + header.first_column);
     at += columns * kSymbolBits;
     std::swap (row, upper);

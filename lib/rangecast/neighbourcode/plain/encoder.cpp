@@ -35,7 +35,6 @@ PlainCodes::set (const DepthQuantiser &depth, const ColourQuantiser &colours)
     near--;
   while (far < 65535 && depth.valid (static_cast<std::uint16_t> (far + 1)))
     far++;
-  is_offset = depth.is_offset ();
   codes.assign (65536, 0);
   for (std::size_t d = near; d <= far; d++)
     codes[d] = depth.code (static_cast<std::uint16_t> (d));
@@ -55,63 +54,45 @@ void
 PlainEncoder::resize (int columns)
 {
   const auto padded = static_cast<std::size_t> (kPixelsBefore + columns + kPixelsBehind);
-  for (Row &row : rows_)
-    row.pixels.assign (padded, kOutsidePixel);
+  row_.assign (padded, kOutsidePixel);
   upper_.assign (padded, kOutsidePixel);
-  outside_.assign (padded, kOutsidePixel);
   const auto size = static_cast<std::size_t> (columns);
-  for (auto &symbols : row_symbols_)
-    symbols.resize (std::max (symbols.size (), symbol_bytes (size) + kSymbolBytesBehind));
+  row_symbols_.resize (std::max (row_symbols_.size (), symbol_bytes (size) + 2 * kGroup));
   row_full_.resize (std::max (row_full_.size (), size + kGroup));
   const auto size_with_padding = static_cast<std::size_t> (settings_.max_slice_size) + 16;
   symbols_.resize (std::max (symbols_.size (), size_with_padding));
   full_.resize (std::max (full_.size (), size_with_padding));
 }
 
-/* Codes the first rows of rows_. @return the columns with valid pixels */
-PlainSpan
-PlainEncoder::code_band (int rows)
+/* Codes row_. */
+PlainRow
+PlainEncoder::code_row (const PlainSpan &span)
 {
-  PlainBand band;
-  band.upper = upper_.data () + kPixelsBefore;
-  PlainSpan span = {header_.columns, 0, 0};
-  for (int i = 0; i < kBandRows; i++) {
-    const auto at = static_cast<std::size_t> (i);
-    band.rows[i] = (i < rows ? rows_[at].pixels : outside_).data () + kPixelsBefore;
-    band.symbols[i] = row_symbols_[at].data ();
-    if (i >= rows || rows_[at].span.valid == 0)
-      continue;
-    span.begin = std::min (span.begin, rows_[at].span.begin);
-    span.end = std::max (span.end, rows_[at].span.end);
-  }
-  if (span.end == 0)
-    span.begin = 0;
-  band.begin = span.begin;
-  band.end = span.end;
-  band.threshold = plain_pixel (settings_.colour_threshold, settings_.colour_threshold,
-      settings_.colour_threshold, settings_.depth_threshold);
-  if (span.end > 0)
-    functions_->code_band (band);
-  std::fill (band.upper - 1, band.upper + span.begin, kOutsidePixel);
-  std::fill (band.upper + span.end, band.upper + header_.columns + 1, kOutsidePixel);
-  return span;
+  const PlainRow row = {row_.data () + kPixelsBefore, upper_.data () + kPixelsBefore, span,
+      plain_pixel (settings_.colour_threshold, settings_.colour_threshold,
+          settings_.colour_threshold, settings_.depth_threshold),
+      row_symbols_.data ()};
+  code_plain_row (row);
+  std::fill (row.upper - 1, row.upper + span.begin, kOutsidePixel);
+  std::fill (row.upper + span.end, row.upper + header_.columns + 1, kOutsidePixel);
+  return row;
 }
 
 /* Appends a coded row to the slice. */
 void
-PlainEncoder::add_row (const PlainRow &row, const PlainSpan &span, std::span<PlainPixel> full)
+PlainEncoder::add_row (const PlainRow &row, std::span<PlainPixel> full)
 {
   const auto pixels_before =
       static_cast<std::size_t> (header_.rows) * static_cast<std::size_t> (header_.columns);
   BitWriter symbols (symbols_.data (), pixels_before * kSymbolBits);
-  put_invalid (symbols, span.begin);
-  std::size_t bit = row.first_bit;
-  for (int left = row.columns; left > 0; left -= kGroup, bit += kGroupBits)
+  put_invalid (symbols, row.span.begin);
+  std::size_t bit = 0;
+  for (int left = row.span.end - row.span.begin; left > 0; left -= kGroup, bit += kGroupBits)
     symbols.put (plain_group (row.symbols, bit, left), std::min (left, kGroup) * kSymbolBits);
-  put_invalid (symbols, header_.columns - span.end);
+  put_invalid (symbols, header_.columns - row.span.end);
 
   const int bits = bits_of_full ();
-  functions_->pack_pixels (full.data (), full.size (), header_.depth_bits, header_.colour_bits);
+  pack_plain_pixels (full.data (), full.size (), header_.depth_bits, header_.colour_bits);
   BitWriter pixels (full_.data (), full_pixels_ * static_cast<std::size_t> (bits));
   for (const std::uint64_t pixel : full)
     pixels.put (pixel, bits);
@@ -143,57 +124,35 @@ PlainEncoder::close_slice (std::vector<std::uint8_t> &to)
   result_.full_pixels += full_pixels_;
 }
 
-/* Codes the first rows of rows_ and appends them to the open slice while they fit. When it is full
- * opens the next one, whose first row has no upper neighbours. @return rows appended */
-int
-PlainEncoder::add_band (int rows, std::vector<std::uint8_t> &to)
-{
-  const PlainSpan span = code_band (rows);
-  const auto limit = static_cast<std::size_t> (settings_.max_slice_size);
-  for (int i = 0; i < rows; i++) {
-    const auto at = static_cast<std::size_t> (i);
-    const PlainRow row = {row_symbols_[at].data (),
-        at * static_cast<std::size_t> (functions_->skip_bits),
-        rows_[at].pixels.data () + kPixelsBefore + span.begin, span.end - span.begin};
-    const std::span<PlainPixel> full (
-        row_full_.data (), functions_->gather_full (row, row_full_.data ()));
-    if (header_.rows > 0 && slice_size (header_.rows + 1, full_pixels_ + full.size ()) > limit) {
-      close_slice (to);
-      begin_slice (header_.first_row + header_.rows);
-      return i;
-    }
-    add_row (row, span, full);
-  }
-  return rows;
-}
-
 void
 PlainEncoder::code_partition (const ConstRangeImage &image, const PlainCodes &codes,
     const PlainSettings &settings, const SliceHeader &header, std::vector<std::uint8_t> &to,
     EncoderResult &result)
 {
-  codes_ = &codes;
   settings_ = settings;
   header_ = header;
   result_ = {};
-  functions_ = &plain_functions (cpu_level ());
   resize (header.columns);
   begin_slice (0);
-  int waiting = 0;
-  for (int done = 0; done < image.roi.height;) {
-    for (; waiting < functions_->band_rows && done + waiting < image.roi.height; waiting++) {
-      const int y = done + waiting;
-      Row &row = rows_[static_cast<std::size_t> (waiting)];
-      row.span = functions_->make_pixels (
-          {codes_->near, codes_->far, codes_->codes.data (), codes_->is_offset, codes_->colour, y},
-          image.depth.row (y) + header_.first_column, image.colour.row (y) + header_.first_column,
-          header_.columns, row.pixels.data () + kPixelsBefore);
-      result_.points += static_cast<std::uint64_t> (row.span.valid);
+  for (int y = 0; y < image.roi.height; y++) {
+    const PlainSpan span =
+        make_plain_pixels ({codes.near, codes.far, codes.codes.data (), codes.colour, y},
+            image.depth.row (y) + header_.first_column, image.colour.row (y) + header_.first_column,
+            header_.columns, row_.data () + kPixelsBefore);
+    result_.points += static_cast<std::uint64_t> (span.valid);
+    const auto full_of = [&] (const PlainRow &row) {
+      return std::span (row_full_.data (), gather_full (row, row_full_.data ()));
+    };
+    PlainRow row = code_row (span);
+    std::span<PlainPixel> full = full_of (row);
+    if (header_.rows > 0 && slice_size (header_.rows + 1, full_pixels_ + full.size ()) >
+                                static_cast<std::size_t> (settings_.max_slice_size)) {
+      close_slice (to); /* the row begins the next one, where it has no upper neighbours */
+      begin_slice (y);
+      row = code_row (span);
+      full = full_of (row);
     }
-    const int more = add_band (waiting, to);
-    std::rotate (rows_.begin (), rows_.begin () + more, rows_.end ());
-    waiting -= more;
-    done += more;
+    add_row (row, full);
   }
   close_slice (to);
   result += result_;

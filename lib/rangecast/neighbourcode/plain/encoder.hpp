@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -20,13 +19,12 @@ struct PlainSettings {
   int max_slice_size;                    ///< bytes
 };
 
-/** The codes of depths and colours, as tables for vector code. */
+/** The codes of depths and colours, as tables. */
 struct PlainCodes {
   void set (const DepthQuantiser &depth, const ColourQuantiser &colour);
 
   std::uint16_t near = 1, far = 0;  ///< of valid depths
   std::vector<std::uint16_t> codes; ///< of all depths
-  bool is_offset = false;           ///< see PlainQuantising
   ColourQuantiser colour;
 };
 
@@ -42,30 +40,21 @@ public:
       EncoderResult &result);
 
 private:
-  /* A row to be coded. */
-  struct Row {
-    std::vector<PlainPixel> pixels; /* the first one is at kPixelsBefore */
-    PlainSpan span;
-  };
   void resize (int columns);
-  PlainSpan code_band (int rows);
-  void add_row (const PlainRow &row, const PlainSpan &span, std::span<PlainPixel> full);
-  int add_band (int rows, std::vector<std::uint8_t> &to);
+  PlainRow code_row (const PlainSpan &span);
+  void add_row (const PlainRow &row, std::span<PlainPixel> full);
   void begin_slice (int first_row);
   void close_slice (std::vector<std::uint8_t> &to);
   [[nodiscard]] std::size_t slice_size (int rows, std::size_t full) const;
   [[nodiscard]] int bits_of_full () const { return header_.depth_bits + 3 * header_.colour_bits; }
 
   PlainSettings settings_{};
-  const PlainFunctions *functions_ = nullptr;
-  const PlainCodes *codes_ = nullptr; /* while code_partition() runs */
-  SliceHeader header_;                /* of the open slice */
-  std::size_t full_pixels_ = 0;       /* of the open slice */
+  SliceHeader header_;          /* of the open slice */
+  std::size_t full_pixels_ = 0; /* of the open slice */
   EncoderResult result_;
 
-  std::array<Row, kBandRows> rows_;
-  std::vector<PlainPixel> upper_, outside_;
-  std::array<std::vector<std::uint8_t>, kBandRows> row_symbols_;
+  std::vector<PlainPixel> row_, upper_; /* the first pixel is at kPixelsBefore */
+  std::vector<std::uint8_t> row_symbols_;
   std::vector<PlainPixel> row_full_;
   std::vector<std::uint8_t> symbols_, full_; /* of the open slice */
 };

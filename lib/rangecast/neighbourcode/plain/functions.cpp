@@ -8,10 +8,9 @@
 #include "../bitstream/components.hpp"
 
 namespace rangecast {
-namespace {
 
 PlainSpan
-make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *colour,
+make_plain_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx *colour,
     int columns, PlainPixel *to)
 {
   PlainSpan span;
@@ -31,6 +30,8 @@ make_pixels (const PlainQuantising &how, const std::uint16_t *depth, const Rgbx 
   span.begin = span.valid > 0 ? first : 0;
   return span;
 }
+
+namespace {
 
 typedef std::uint16_t Packed __attribute__ ((vector_size (8)));
 
@@ -93,17 +94,18 @@ code_group (const PlainPixel *row, PlainPixel *upper, int count, PlainPixel &lef
   return symbols;
 }
 
-/* A band of one row. */
+} // namespace
+
 void
-code_band (const PlainBand &band)
+code_plain_row (const PlainRow &row)
 {
-  const Components threshold = components_of (band.threshold);
-  PlainPixel *const upper = band.upper;
-  BitWriter symbols (band.symbols[0]);
-  PlainPixel left = kOutsidePixel, upper_left = upper[band.begin - 1];
-  for (int x = band.begin; x < band.end; x += kGroup) {
-    const int count = std::min (kGroup, band.end - x);
-    symbols.put (code_group (band.rows[0] + x, upper + x, count, left, upper_left, threshold),
+  const Components threshold = components_of (row.threshold);
+  PlainPixel *const upper = row.upper;
+  BitWriter symbols (row.symbols);
+  PlainPixel left = kOutsidePixel, upper_left = upper[row.span.begin - 1];
+  for (int x = row.span.begin; x < row.span.end; x += kGroup) {
+    const int count = std::min (kGroup, row.span.end - x);
+    symbols.put (code_group (row.pixels + x, upper + x, count, left, upper_left, threshold),
         count * kSymbolBits);
   }
 }
@@ -112,9 +114,10 @@ std::size_t
 gather_full (const PlainRow &row, PlainPixel *to)
 {
   const PlainPixel *const begin = to;
-  const PlainPixel *pixels = row.pixels;
-  std::size_t bit = row.first_bit;
-  for (int left = row.columns; left > 0; left -= kGroup, bit += kGroupBits, pixels += kGroup) {
+  const PlainPixel *pixels = row.pixels + row.span.begin;
+  std::size_t bit = 0;
+  for (int left = row.span.end - row.span.begin; left > 0;
+       left -= kGroup, bit += kGroupBits, pixels += kGroup) {
     const std::uint64_t group = plain_group (row.symbols, bit, left);
     for (std::uint64_t full = group >> 2 & ~(group >> 1) & ~group & kGroupLowBits; full;
          full &= full - 1)
@@ -124,7 +127,7 @@ gather_full (const PlainRow &row, PlainPixel *to)
 }
 
 void
-pack_pixels (PlainPixel *pixels, std::size_t count, int depth_bits, int colour_bits)
+pack_plain_pixels (PlainPixel *pixels, std::size_t count, int depth_bits, int colour_bits)
 {
   const int r = depth_bits, g = r + colour_bits, b = g + colour_bits;
   for (std::size_t i = 0; i < count; i++) {
@@ -149,7 +152,7 @@ count_symbols (const std::uint8_t *symbols, std::size_t bytes)
 }
 
 std::size_t
-show_row (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour)
+show_plain_row (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour)
 {
   std::size_t points = 0;
   for (int x = 0; x < columns; x++) {
@@ -160,22 +163,6 @@ show_row (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour
     points += p != 0;
   }
   return points;
-}
-
-constexpr PlainFunctions kScalar = {
-    make_pixels, code_band, gather_full, pack_pixels, count_symbols, show_row, 1, 0};
-
-} // namespace
-
-const PlainFunctions &
-plain_functions (CpuLevel level)
-{
-#if defined __x86_64__
-  if (level >= CpuLevel::kAvx2)
-    return kPlainFunctionsAvx2;
-#endif
-  (void)level;
-  return kScalar;
 }
 
 } // namespace rangecast

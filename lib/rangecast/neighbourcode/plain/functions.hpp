@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The inner loops of profile plain, implemented for each CpuLevel. All implementations give the
- * same results; the scalar one is the reference. */
+/* The inner loops of profile plain. */
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
-#include "../../base/cpu.hpp"
 #include "../../geometry/image_view.hpp"
 #include "../../geometry/quantiser.hpp"
 #include "../bitstream/symbols.hpp"
@@ -34,13 +32,12 @@ invalid_plain_pixel (int x, int y)
 inline constexpr PlainPixel kInvalidPixelBit = 0x4000; /* set in both, and in no valid pixel */
 
 /** Padding of rows: so many pixels before and after can be read, and are outside or invalid. */
-inline constexpr int kPixelsBefore = 16, kPixelsBehind = 48;
+inline constexpr int kPixelsBefore = 1, kPixelsBehind = 16;
 
 /** Parameters to quantise a row. */
 struct PlainQuantising {
   std::uint16_t near, far;    ///< of valid depths
   const std::uint16_t *codes; ///< of all 65536 depths; of those that are not valid, anything
-  bool is_offset;             ///< the code of a depth is the depth less near
   const ColourQuantiser &colour;
   int row; ///< of the partition: its last bit matters
 };
@@ -51,26 +48,14 @@ struct PlainSpan {
   int valid = 0;          ///< valid pixels
 };
 
-/** Rows are coded in bands of PlainFunctions::band_rows, which is at most this. */
-inline constexpr int kBandRows = 4;
-
-struct PlainBand {
-  const PlainPixel *rows[kBandRows]; ///< to be coded; missing ones are rows of outside pixels
-  PlainPixel *upper;    ///< in: the coded row above; out: from begin to end the last of `rows` as
-                        ///< coded, elsewhere unchanged, outside or invalid
-  int begin, end;       ///< elsewhere all pixels of the rows are invalid
-  PlainPixel threshold; ///< in all four numbers
-  std::uint8_t *symbols[kBandRows]; ///< 3 bits each, from column `begin` on, after skip bits;
-                                    ///< with room for kSymbolBytesBehind more bytes
-};
-inline constexpr int kSymbolBytesBehind = 24;
-
-/** A coded row. */
+/** A row to be coded. */
 struct PlainRow {
-  const std::uint8_t *symbols; ///< written by code_band()
-  std::size_t first_bit;       ///< of the row's symbols
-  const PlainPixel *pixels;    ///< the row before coding; kPixelsBehind more can be read
-  int columns;
+  const PlainPixel *pixels; ///< quantised
+  PlainPixel *upper;        ///< in: the coded row above; out: from begin to end this one as coded,
+                            ///< elsewhere unchanged, outside or invalid
+  PlainSpan span;
+  PlainPixel threshold;  ///< in all four numbers
+  std::uint8_t *symbols; ///< 3 bits each, from column `begin` on; with room for a group more
 };
 
 /** Up to sixteen symbols from a bit on; the bits above them are 0. */
@@ -89,31 +74,18 @@ struct PlainCounts {
   std::size_t full = 0, invalid = 0;
 };
 
-struct PlainFunctions {
-  /** Quantises a row; may write up to 15 pixels after the columns. */
-  PlainSpan (*make_pixels) (const PlainQuantising &how, const std::uint16_t *depth,
-      const Rgbx *colour, int columns, PlainPixel *to);
-  /** Codes a band, see "How an encoder chooses" in docs/formats/bitstream.md. */
-  void (*code_band) (const PlainBand &band);
-  /** Copies the full pixels of a row to `to`. @return how many */
-  std::size_t (*gather_full) (const PlainRow &row, PlainPixel *to);
-  /** Packs pixels in place: D bits of depth, then C each of R, G, B. May change 3 more after them.
-   */
-  void (*pack_pixels) (PlainPixel *pixels, std::size_t count, int depth_bits, int colour_bits);
-  /** Counts symbols. Bits that fill the last byte are 0. */
-  PlainCounts (*count_symbols) (const std::uint8_t *symbols, std::size_t bytes);
-  /** Writes a decoded row. @return valid pixels */
-  std::size_t (*show_row) (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour);
-  int band_rows;
-  /** The symbols of row i of a band begin at bit i * skip_bits. */
-  int skip_bits;
-};
-
-/** The functions for a level, or for the next lower one that has its own. */
-const PlainFunctions &plain_functions (CpuLevel level);
-
-#if defined __x86_64__
-extern const PlainFunctions kPlainFunctionsAvx2;
-#endif
+/** Quantises a row. */
+PlainSpan make_plain_pixels (const PlainQuantising &how, const std::uint16_t *depth,
+    const Rgbx *colour, int columns, PlainPixel *to);
+/** Codes a row, see "How an encoder chooses" in docs/formats/bitstream.md. */
+void code_plain_row (const PlainRow &row);
+/** Copies the full pixels of a coded row to `to`. @return how many */
+std::size_t gather_full (const PlainRow &row, PlainPixel *to);
+/** Packs pixels in place: D bits of depth, then C each of R, G, B. */
+void pack_plain_pixels (PlainPixel *pixels, std::size_t count, int depth_bits, int colour_bits);
+/** Counts symbols. Bits that fill the last byte are 0. */
+PlainCounts count_symbols (const std::uint8_t *symbols, std::size_t bytes);
+/** Writes a decoded row. @return valid pixels */
+std::size_t show_plain_row (const ShownPixel *row, int columns, std::uint16_t *depth, Rgbx *colour);
 
 } // namespace rangecast

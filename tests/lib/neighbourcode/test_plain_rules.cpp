@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Profile plain on every rung of cpu.hpp that this machine has, beside the rules of
- * docs/formats/bitstream.md written straight. */
+/* Profile plain beside the rules of docs/formats/bitstream.md written straight. */
 #include <map>
 #include <memory>
 #include <optional>
-#include <rangecast/base/cpu.hpp>
 #include <rangecast/neighbourcode/bitstream/symbols.hpp>
 #include <rangecast/neighbourcode/decoder.hpp>
 #include <rangecast/neighbourcode/encoder.hpp>
@@ -273,23 +271,11 @@ decode_straight (
   return shown;
 }
 
-/* ---- on every rung ---- */
+/* ---- beside the library ---- */
 
-std::vector<CpuLevel>
-rungs ()
-{
-  std::vector<CpuLevel> rungs;
-  for (CpuLevel level : kCpuLevels)
-    if (level <= cpu_supports ())
-      rungs.push_back (level);
-  return rungs;
-}
-
-class PlainRungs : public ::testing::Test {
+class PlainRules : public ::testing::Test {
 protected:
-  void TearDown () override { limit_cpu (kCpuLevels[std::size (kCpuLevels) - 1]); }
-
-  /* Codes an image on each rung. @return what all gave */
+  /* Codes an image. @return what the rules give */
   static std::vector<std::uint8_t> encode (Pixels &pixels, const EncoderSettings &settings)
   {
     const auto straight = encode_straight (pixels, settings);
@@ -299,29 +285,23 @@ protected:
     for (int y = 0; y < pixels.height; y++)
       for (int x = 0; x < pixels.width; x++)
         valid += depth.valid (pixels.depth (x, y));
-    for (CpuLevel level : rungs ()) {
-      limit_cpu (level);
-      static std::map<CpuLevel, ViewEncoder> encoders; /* memory is used again */
-      static std::map<CpuLevel, PartitionEncoder> partition_encoders;
-      ViewEncoder &encoder = encoders[level];
-      EXPECT_TRUE (encoder.configure (view_of (pixels.width, pixels.height), settings).ok ());
-      std::vector<std::uint8_t> bytes;
-      EXPECT_TRUE (encoder.begin (pixels.image (), 5).ok ());
-      encoder.for_open_partitions ([&] (ViewEncoder::PartitionId partition) {
-        encoder.code (partition, partition_encoders[level]);
-      });
-      EXPECT_TRUE (encoder.finish ());
-      encoder.for_coded_partitions (
-          [&] (auto piece) { bytes.insert (bytes.end (), piece.begin (), piece.end ()); });
-      EXPECT_EQ (bytes, straight) << cpu_level_name (level) << ": " << pixels.width << "x"
-                                  << pixels.height << ", bits " << settings.depth_bits << " + "
-                                  << settings.colour_bits;
-      EXPECT_EQ (encoder.result ().points, valid) << cpu_level_name (level);
-    }
+    static ViewEncoder encoder; /* memory is used again */
+    static PartitionEncoder partition_encoder;
+    EXPECT_TRUE (encoder.configure (view_of (pixels.width, pixels.height), settings).ok ());
+    std::vector<std::uint8_t> bytes;
+    EXPECT_TRUE (encoder.begin (pixels.image (), 5).ok ());
+    encoder.for_open_partitions (
+        [&] (ViewEncoder::PartitionId partition) { encoder.code (partition, partition_encoder); });
+    EXPECT_TRUE (encoder.finish ());
+    encoder.for_coded_partitions (
+        [&] (auto piece) { bytes.insert (bytes.end (), piece.begin (), piece.end ()); });
+    EXPECT_EQ (bytes, straight) << pixels.width << "x" << pixels.height << ", bits "
+                                << settings.depth_bits << " + " << settings.colour_bits;
+    EXPECT_EQ (encoder.result ().points, valid);
     return straight;
   }
 
-  /* Decodes a slice on each rung: all must say what the rules say. */
+  /* Decodes a slice, which must give what the rules say. */
   static void decode (std::span<const std::uint8_t> slice, const DepthQuantiser &depth)
   {
     const auto fresh = std::make_unique<std::uint8_t[]> (slice.size ());
@@ -333,15 +313,11 @@ protected:
     const auto pixels = std::size_t (header.rows) * std::size_t (header.columns);
     if (unit.size () >= kSliceHeaderSize + symbol_bytes (pixels))
       expected = decode_straight (unit.subspan (kSliceHeaderSize), header, depth);
-    for (CpuLevel level : rungs ()) {
-      limit_cpu (level);
-      decode_on_this_rung (unit, header, expected);
-      ASSERT_FALSE (HasFailure ()) << cpu_level_name (level);
-    }
+    decode_and_compare (unit, header, expected);
   }
 
 private:
-  static void decode_on_this_rung (std::span<const std::uint8_t> unit, const SliceHeader &header,
+  static void decode_and_compare (std::span<const std::uint8_t> unit, const SliceHeader &header,
       const std::optional<std::vector<Shown>> &expected)
   {
     static std::map<std::pair<int, int>, SliceDecoder> decoders;
@@ -403,7 +379,7 @@ constexpr EncoderSettings kSettings[] = {plain (12, 8, 8, 10), plain (16, 8, 0, 
 
 } // namespace
 
-TEST_F (PlainRungs, code_pictures_of_1_to_70_columns_as_the_rules_say)
+TEST_F (PlainRules, code_pictures_of_1_to_70_columns_as_the_rules_say)
 {
   for (int width = 1; width <= 70; width++)
     for (Kind kind : kKinds) {
@@ -414,7 +390,7 @@ TEST_F (PlainRungs, code_pictures_of_1_to_70_columns_as_the_rules_say)
     }
 }
 
-TEST_F (PlainRungs, code_with_all_bits_and_thresholds_as_the_rules_say)
+TEST_F (PlainRules, code_with_all_bits_and_thresholds_as_the_rules_say)
 {
   unsigned seed = 0;
   for (int depth_bits = 6; depth_bits <= 16; depth_bits++)
@@ -427,7 +403,7 @@ TEST_F (PlainRungs, code_with_all_bits_and_thresholds_as_the_rules_say)
       }
 }
 
-TEST_F (PlainRungs, cut_large_pictures_into_the_same_slices)
+TEST_F (PlainRules, cut_large_pictures_into_the_same_slices)
 {
   for (const EncoderSettings &settings : kSettings)
     for (Kind kind : kKinds) {
@@ -437,7 +413,7 @@ TEST_F (PlainRungs, cut_large_pictures_into_the_same_slices)
     }
 }
 
-TEST_F (PlainRungs, quantise_every_colour_the_same)
+TEST_F (PlainRules, quantise_every_colour_the_same)
 {
   for (int colour_bits = 4; colour_bits <= 8; colour_bits++) {
     Pixels pixels = make_pixels (Kind::kFlat, 256, 1, 1);
@@ -450,7 +426,7 @@ TEST_F (PlainRungs, quantise_every_colour_the_same)
   }
 }
 
-TEST_F (PlainRungs, decode_what_was_coded)
+TEST_F (PlainRules, decode_what_was_coded)
 {
   for (int width = 1; width <= 70; width++)
     for (Kind kind : kKinds) {
@@ -464,7 +440,7 @@ TEST_F (PlainRungs, decode_what_was_coded)
     }
 }
 
-class PlainDamage : public PlainRungs {
+class PlainDamage : public PlainRules {
 protected:
   /* One slice of islands, some rows and columns of its ROI. */
   std::vector<std::uint8_t> slice (const EncoderSettings &settings, int width)
@@ -533,12 +509,4 @@ TEST_F (PlainDamage, of_random_symbols_is_judged_as_the_rules_say)
                 .has_value ();
   }
   EXPECT_GT (good, 10);
-}
-
-TEST (CpuLevel, is_limited_by_limit_cpu_and_by_the_machine)
-{
-  EXPECT_LE (cpu_level (), cpu_supports ());
-  limit_cpu (CpuLevel::kScalar);
-  EXPECT_EQ (cpu_level (), CpuLevel::kScalar);
-  limit_cpu (kCpuLevels[std::size (kCpuLevels) - 1]);
 }
