@@ -3,7 +3,7 @@
 # Makes the source tarball and Debian packages from it. usage: make-packages.sh OUT-DIR
 # The tarball holds the last commit. What the packages contain: pipelines/debian.
 set -euo pipefail
-source "$(dirname "$0")/options.sh"
+die () { echo "make-packages.sh: $*" >&2; exit 2; }
 case "${1:-}" in
   -h | --help) sed -n '3,4s/^# //p' "$0"; exit 0 ;;
   -*) die "unknown option '$1'; usage: make-packages.sh OUT-DIR" ;;

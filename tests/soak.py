@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Runs the whole job for long, each host a process started with the scripts of pipelines/, and restarts a camera host now and
+"""Runs the whole job for long, each host a process started by rangecast, and restarts a camera host now and
 then, by SIGTERM and SIGKILL in turn. Camera 0, the parent and the viewer run from beginning to end. Fails if their memory
 grows, if they have more threads or file descriptors at the end than after the warm-up, if a restarted view does not come
 back, if a process does not end with status 0 when asked to, or if GStreamer's leaks tracer finds an object.
@@ -18,7 +18,11 @@ import time
 from pathlib import Path
 from statistics import median
 
-PIPELINES = Path(__file__).resolve().parents[2] / "pipelines"
+TOP = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(TOP / "pipelines"))
+from rangecast.launch import set_up_environment  # noqa: E402
+from rangecast.main import make_parser  # noqa: E402
+
 PATIENCE_S = 30  # for a process to end when asked to
 RUNS_THROUGHOUT = ("camera0", "parent", "viewer")
 
@@ -44,23 +48,23 @@ class Soak:
     def command(self, name: str) -> list[str]:
         o, viewer_port = self.options, self.options.port + self.options.views
         if name == "viewer":
-            return ["viewer-host.sh", "--listen", str(viewer_port), "--orbit", "10"]
+            return ["view", "--listen", str(viewer_port), "--orbit", "10"]
         if name == "parent":
-            return ["parent-host.sh", "--views", str(o.views), "--listen", str(o.port), "--to", f"127.0.0.1:{viewer_port}"]
+            return ["parent", "--views", str(o.views), "--listen", str(o.port), "--to", f"127.0.0.1:{viewer_port}"]
         view = int(name.removeprefix("camera"))
-        return ["camera-host.sh", "--view", str(view), "--views", str(o.views), "--rig", str(self.rig), "--size", o.size, "--fps",
+        return ["camera", "--view", str(view), "--views", str(o.views), "--rig", str(self.rig), "--size", o.size, "--fps",
                 str(o.fps), "--learn", str(o.learn), "--to", f"127.0.0.1:{o.port + view}"]  # fmt: skip
 
     def start(self, name: str) -> None:
         log = self.options.out / "log" / f"{name}-{self.starts.setdefault(name, 0)}.log"
         self.starts[name] += 1
-        runner = f"rangecast-run --views {self.options.views} --frame-log '{self.frames}'" if name == "viewer" else "rangecast-run"
-        environment = dict(os.environ, RANGECAST_LAUNCH=runner, GST_TRACERS="leaks", GST_DEBUG="GST_TRACER:7")
-        command = self.command(name)
+        args = make_parser().parse_args(self.command(name))
+        launch = args.build(args)
+        launch.environment.update(GST_TRACERS="leaks", GST_DEBUG="GST_TRACER:7")
+        if name == "viewer":
+            launch.option("--views", self.options.views, "--frame-log", self.frames)
         with log.open("w") as file:
-            self.processes[name] = subprocess.Popen(
-                [str(PIPELINES / command[0]), *command[1:]], stdin=subprocess.DEVNULL, stdout=file, stderr=file, env=environment
-            )
+            self.processes[name] = launch.spawn(stdin=subprocess.DEVNULL, stdout=file, stderr=file)
 
     def end(self, name: str, how: signal.Signals) -> None:
         process = self.processes[name]
@@ -97,8 +101,9 @@ class Soak:
     def run(self) -> None:
         o = self.options
         width, height = o.size.split("x")
-        launch = f"avatartestsrc views={o.views} num-buffers=1 rig-export='{self.rig}' ! video/x-range,width={width},height={height} ! fakesink"
-        subprocess.run(["bash", "-c", f"source '{PIPELINES}/env.sh'; exec gst-launch-1.0 -q {launch}"], check=True, timeout=120)
+        launch = f"avatartestsrc views={o.views} num-buffers=1 rig-export={self.rig} ! video/x-range,width={width},height={height} ! fakesink"
+        set_up_environment()
+        subprocess.run(["gst-launch-1.0", "-q", *launch.split()], check=True, timeout=120)
         for name in ["viewer", "parent", *(f"camera{view}" for view in range(o.views))]:
             self.start(name)
         restarts = int((o.minutes * 60 - o.warm_up) / o.restart_every)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """calibrate: pictures of a chessboard or ChArUco board, from files or live, to a rig file."""
 
+import queue
 import re
 import shutil
 import signal
@@ -8,6 +9,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 from pathlib import Path
 
 from . import options
@@ -202,15 +204,30 @@ def print_result(text):
         print(f'written: {r["location"]}', flush=True)
 
 
+def lines_of(child):
+    """Of both outputs, each read by itself: in one pipe an error may begin in the middle of a line."""
+    lines = queue.Queue()
+
+    def read(output):
+        for line in output:
+            lines.put(line)
+        lines.put(None)
+
+    for output in (child.stdout, child.stderr):
+        threading.Thread(target=read, args=(output,), daemon=True).start()
+    for _ in range(2):
+        yield from iter(lines.get, None)
+
+
 def run_calibrate(args, launch):
     """Runs it with gst-launch-1.0 -m, whose lines are rigcalibrate's messages. Ctrl-C ends the stream, which calibrates."""
     try:
         command = ["gst-launch-1.0", "-e", "-m", *launch.words]
-        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", start_new_session=True)
+        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True)
         signal.signal(signal.SIGINT, lambda *_: child.send_signal(signal.SIGINT))
         signal.signal(signal.SIGTERM, lambda *_: (child.kill(), sys.exit(143)))
         result = error = False
-        for line in child.stdout:
+        for line in lines_of(child):
             text = line.rstrip("\n").replace("\\", "")
             complaint = re.match(r"(?:(ERROR|WARNING): from element \S+|WARNING: erroneous pipeline): (.*)", text)
             if "rigcalibrate-coverage," in text:

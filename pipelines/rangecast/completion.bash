@@ -4,7 +4,7 @@
 _rangecast () {
   local word=${COMP_WORDS[COMP_CWORD]} words
   if [ "$COMP_CWORD" = 1 ]; then
-    words=$(rangecast --help | sed -n 's/^    \([a-z][a-z]*\)  .*/\1/p')
+    words=$(rangecast --help | sed -n 's/^    \([a-z][a-z]*\)\( .*\)*$/\1/p')
   elif [[ "$word" == -* ]]; then
     words=$(rangecast "${COMP_WORDS[1]}" --help 2>/dev/null | grep -oE -- '--[a-z-]+' | sort -u)
   else

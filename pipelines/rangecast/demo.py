@@ -99,17 +99,17 @@ def demo(args, parse):
             launch.option("--report", log / f"camera{view}.json")
             if Path(args.input).is_dir():
                 launch.option("--base-time", base_time)
-            processes.start(f"camera{view}", launch, log / f"camera{view}.log", {**statistics, "RANGECAST_HOST": f"camera{view}"})
+            launch.environment.update(statistics, RANGECAST_HOST=f"camera{view}")
+            processes.start(f"camera{view}", launch, log / f"camera{view}.log")
         _, launch = host("parent", "--views", args.views, "--listen", args.port, "--to", f"127.0.0.1:{viewer_port}", "--jitter", args.jitter, "--latency", args.latency, *sending)
         launch.option("--report", log / "parent.json")
-        processes.start("parent", launch, log / "parent.log", {**statistics, "RANGECAST_HOST": "parent"})
+        launch.environment.update(statistics, RANGECAST_HOST="parent")
+        processes.start("parent", launch, log / "parent.log")
         if args.web is not None:
             print("open the first link in a browser, or the second one for a dashboard of the rig; Ctrl-C ends the demo:", flush=True)
             parsed, launch = host("serve", "--listen", viewer_port, "--port", args.web, "--stats", viewer_port + 1, "--jitter", args.jitter,
                                   "--title", f"gst-rangecast: {args.views} stereo cameras")  # fmt: skip
-            launch.environment.update(statistics, RANGECAST_HOST="web-server")
-            child = launch.spawn(stdout=subprocess.PIPE, text=True, start_new_session=True)
-            processes.running["server"] = child
+            child = processes.start("server", launch, stdout=subprocess.PIPE, text=True)
             fail_unless(serve.follow(parsed, child, rig=True) == 0, "the server for browsers failed")
             return 0
         film = [] if args.no_film else ["--out", out]
@@ -118,7 +118,7 @@ def demo(args, parse):
         launch.option("--snapshot", out / "avatar.png", "--report", log / "viewer.json")
         if args.no_film:
             (out / "avatar.webm").unlink(missing_ok=True)  # of another run
-        processes.running["viewer"] = launch.spawn(start_new_session=True)
+        processes.start("viewer", launch)
         while True:
             # The viewer ends the run; a host that ends earlier has failed, or its recording is over.
             name, status = processes.wait_for_end()

@@ -149,11 +149,8 @@ def build_convert(args):
 
 
 def convert_recording(file, out):
-    launch = Launch("filesrc", f"location={file}", "!", "neighbourcodeparse", "!", "neighbourcodedec", "!", *PREPARE, "!", "cylinderfilter", "!", "plyenc")
-    if options.numbered(out):
-        launch.add("!", "multifilesink", f"location={out}")
-    else:  # a second frame set is an error that names what to do
-        launch.add("!", "identity", "name=one-frame-set--use-a-name-such-as-out-%05d.ply", "error-after=2", "!", "filesink", f"location={out}")
+    launch = Launch("filesrc", f"location={file}", "!", "neighbourcodeparse", "!", "neighbourcodedec", "!", *PREPARE, "!", "cylinderfilter")
+    launch.add("!", "plyenc", "!", "multifilesink" if options.numbered(out) else "filesink", f"location={out}")
     return launch
 
 

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The hosts of the main job: camera, parent and view."""
 
-import os
 import re
 from pathlib import Path
 
 from . import options, transport
-from .launch import Fail, Launch, fail_unless, has_display
+from .launch import Launch, fail_unless, has_display
 
 QUEUE = ["queue", "max-size-buffers=2"]
 # What a viewer does between decoder and renderer.
@@ -111,6 +110,7 @@ def build_camera(args):
                 f"--views is {args.views}, but the rig '{args.rig}' has {in_rig} views")  # fmt: skip
     fail_unless(not args.loop or args.input.startswith("avatar"), "--loop is for --input avatar")
     fail_unless(not args.depth or args.input != "range", "--depth is for cameras: --input range has no stereodepth")
+    fail_unless(not args.clock_server or args.input.startswith("cameras"), "--clock-server is for --input cameras")
     adaptive = any(re.fullmatch(r"adaptive-bitrate=(true|t|yes|1)", one, re.I) for one in args.encoder)
     fail_unless(not adaptive or (args.feedback_port and len(args.to) == 1 and not transport.is_multicast(args.to)),
                 "--encoder: adaptive-bitrate needs --feedback-port, and one receiver in --to")  # fmt: skip

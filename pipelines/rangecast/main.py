@@ -63,3 +63,5 @@ def main(words=None):
     except (Fail, OSError, argparse.ArgumentTypeError) as error:
         print(f"rangecast {args.command}: {error}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        return 130

@@ -10,19 +10,29 @@ import time
 PATIENCE_S = 10  # for a process to end, and a video to be written to its end
 
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
 class Processes:
     """Ends all of them when it is left, or by a signal."""
 
     def __init__(self):
         self.running = {}
+        self.starting, self.pending = False, 0  # a signal waits until the process that starts is known
+
+    def handle(self, number, _):
+        if self.starting:
+            self.pending = number
+        else:
+            sys.exit(128 + number)
 
     def __enter__(self):
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, lambda number, _: sys.exit(128 + number))
+        for number in SIGNALS:
+            signal.signal(number, self.handle)
         return self
 
     def __exit__(self, *_):
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for number in SIGNALS:
             signal.signal(number, signal.SIG_IGN)
         for how in (signal.SIGTERM, signal.SIGKILL):
             end = time.monotonic() + PATIENCE_S
@@ -32,11 +42,15 @@ class Processes:
             while time.monotonic() < end and any(process.poll() is None for process in self.running.values()):
                 time.sleep(0.05)
 
-    def start(self, name, launch, log=None, environment=None):
-        # In a group of its own: Ctrl-C reaches them once, from here.
-        file = open(log, "w") if log else None  # noqa: SIM115
-        launch.environment.update(environment or {})
-        self.running[name] = launch.spawn(stdin=subprocess.DEVNULL, stdout=file, stderr=file and subprocess.STDOUT, start_new_session=True)
+    def start(self, name, launch, log=None, **options):
+        """In a group of its own: Ctrl-C reaches it once, from here."""
+        if log:
+            options |= {"stdout": open(log, "w"), "stderr": subprocess.STDOUT}  # noqa: SIM115
+        self.starting = True
+        self.running[name] = launch.spawn(stdin=subprocess.DEVNULL, start_new_session=True, **options)
+        self.starting = False
+        if self.pending:
+            sys.exit(128 + self.pending)
         return self.running[name]
 
     def wait_for_end(self):

@@ -81,6 +81,8 @@ def build_serve(args):
     if args.title:
         launch.add('title="{}"'.format(re.sub(r'(["\\])', r"\\\1", args.title)))
     if args.stats:
+        launch.environment["RANGECAST_STATS"] = os.environ.get("RANGECAST_STATS", f"udp://127.0.0.1:{args.stats}")
+        launch.environment["RANGECAST_HOST"] = os.environ.get("RANGECAST_HOST", "web-server")
         launch.add(f"stats-address=udp://{'127.0.0.1' if is_local(args.address) else '0.0.0.0'}:{args.stats}")
     if args.audio_port:
         transport.receive_speech(args, launch)

@@ -2,6 +2,7 @@
 """webcam: a USB stereo camera, plugged in, to an avatar in a window."""
 
 import os
+import signal
 import subprocess
 import sys
 
@@ -58,4 +59,7 @@ def calibrate(args, source):
     command = [sys.executable, sys.argv[0], "calibrate", f"--{args.packing}", " ".join(source), "--out", args.rig, "--far", "1.2"]
     command += ["--auto-finish", *([] if args.png else ["--window"]), *args.calibrate]
     print(f"no '{args.rig}' yet: calibrating; show the camera a chessboard in all parts of the picture (Ctrl-C finishes)", flush=True)
-    fail_unless(subprocess.run(command, check=False).returncode == 0, "the calibration failed")
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the calibration
+    status = subprocess.run(command, check=False).returncode
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    fail_unless(status == 0, "the calibration failed")

@@ -44,7 +44,7 @@ RunOptions::parse (int *argc, char ***argv)
           "File with the key (60 hexadecimal digits) of every srtpenc and srtpdec", "FILE"},
       {"drop-empty", 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &drop_empty,
           "Remove this file at the end if nothing was written to it, or a WebM header without "
-          "frames; may be given again",
+          "frames; that is an error of the first of several such files",
           "FILE"},
       {"clock", 0, 0, G_OPTION_ARG_STRING, &clock,
           "Clock of the pipeline: system (monotonic), or HOST:PORT, where rangemux publishes one "

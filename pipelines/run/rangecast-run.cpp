@@ -16,6 +16,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "clock.hpp"
 #include "common/dump-graph.hpp"
@@ -254,8 +255,11 @@ finish (Runner &runner)
     runner.failed = !write_snapshot (runner.pipeline, *runner.measure, options.snapshot);
   gst_element_set_state (runner.pipeline, GST_STATE_NULL);
   for (gchar **path = options.drop_empty; path && *path; path++)
-    if (is_empty (*path))
+    if (is_empty (*path)) {
       g_remove (*path);
+      if (path == options.drop_empty && !std::exchange (runner.failed, true))
+        g_printerr ("ERROR: %s: nothing came to write, so there is no file\n", *path);
+    }
 }
 
 /* Has an element post its statistics every second, unless its launch string says how often. */
@@ -323,7 +327,20 @@ GstElement *
 parse_pipeline (gchar **launch)
 {
   GError *error = nullptr;
+  /* Of a number out of range GObject only warns, and the default stays. */
+  const auto fail = [] (const gchar *, GLogLevelFlags, const gchar *message, gpointer error) {
+    if (!*static_cast<GError **> (error))
+      g_set_error_literal (static_cast<GError **> (error), GST_PARSE_ERROR,
+          GST_PARSE_ERROR_COULD_NOT_SET_PROPERTY, message);
+  };
+  GError *warning = nullptr;
+  const guint handler = g_log_set_handler ("GLib-GObject", G_LOG_LEVEL_WARNING, fail, &warning);
   GstElement *parsed = gst_parse_launchv (const_cast<const gchar **> (launch), &error);
+  g_log_remove_handler ("GLib-GObject", handler);
+  if (error)
+    g_clear_error (&warning);
+  else
+    error = warning;
   if (!parsed || error) {
     g_printerr ("ERROR: %s\n", error ? error->message : "empty launch string");
     g_clear_error (&error);

@@ -90,7 +90,7 @@ check_display ()
   if (!g_getenv ("DISPLAY") && !g_getenv ("WAYLAND_DISPLAY"))
     g_printerr (
         "rangecast-viewer: no display: neither DISPLAY nor WAYLAND_DISPLAY is set; without one, "
-        "rangecast play --film and viewer-host.sh --out write videos\n");
+        "rangecast play --film and rangecast view --out write videos\n");
   else if (!is_seen)
     g_printerr (
         "rangecast-viewer: GST_GL_WINDOW=%s draws without a window; expected it to be unset\n",

@@ -11,7 +11,7 @@ const char kSpeechCaps[] =
     "extmap-2=(string)urn:ietf:params:rtp-hdrext:ntp-64";
 
 /* The name of the file with the speech of a recording: x.opus beside x.rcnc, and x.opus~ beside
- * x.rcnc~, which record.sh keeps of the recording before. */
+ * x.rcnc~, which rangecast record keeps of the recording before. */
 std::string
 speech_beside (std::string recording)
 {

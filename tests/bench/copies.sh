@@ -10,7 +10,6 @@ source "$here/arguments.sh"
 source "$here/../../pipelines/env.sh"
 need_arguments 0 1 "$@"
 frames=${1:-20}
-need_number "$frames" FRAMES 1 100000
 dir=$(mktemp -d)
 trap 'rm -rf "$dir"' EXIT
 

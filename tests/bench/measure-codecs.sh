@@ -10,7 +10,6 @@ source "$here/arguments.sh"
 need_arguments 2 3 "$@"
 source "$here/../../pipelines/env.sh"
 data=$1 out=$2 rounds=${3:-11}
-need_number "$rounds" ROUNDS 1 1000
 bench=$here/../../build/tests/bench/codec_bench
 pipelines=$here/../../pipelines
 mkdir -p "$out"

@@ -8,7 +8,6 @@ source "$(dirname "$0")/arguments.sh"
 source "$(dirname "$0")/../../pipelines/env.sh"
 need_arguments 0 1 "$@"
 seconds=${1:-40} skip=10
-need_number "$seconds" SECONDS $((skip + 1)) 86400
 port=$((21000 + $$ % 40 * 50))
 twcc='extmap-1=(string)http://www.ietf.org/id/draft-holmer-rmcat-transport-wide-cc-extensions-01'
 caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE,payload=96"

@@ -23,7 +23,7 @@ send_both () { # condition options...
 }
 
 test_loss_makes_no_point_wrong () { send_both "r['lost'] > 0" --loss 0.2; }
-test_bursts_of_loss_make_no_point_wrong () { send_both "r['lost'] >= 20" --loss 0.2 --burst 20; }
+test_bursts_of_loss_make_no_point_wrong () { send_both "r['lost'] >= 20" --loss 0.5 --burst 20; }
 test_reordering_makes_no_point_wrong () { send_both "r['held_back'] > 0" --reorder 0.2 --reorder-by 10; }
 test_duplicates_change_nothing () { send_both "r['twice'] > 0 and r['whole_share'] == 1" --duplicate 0.3 --jitter-buffer 4000; }
 test_jitter_changes_nothing () { send_both "r['whole_share'] == 1" --jitter 50 --jitter-buffer 4000; }

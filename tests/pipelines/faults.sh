@@ -11,11 +11,11 @@ declare -a camera=() first_camera=() started=()
 now_ms () { awk '{ printf "%d\n", $1 * 1000 }' /proc/uptime; }
 
 start_viewer () {
-  "$pipelines/record.sh" all.rcnc --listen $((port + 9)) >viewer.log 2>&1 &
+  rangecast record all.rcnc --listen $((port + 9)) >viewer.log 2>&1 &
   viewer=$!
 }
 start_parent () { # options...
-  "$pipelines/parent-host.sh" --views 4 --listen "$port" --to 127.0.0.1:$((port + 9)) --jitter 100 --latency "$latency" "$@" >>parent.log 2>&1 &
+  rangecast parent --views 4 --listen "$port" --to 127.0.0.1:$((port + 9)) --jitter 100 --latency "$latency" "$@" >>parent.log 2>&1 &
   parent=$!
 }
 # It becomes the pipeline's process (exec): signals go to that.

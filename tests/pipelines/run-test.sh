@@ -22,6 +22,7 @@ source "$pipelines/env.sh"
 export GST_PLUGIN_PATH="${RANGECAST_BUILD:-$source_dir/build}/gst"
 PATH="${RANGECAST_BUILD:-$source_dir/build}/pipelines:${RANGECAST_BUILD:-$source_dir/build}/tests/simulators:$PATH"
 
+rtp_caps=application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE
 skip () { echo "skipped: $*"; exit 77; }
 fail () { echo "FAILED: $*" >&2; exit 1; }
 

@@ -47,9 +47,9 @@ record () {
 }
 
 test_recording_script_writes_what_the_document_says () {
-  "$pipelines/record.sh" recording.rcnc --frames 3 --size 160x120
-  expect_decoders_agree recording.rcnc 4 record.sh
-  expect_nothing_damaged record.sh
+  rangecast record recording.rcnc --frames 3 --size 160x120
+  expect_decoders_agree recording.rcnc 4 record
+  expect_nothing_damaged record
   [[ "$(cat counts.txt)" == "3 access units, "* ]] || fail "$(cat counts.txt)"
 }
 

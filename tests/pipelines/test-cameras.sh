@@ -25,11 +25,11 @@ stop_all () {
 start_hosts () { # port host-options...
   local port=$1
   shift
-  "$pipelines/record.sh" all.rcnc --listen $((port + 9)) >record.log 2>&1 &
+  rangecast record all.rcnc --listen $((port + 9)) >record.log 2>&1 &
   recorder=$!
-  "$pipelines/parent-host.sh" --views 1 --listen "$port" --to 127.0.0.1:$((port + 9)) >parent.log 2>&1 &
+  rangecast parent --views 1 --listen "$port" --to 127.0.0.1:$((port + 9)) >parent.log 2>&1 &
   parent=$!
-  "$pipelines/camera-host.sh" --view 0 --rig rig.yaml --size 160x120 --fps 8 --learn 5 --to "127.0.0.1:$port" "$@" >host.log 2>&1 &
+  rangecast camera --view 0 --rig rig.yaml --size 160x120 --fps 8 --learn 5 --to "127.0.0.1:$port" "$@" >host.log 2>&1 &
   host=$!
 }
 
@@ -100,7 +100,7 @@ test_one_host_of_two_sends_the_action_commands () {
   local view
   start_cameras cameras.log --views 2 --rig-export rig.yaml --log shots.log
   for view in 0 1; do
-    "$pipelines/camera-host.sh" --view $view --rig rig.yaml --size 160x120 --fps 8 --learn 5 --to 127.0.0.1:$((ports + 60)) \
+    rangecast camera --view $view --rig rig.yaml --size 160x120 --fps 8 --learn 5 --to 127.0.0.1:$((ports + 60)) \
       --input cameras --trigger action >host$view.log 2>&1 &
     hosts[view]=$!
   done
@@ -129,11 +129,11 @@ test_cameras_say_what_is_wrong () {
   start_cameras cameras.log --views 1 --rig-export rig.yaml
   expect_error "$(address 1)" fake-cameras --views 1 --address-base "$(address 1)"
   stop_all "$cameras"
-  expect_error "--trigger" "$pipelines/camera-host.sh" --view 0 --rig rig.yaml --to 127.0.0.1:1 --input cameras --trigger never
-  expect_error "--clock-server" "$pipelines/camera-host.sh" --view 0 --rig rig.yaml --to 127.0.0.1:1 --clock-server 127.0.0.1:1
-  expect_error "--action-send" "$pipelines/camera-host.sh" --view 0 --rig rig.yaml --to 127.0.0.1:1 --input cameras --action-send 3
-  expect_error "--input" "$pipelines/camera-host.sh" --view 0 --rig rig.yaml --to 127.0.0.1:1 --input cameras=one
-  expect_error "$(address 1)" "$pipelines/camera-host.sh" --view 0 --rig rig.yaml --to 127.0.0.1:1 --input cameras
+  expect_error "--trigger" rangecast camera --view 0 --rig rig.yaml --to 127.0.0.1:1 --input cameras --trigger never
+  expect_error "--clock-server" rangecast camera --view 0 --rig rig.yaml --to 127.0.0.1:1 --clock-server 127.0.0.1:1
+  expect_error "--action-send" rangecast camera --view 0 --rig rig.yaml --to 127.0.0.1:1 --input cameras --action-send 3
+  expect_error "--input" rangecast camera --view 0 --rig rig.yaml --to 127.0.0.1:1 --input cameras=one
+  expect_error "$(address 1)" rangecast camera --view 0 --rig rig.yaml --to 127.0.0.1:1 --input cameras
 }
 
 # ---- several machines: namespaces of network and time ----
@@ -219,8 +219,8 @@ start_machines () { # host-options...
   ip -n "$hub" link add bridge type bridge
   ip -n "$hub" link set bridge up
   ip -n "$hub" addr add 10.213.7.1/24 dev bridge
-  on "$hub" 0 "$pipelines/record.sh" all.rcnc --listen 7000 >record.log 2>&1 &
-  on "$hub" 0 "$pipelines/parent-host.sh" --views 3 --listen 7001 --to 127.0.0.1:7000 --clock-port 7100 --latency 150 >parent.log 2>&1 &
+  on "$hub" 0 rangecast record all.rcnc --listen 7000 >record.log 2>&1 &
+  on "$hub" 0 rangecast parent --views 3 --listen 7001 --to 127.0.0.1:7000 --clock-port 7100 --latency 150 >parent.log 2>&1 &
   local view names
   for view in 0 1 2; do
     make_machine "rc$$m$view" $((view + 2))
@@ -232,7 +232,7 @@ start_machines () { # host-options...
   for view in 0 1 2; do
     wait_for "cameras$view.log" '^ready' 60
     names=$(awk '/^view/ { print $2 }' "cameras$view.log" | paste -sd,)
-    on "rc$$m$view" "${clock_ahead[view]}" "$pipelines/camera-host.sh" --view $view --rig "rig$view.yaml" --input "cameras=$names" \
+    on "rc$$m$view" "${clock_ahead[view]}" rangecast camera --view $view --rig "rig$view.yaml" --input "cameras=$names" \
       --size 160x120 --fps 8 --learn 5 --to "10.213.7.1:$((7001 + view))" "$@" >"host$view.log" 2>&1 &
   done
   for view in 0 1 2; do wait_for "shots$view.log" . 60; done

@@ -31,18 +31,18 @@ start_network () {
 }
 start_hosts () { # parent-options...
   local view
-  net_on parent "$pipelines/parent-host.sh" --views 2 --listen 5000 "$@" >parent.log 2>&1 &
+  net_on parent rangecast parent --views 2 --listen 5000 "$@" >parent.log 2>&1 &
   parent=$!
   for view in 0 1; do
     # shellcheck disable=SC2086 # several options
-    net_on camera$view "$pipelines/camera-host.sh" --view $view --views 2 --rig rig.yaml --size 160x120 --fps 8 --learn 5 \
+    net_on camera$view rangecast camera --view $view --views 2 --rig rig.yaml --size 160x120 --fps 8 --learn 5 \
       --to "$(net_address parent):$((5000 + view))" ${camera_options:-} >camera$view.log 2>&1 &
   done
 }
 start_viewer () { # host options...
   local host=$1
   shift
-  net_on "$host" "$pipelines/record.sh" "$host.rcnc" --listen 6000 "$@" >"$host.log" 2>&1 &
+  net_on "$host" rangecast record "$host.rcnc" --listen 6000 "$@" >"$host.log" 2>&1 &
   viewer=$!
 }
 list () { # host... -> HOST:6000,...
@@ -84,9 +84,8 @@ test_a_picture_is_drawn_on_a_host_of_its_own () {
   need_gl
   start_network screen
   start_hosts --to "$(list screen)"
-  RANGECAST_LAUNCH="rangecast-run --frames 12 --views 2 --snapshot picture.png" \
-    net_on screen timeout -k 5 100 "$pipelines/viewer-host.sh" --listen 6000 --size 320x240 >screen.log 2>&1 ||
-    fail "$(tail -n 5 ./*.log)"
+  rangecast view --listen 6000 --picture 320x240 --print | sed 's/^gst-launch-1.0 -e/rangecast-run --frames 12 --views 2 --snapshot picture.png/' >view.sh
+  net_on screen timeout -k 5 100 bash view.sh >screen.log 2>&1 || fail "$(tail -n 5 ./*.log)"
   expect_file picture.png 3000
 }
 
@@ -112,18 +111,18 @@ test_encrypted_hosts_need_the_same_key () {
 # Without a refresh only a key frame set that the viewer asks for, through the parent, lets it in.
 test_a_viewer_that_joins_gets_a_key_frame_set_through_the_parent () {
   start_network one
-  sed -e 's/! neighbourcodeparse !/! neighbourcodedec ! neighbourcodeenc ! neighbourcodeparse !/' \
-    -e "s|source \"\$(dirname \"\$0\")|source \"$pipelines|" "$pipelines/record.sh" >decode.sh
-  net_on parent "$pipelines/parent-host.sh" --views 2 --listen 5000 --to "$(list one)" --feedback 5200 \
+  rangecast record one.rcnc --listen 6000 --feedback-to "$(net_address parent):5200" --print |
+    sed 's/! neighbourcodeparse/! neighbourcodedec ! neighbourcodeenc ! neighbourcodeparse/' >decode.sh
+  net_on parent rangecast parent --views 2 --listen 5000 --to "$(list one)" --feedback-port 5200 \
     --cameras "$(net_address camera0):5100,$(net_address camera1):5100" >parent.log 2>&1 &
   local view
   for view in 0 1; do
-    net_on camera$view "$pipelines/camera-host.sh" --view $view --views 2 --rig rig.yaml --size 160x120 --fps 8 --learn 5 \
-      --to "$(net_address parent):$((5000 + view))" --feedback 5100 --encoder "profile=entropy temporal=true refresh-period=0" \
+    net_on camera$view rangecast camera --view $view --views 2 --rig rig.yaml --size 160x120 --fps 8 --learn 5 \
+      --to "$(net_address parent):$((5000 + view))" --feedback-port 5100 --encoder "profile=entropy temporal=true refresh-period=0" \
       >camera$view.log 2>&1 &
   done
   sleep 8 # the first key frame sets are gone
-  net_on one bash decode.sh one.rcnc --listen 6000 --feedback "$(net_address parent):5200" >one.log 2>&1 &
+  net_on one bash decode.sh >one.log 2>&1 &
   wait_for_whole_sets one.rcnc 8 60
 }
 
@@ -156,9 +155,9 @@ repair () {
   start_viewer two --jitter 300
   expect_repair
 }
-test_fec_makes_frame_sets_whole_between_hosts () { repair "--fec 100" --fec; }
+test_fec_makes_frame_sets_whole_between_hosts () { repair "--fec-percent 100" --fec; }
 test_retransmission_makes_frame_sets_whole_between_hosts () {
-  repair "--rtx --feedback 5200" --rtx --feedback PARENT:5200
+  repair "--rtx --feedback-port 5200" --rtx --feedback-to PARENT:5200
 }
 
 # Capture times of the frame sets of a file that lack nothing.
@@ -170,9 +169,9 @@ whole_times () { # file
 test_retransmission_costs_nothing_on_a_good_network () {
   start_network one two
   camera_options="--input range --encoder profile=entropy"
-  start_hosts --to "$(list one two)" --rtx --feedback 5200
+  start_hosts --to "$(list one two)" --rtx --feedback-port 5200
   start_viewer two
-  start_viewer one --rtx --feedback "$(net_address parent):5200"
+  start_viewer one --rtx --feedback-to "$(net_address parent):5200"
   wait_for_whole_sets one.rcnc 40 90
   wait_for_whole_sets two.rcnc 40 90
   local first last missing

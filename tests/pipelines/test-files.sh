@@ -25,7 +25,7 @@ test_recording_becomes_points_film_and_numbers () {
   rangecast convert recording.rcnc cloud-%05d.ply
   [ "$(find . -name 'cloud-*.ply' | wc -l)" = 8 ] || fail "not 8 PLY files: $(ls)"
   [ "$(ply_vertices cloud-00005.ply)" -gt 3000 ] || fail "few points: $(ply_vertices cloud-00005.ply)"
-  expect_error "use-a-name-such-as-out-%05d.ply" rangecast convert recording.rcnc one.ply
+  expect_error "a second point cloud would go into the file of the first" rangecast convert recording.rcnc one.ply
   rangecast play recording.rcnc --film film.webm --picture 320x240
   expect_file film.webm 1000
   "${RANGECAST_BUILD:-$source_dir/build}/pipelines/count-points" recording.rcnc >points.txt

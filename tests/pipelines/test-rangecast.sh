@@ -14,7 +14,7 @@ test_each_command_has_help () {
   local command
   rangecast --help >help.txt
   for command in demo camera parent view record play webcam calibrate call serve convert check; do
-    grep -q "^    $command " help.txt || fail "$command is not in: $(cat help.txt)"
+    grep -qE "^    $command( |$)" help.txt || fail "$command is not in: $(cat help.txt)"
     rangecast "$command" --help | grep -q "^usage: rangecast $command" || fail "no help of $command"
   done
 }
@@ -150,4 +150,14 @@ test_bash_completes_commands_and_options () {
   COMP_WORDS=(rangecast view --mu) COMP_CWORD=2
   _rangecast
   [ "${COMPREPLY[*]}" = --multicast ] || fail "${COMPREPLY[*]}"
+}
+
+test_a_film_of_a_stream_that_did_not_come_is_not_left () {
+  need_gl
+  rangecast view --listen 20400 --out film --picture 160x120 >viewer.log 2>&1 &
+  until_true 60 takes_interrupt $!
+  until_true 60 test -e film/avatar.webm
+  kill -INT $!
+  ! wait $! || fail "nothing came, but no error"
+  [ ! -e film/avatar.webm ] || fail "an empty film is left"
 }

@@ -90,9 +90,10 @@ test_below_the_worst_thresholds_frame_sets_are_left_out_before_slices_are_lost (
 test_camera_host_with_feedback_follows_the_link () {
   timeout 60 gst-launch-1.0 -q avatartestsrc views=1 num-buffers=1 rig-export=rig.yaml ! fakesink
   udp-relay --listen $((ports + 50)) --to "127.0.0.1:$((ports + 51))" --bandwidth 500 >relay.log 2>&1 &
-  timeout -k 5 28 "$pipelines/record.sh" out.rcnc --listen $((ports + 51)) --feedback "127.0.0.1:$((ports + 52))" >record.log 2>&1 &
-  RANGECAST_LAUNCH="timeout -k 5 24 gst-launch-1.0 -m" "$pipelines/camera-host.sh" --view 0 --views 1 --rig rig.yaml --input range --learn 5 \
-    --to "127.0.0.1:$((ports + 50))" --feedback $((ports + 52)) --encoder "profile=entropy adaptive-bitrate=true" >camera.log 2>&1 || true
+  timeout -k 5 28 rangecast record out.rcnc --listen $((ports + 51)) --feedback-to "127.0.0.1:$((ports + 52))" >record.log 2>&1 &
+  rangecast camera --view 0 --views 1 --rig rig.yaml --input range --learn 5 \
+    --to "127.0.0.1:$((ports + 50))" --feedback-port $((ports + 52)) --encoder "profile=entropy adaptive-bitrate=true" --print | sed 's/^gst-launch-1.0 -e/& -m/' >camera.sh
+  timeout -k 5 24 bash camera.sh >camera.log 2>&1 || true
   jobs -p | xargs -r kill 2>/dev/null || true
   wait
   local bitrate

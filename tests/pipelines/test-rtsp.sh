@@ -187,7 +187,7 @@ test_failure_is_shown_and_the_next_viewer_starts_again () {
   kill -TERM "$server"
 }
 
-# Cameras by RTP, as parent-host.sh receives them.
+# Cameras by RTP, as rangecast parent receives them.
 test_parent_of_two_cameras_is_served () {
   local caps='application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE' i
   for i in 0 1; do

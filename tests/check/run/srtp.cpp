@@ -135,7 +135,7 @@ decrypt (const std::string &caps, const std::string &receiver, const Packets &pa
   return received;
 }
 
-/* As in pipelines/rtp.sh. */
+/* As in pipelines/rangecast/transport.py. */
 static const std::string kFrameSets =
     "avatartestsrc num-buffers=40 range-person-only=true views=1 is-live=true ! "
     "video/x-range,width=160,height=120,framerate=30/1 ! neighbourcodeenc max-slice-size=256 ! "

@@ -259,7 +259,7 @@ TEST (Views, view_with_another_persons_depth_is_skipped_until_that_person_goes)
     EXPECT_EQ (frame.points (2), 0u);
   }
   EXPECT_LT (alignment.view (2).consistency, 0.35);
-  learn (alignment, figure);
+  learn (alignment, figure, {}, 75);
   for (int id = 0; id < 4; id++)
     EXPECT_FALSE (alignment.view (id).skipped) << id;
   EXPECT_GT (alignment.view (2).consistency, 0.85);
@@ -354,7 +354,7 @@ struct Floating {
   }
 
   static constexpr int kLeft = 155, kTop = 90, kSize = 10;
-  Figure figure{6};
+  Figure figure{8};
   Frame frame = *figure.frame, before = frame;
 };
 
