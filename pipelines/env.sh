@@ -7,7 +7,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 # Whether build/ holds what setup.sh --demo builds.
 build_is_complete () {
   local file
-  for file in gst/{align,codec,convert,depth,mux,render,rtp,testsrc}/lib*.so pipelines/rangecast-run; do
+  for file in gst/{align,codec,convert,depth,mux,render,rtp,testsrc}/lib*.so pipelines/rangecast{,-run}; do
     compgen -G "$root/build/$file" >/dev/null || return 1
   done
 }

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """calibrate: pictures of a chessboard or ChArUco board, from files or live, to a rig file."""
 
+import atexit
 import queue
 import re
 import shutil
@@ -132,7 +133,9 @@ def size_of(folder, source):
 def build_calibrate(args):
     fail_unless(args.cameras, "needs --left, --side-by-side or --top-bottom")
     fail_unless(has_element("rigcalibrate"), "no element rigcalibrate: run setup.sh")
-    args.folder = folder = Path(tempfile.mkdtemp(prefix="rangecast-"))
+    folder = Path(tempfile.mkdtemp(prefix="rangecast-"))
+    if not args.print:  # the printed string needs it
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
     launch = Launch("rigcalibrate", "name=c", f"location={args.out}")
     for name in ("board", "columns", "rows", "square", "marker", "dictionary", "distortion", "world", "near", "far", "min_frames"):
         value = getattr(args, name)
@@ -221,28 +224,25 @@ def lines_of(child):
 
 def run_calibrate(args, launch):
     """Runs it with gst-launch-1.0 -m, whose lines are rigcalibrate's messages. Ctrl-C ends the stream, which calibrates."""
-    try:
-        command = ["gst-launch-1.0", "-e", "-m", *launch.words]
-        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True)
-        signal.signal(signal.SIGINT, lambda *_: child.send_signal(signal.SIGINT))
-        signal.signal(signal.SIGTERM, lambda *_: (child.kill(), sys.exit(143)))
-        result = error = False
-        for line in lines_of(child):
-            text = line.rstrip("\n").replace("\\", "")
-            complaint = re.match(r"(?:(ERROR|WARNING): from element \S+|WARNING: erroneous pipeline): (.*)", text)
-            if "rigcalibrate-coverage," in text:
-                print_coverage(text)
-            elif "rigcalibrate-result," in text:
-                print_result(text)
-                result = True
-            elif complaint and not error:
-                print(f"rangecast calibrate: {complaint[2]}", file=sys.stderr)
-                error = complaint[1] != "WARNING"
-                if error:  # before the first picture gst-launch-1.0 may wait forever after it
-                    child.kill()
-        child.wait()
-        if not result and not error:
-            print("rangecast calibrate: no result", file=sys.stderr)
-        return 0 if result and not error else 1
-    finally:
-        shutil.rmtree(args.folder, ignore_errors=True)
+    command = ["gst-launch-1.0", "-e", "-m", *launch.words]
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True)
+    signal.signal(signal.SIGINT, lambda *_: child.send_signal(signal.SIGINT))
+    signal.signal(signal.SIGTERM, lambda *_: (child.kill(), sys.exit(143)))
+    result = error = False
+    for line in lines_of(child):
+        text = line.rstrip("\n").replace("\\", "")
+        complaint = re.match(r"(?:(ERROR|WARNING): from element \S+|WARNING: erroneous pipeline): (.*)", text)
+        if "rigcalibrate-coverage," in text:
+            print_coverage(text)
+        elif "rigcalibrate-result," in text:
+            print_result(text)
+            result = True
+        elif complaint and not error:
+            print(f"rangecast calibrate: {complaint[2]}", file=sys.stderr)
+            error = complaint[1] != "WARNING"
+            if error:  # before the first picture gst-launch-1.0 may wait forever after it
+                child.kill()
+    child.wait()
+    if not result and not error:
+        print("rangecast calibrate: no result", file=sys.stderr)
+    return 0 if result and not error else 1

@@ -26,7 +26,7 @@ def is_multicast(addresses):
 
 def check_sender(args):
     fail_unless(not args.rtx or args.feedback_port, "--rtx needs --feedback-port")
-    fail_unless(not args.interface or is_multicast(args.to), "--interface is for a multicast group in --to")
+    fail_unless(not args.interface or is_multicast(args.to + (args.audio_to or [])), "--interface is for a multicast group in --to or --audio-to")
 
 
 def check_receiver(args):

@@ -2,6 +2,7 @@
 """webcam: a USB stereo camera, plugged in, to an avatar in a window."""
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -56,10 +57,14 @@ def build_webcam(args):
 
 def calibrate(args, source):
     options.output_file(args.rig)
-    command = [sys.executable, sys.argv[0], "calibrate", f"--{args.packing}", " ".join(source), "--out", args.rig, "--far", "1.2"]
+    command = [sys.executable, sys.argv[0], "calibrate", f"--{args.packing}", shlex.join(source), "--out", args.rig, "--far", "1.2"]
     command += ["--auto-finish", *([] if args.png else ["--window"]), *args.calibrate]
     print(f"no '{args.rig}' yet: calibrating; show the camera a chessboard in all parts of the picture (Ctrl-C finishes)", flush=True)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the calibration
-    status = subprocess.run(command, check=False).returncode
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGINT, lambda *_: None)  # Ctrl-C is for the calibration
+    child = subprocess.Popen(command)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: child.terminate())
+    status = child.wait()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
     fail_unless(status == 0, "the calibration failed")

@@ -74,7 +74,7 @@ test_env_says_that_the_build_is_missing_or_incomplete () {
   mkdir -p tree/build/gst/codec
   bash -c "$say" 2>said.txt
   [ "$(wc -l <said.txt)" = 1 ] && grep -q "incomplete.*setup.sh" said.txt || fail "$(cat said.txt)"
-  for file in "$build"/gst/*/*.so "$build/pipelines/rangecast-run"; do
+  for file in "$build"/gst/*/*.so "$build"/pipelines/rangecast{,-run}; do
     mkdir -p "$(dirname "tree/build/${file#"$build"}")"
     ln -s "$file" "tree/build/${file#"$build"}"
   done
