@@ -259,7 +259,7 @@ drop_late (GstRangeMux *self, const MuxStreams &streams)
 }
 
 /* Here late views are dropped. One of a recording that goes back far is dropped with the next frame
- * set: if those of all others go back, too, the recordings have begun again.
+ * set: if those of all others go back, too, the recordings have restarted.
  * @return whether any was dropped */
 static bool
 drop_unusable (GstRangeMux *self, const MuxStreams &streams)

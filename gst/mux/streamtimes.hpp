@@ -24,7 +24,7 @@ public:
   /** Live: sets `offset` and `in_sync`. The clock is the pipeline's if any stream has it, else the
    *  same as before. */
   void compare_clocks (const MuxStreams &streams, GstClockTime base);
-  /** Sets `late`. Recordings have begun again, as loops do, if all of them go back. */
+  /** Sets `late`. Recordings have restarted, as loops do, if all of them go back. */
   void find_late (const MuxStreams &streams, GstClockTime tolerance);
 
   /** Running time of the oldest buffer that waits, or GST_CLOCK_TIME_NONE; after find_silent(). */

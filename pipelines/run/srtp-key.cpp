@@ -12,7 +12,7 @@ constexpr std::size_t kKeyBytes = 30;       /* of AES-128 in counter mode, RFC 3
 constexpr guint kClosedPackets = 20;        /* in a row, and ... */
 constexpr gint64 kClosedTimeUs = 3'000'000; /* ... for this time, before it is reported */
 
-/* srtpdec keeps 29 KB for each SSRC, authentic or not, until it is told to clear its keys. */
+/* srtpdec keeps 29 KB for each SSRC, authentic or not, until its signal clear-keys. */
 constexpr guint kMaxStreams = 128;
 
 /** What goes into a srtpdec and comes out of it; its streaming threads count. */
