@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Installs what the project needs (Debian 12 packages), configures and builds build/.
 # Quick when nothing changed. What the compiler prints goes to build/setup.log.
-# usage: setup.sh [--demo | --web | --tests]
-#   --demo   what demo.sh, the viewer and README's launch lines need: no calibration, cameras, RTSP server, other programs,
-#            language bindings, tests and benchmarks, even where their libraries are installed
-#   --web    what demo.sh --web needs: that, rangewebsink and its page
-#   --tests  everything, as without an option
+# usage: setup.sh [--demo | --web | --cameras | --tests]
+#   --demo     what demo.sh, the viewer and README's launch lines need
+#   --web      what demo.sh --web needs: that, rangewebsink and its page
+#   --cameras  what camera hosts and calibration need: that of --demo, cameras, simulated cameras, calibration
+#   --tests    everything, as without an option: also the RTSP server, language bindings, tests and benchmarks
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -17,9 +17,13 @@ case "${1:-}" in
     [ "$1" = --demo ] || targets+=(web)
     # What was built before is kept up to date, because env.sh makes all plugins known.
     ! compgen -G "build/gst/camera/*.so" >/dev/null || targets+=(plugins programs) ;;
+  --cameras) targets=(cameras) ;;
   --tests | "") ;;
+  --help | -h)
+    sed -n '/^set/q; /^# usage/,$ s/^# //p' setup.sh
+    exit ;;
   *)
-    echo "setup.sh: unknown option '$1'; expected --demo, --web or --tests" >&2
+    echo "setup.sh: unknown option '$1': use --demo, --web, --cameras or --tests" >&2
     exit 2
     ;;
 esac
@@ -30,24 +34,28 @@ packages=(
   libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libopencv-dev libtinygltf-dev libtinyobjloader-dev libyaml-dev zlib1g-dev libcairo2-dev
   # run: launch strings, RTP, image and video files, software OpenGL without a display
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-base-apps gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
-  gstreamer1.0-libav glib-networking gstreamer1.0-gl libgl1-mesa-dri libegl1 libegl-mesa0 libgles2 libgl1
+  gstreamer1.0-libav glib-networking python3-yaml gstreamer1.0-gl libgl1-mesa-dri libegl1 libegl-mesa0 libgles2 libgl1
 )
-[ "${1:-}" = --demo ] || packages+=(
+[[ "${1:-}" = --demo || "${1:-}" = --cameras ]] || packages+=(
   # rangewebsink, and its page: rangecast.wasm
   libsoup-3.0-dev libjson-glib-dev
   clang-19 lld-19 wasi-libc libc++-19-dev-wasm32 libc++abi-19-dev-wasm32 libclang-rt-19-dev-wasm32
 )
 [ "${targets[0]}" = demo ] || packages+=(
-  # calibration, cameras, RTSP server
-  libopencv-contrib-dev libceres-dev libaravis-dev libusb-1.0-0-dev libgstrtspserver-1.0-dev
+  # calibration with its example images, cameras
+  libopencv-contrib-dev opencv-doc libceres-dev libaravis-dev libusb-1.0-0-dev aravis-tools aravis-tools-cli
+)
+[ "${targets[0]}" != all ] || packages+=(
+  # RTSP server
+  libgstrtspserver-1.0-dev
   # language bindings of libgstrange
   libgirepository1.0-dev python3-gst-1.0 python3-numpy
   # benchmarks
-  libturbojpeg0-dev libzstd-dev libpng-dev libdraco-dev libavcodec-dev
+  libturbojpeg0-dev
   # tests of the page
   nodejs chromium
   # tests
-  libgtest-dev iproute2 openssl opencv-doc valgrind xvfb xauth xdotool aravis-tools aravis-tools-cli umockdev libumockdev-dev
+  libgtest-dev python3-opencv iproute2 openssl valgrind xvfb xauth xdotool
 )
 
 installed= # "yes" once packages were
@@ -64,14 +72,19 @@ install_packages () {
     echo "setup.sh: not a Debian system; install yourself what these packages hold: ${packages[*]}" >&2
     return 0
   }
-  local missing sudo=
+  local missing sudo= command
   missing=$(missing_packages)
   [ -n "$missing" ] || return 0
   [ "$(id -u)" = 0 ] || sudo=sudo
-  echo "setup.sh: installing $(wc -w <<<"$missing") packages, which may take some minutes"
-  $sudo apt-get update -qq
+  command="apt-get install --no-install-recommends ${missing//$'\n'/ }"
+  echo "setup.sh: installing $(wc -w <<<"$missing") packages, which may take 10 minutes"
   # shellcheck disable=SC2086
-  $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null
+  { $sudo apt-get update -qq &&
+    { LC_ALL=C $command --assume-no 2>/dev/null | grep -E '^(Need to get|After this)' || true; } &&
+    $sudo env DEBIAN_FRONTEND=noninteractive $command -y -qq >/dev/null; } || {
+    echo "setup.sh: could not install packages; an administrator can: $command" >&2
+    exit 1
+  }
   installed=yes
 }
 
@@ -93,7 +106,7 @@ show_progress () {
   local line begun=
   while IFS= read -r line; do
     [[ "$line" =~ ^\[([0-9]+)/([0-9]+)\]\  ]] || continue
-    [ -n "$begun" ] || echo "setup.sh: building; the first time this takes some minutes; the log is $log"
+    [ -n "$begun" ] || echo "setup.sh: building; the first time this takes 10 to 30 minutes on two cores; the log is $log"
     begun=yes
     [ ! -t 1 ] || printf '\r%s of %s ' "${BASH_REMATCH[1]}" "${BASH_REMATCH[2]}"
   done
@@ -118,10 +131,12 @@ build () {
 # One at a time: demo.sh and run.sh may be started together.
 lock_build () {
   mkdir -p build
+  [ -w build ] || { echo "setup.sh: $PWD/build is not yours: run it as $(stat -c %U build), or copy the tree" >&2; exit 1; }
   exec 9>build/setup.lock
   flock -n 9 || { echo "setup.sh: waiting for another setup.sh in this folder"; flock 9; }
 }
 
+trap 'exit 130' INT
 lock_build
 install_packages
 build

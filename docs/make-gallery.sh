@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Makes the pictures of docs/guide/viewing.md. usage: docs/make-gallery.sh [FOLDER [MODEL.glb]], by default docs/images and the
+# Makes the images of docs/guide/viewing.md. usage: docs/make-gallery.sh [FOLDER [MODEL.glb]], by default docs/images and the
 # scanned head of the test data; without that, the built-in figure. Wants ffmpeg for the film (Debian package ffmpeg)
 # and python3-opencv for the bad views.
 set -euo pipefail
@@ -16,12 +16,11 @@ cd "$work"
 
 raw=video/x-raw,width=640,height=480,framerate=12/1
 range=video/x-range,width=640,height=480,framerate=12/1
-stream=video/x-neighbour-code,alignment=byte-stream
 
 # Six views in exact depth: one frame set. usage: record_exact RECORDING avatartestsrc's properties...
 record_exact () {
   gst-launch-1.0 -q -e avatartestsrc "${@:2}" noise=0 views=6 num-buffers=1 range-person-only=true ! "$range" \
-    ! neighbourcodeenc depth-threshold=0 colour-threshold=0 ! neighbourcodeparse ! "$stream" ! filesink "location=$1"
+    ! neighbourcodeenc depth-threshold=0 colour-threshold=0 ! filesink "location=$1"
 }
 
 # The same six views as stereo cameras see them, without and with the person, through the whole chain.
@@ -33,7 +32,7 @@ record_stereo () {
       "camera$view.left" ! "$raw" ! queue ! "depth$view.left" "camera$view.right" ! "$raw" ! queue ! "depth$view.right"
       stereodepth "name=depth$view" rig=rig.yaml "view-id=$view" ! roiextract background-frames=15 ! queue ! neighbourcodeenc depth-threshold=0 colour-threshold=0 ! mux.)
   done
-  gst-launch-1.0 -q -e rangemux name=mux ! neighbourcodeparse ! "$stream" ! filesink location=stereo.rcnc "${chain[@]}"
+  gst-launch-1.0 -q -e rangemux name=mux ! filesink location=stereo.rcnc "${chain[@]}"
 }
 
 # usage: sheet FILE RECORDING PANEL...: the last frame set, side by side; a panel is "elements after rangealign|striprender's properties"

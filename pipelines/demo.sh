@@ -7,8 +7,9 @@ top=$(cd "$(dirname "$0")/.." && pwd)
 ! command -v python3 >/dev/null || PYTHONPATH=$top/pipelines PYTHONDONTWRITEBYTECODE=1 \
   python3 -c 'from rangecast.main import make_parser; make_parser().parse_args()' demo "$@"
 case " $* " in
-  *' --help '* | *' -h '*) exit ;;
-  *cameras*) "$top/setup.sh" ;; # Aravis and the simulated cameras
+  *' --help '* | *' -h '*) command -v python3 >/dev/null || echo "demo.sh: install python3 to see the options"; exit ;;
+  *cameras*' --web'* | *' --web'*cameras*) "$top/setup.sh" ;;
+  *cameras*) "$top/setup.sh" --cameras ;; # Aravis and the simulated cameras
   *' --web'*) "$top/setup.sh" --web ;;
   *) "$top/setup.sh" --demo ;;
 esac

@@ -8,7 +8,7 @@ case "${1:-}" in
   -h | --help) sed -n '3,4s/^# //p' "$0"; exit 0 ;;
   -*) die "unknown option '$1'; usage: make-packages.sh OUT-DIR" ;;
 esac
-[ $# = 1 ] || die "expected one argument, the folder for the packages"
+[ $# = 1 ] || die "give one argument, the folder for the packages"
 mkdir -p "$1" 2>/dev/null || die "$1: cannot create this folder"
 out=$(realpath "$1")
 cd "$(dirname "$0")/.."

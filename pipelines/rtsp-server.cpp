@@ -16,7 +16,6 @@
 #include <atomic>
 #include <clocale>
 #include <cstdio>
-#include <cstring>
 #include <fstream>
 #include <map>
 #include <regex>
@@ -34,9 +33,9 @@ constexpr guint kCleanupInterval_s = 2;
 constexpr guint kGoodbye_ms = 500; /* for RTCP BYE to reach viewers before they are disconnected */
 
 struct Options {
-  gchar *address = nullptr, *mount = nullptr, *users_file = nullptr, *certificate = nullptr;
+  gchar *address = nullptr, *mount = nullptr, *users = nullptr, *certificate = nullptr;
   gchar *key = nullptr, *transports = nullptr, *multicast = nullptr;
-  gchar **users = nullptr, **launch = nullptr;
+  gchar **launch = nullptr;
   gint port = 8554, retransmission_ms = 0, max_viewers = 64;
 };
 
@@ -101,18 +100,36 @@ struct LaunchMediaClass {
 G_END_DECLS
 G_DEFINE_TYPE (LaunchMedia, launch_media, GST_TYPE_RTSP_MEDIA)
 
-/* The media's thread. */
-static gboolean
-launch_media_handle_message (GstRTSPMedia *media, GstMessage *message)
+/* The thread that posts it: where the state change fails, the library stops the media before its
+ * own thread has read the message. */
+static GstBusSyncReply
+report_message (GstBus *, GstMessage *message, gpointer)
 {
-  const GstMessageType type = GST_MESSAGE_TYPE (message);
   dump_graph (message, "rtsp-server");
-  if (type == GST_MESSAGE_ERROR) {
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR) {
     g_autoptr (GError) error = nullptr;
     g_autofree gchar *details = nullptr;
     gst_message_parse_error (message, &error, &details);
     gst_object_default_error (GST_MESSAGE_SRC (message), error, details);
   }
+  return GST_BUS_PASS;
+}
+
+static gboolean
+launch_media_prepare (GstRTSPMedia *media, GstRTSPThread *thread)
+{
+  g_autoptr (GstElement) element = gst_rtsp_media_get_element (media);
+  g_autoptr (GstObject) pipeline = gst_object_get_parent (GST_OBJECT (element));
+  g_autoptr (GstBus) bus = gst_element_get_bus (GST_ELEMENT (pipeline));
+  gst_bus_set_sync_handler (bus, report_message, nullptr, nullptr);
+  return GST_RTSP_MEDIA_CLASS (launch_media_parent_class)->prepare (media, thread);
+}
+
+/* The media's thread. */
+static gboolean
+launch_media_handle_message (GstRTSPMedia *media, GstMessage *message)
+{
+  const GstMessageType type = GST_MESSAGE_TYPE (message);
   const bool is_over = type == GST_MESSAGE_ERROR || type == GST_MESSAGE_EOS;
   /* Before it is prepared, the viewer who asked for it gets the response 503. */
   int run = reinterpret_cast<LaunchMedia *> (media)->run;
@@ -173,6 +190,7 @@ launch_media_init (LaunchMedia *media)
 static void
 launch_media_class_init (LaunchMediaClass *klass)
 {
+  GST_RTSP_MEDIA_CLASS (klass)->prepare = launch_media_prepare;
   GST_RTSP_MEDIA_CLASS (klass)->handle_message = launch_media_handle_message;
   GST_RTSP_MEDIA_CLASS (klass)->prepared = launch_media_prepared;
   GST_RTSP_MEDIA_CLASS (klass)->target_state = launch_media_target_state;
@@ -290,19 +308,8 @@ make_factory (const std::string &launch, const Options &options)
 
 /* ---- who may watch ---- */
 
-/* @param place  the option, or file and line, for errors, which never show the password */
-bool
-add_user (GstRTSPAuth *auth, GstRTSPToken *token, const std::string &text, const std::string &place)
-{
-  const auto colon = text.find (':');
-  if (colon == 0 || colon == text.npos || colon + 1 == text.size ())
-    return fail (place + ": give NAME:PASSWORD, neither of them empty");
-  gst_rtsp_auth_add_digest (
-      auth, text.substr (0, colon).c_str (), text.c_str () + colon + 1, token);
-  return true;
-}
-
-/* One NAME:PASSWORD per line, except for empty lines and those that begin with #. */
+/* One NAME:PASSWORD per line, except for empty lines and those that begin with #. Errors never show
+ * the password. */
 bool
 read_users (GstRTSPAuth *auth, GstRTSPToken *token, const std::string &path)
 {
@@ -314,8 +321,12 @@ read_users (GstRTSPAuth *auth, GstRTSPToken *token, const std::string &path)
       line.pop_back ();
     if (line.empty () || line[0] == '#')
       continue;
-    if (!add_user (auth, token, line, path + ":" + std::to_string (n_lines)))
-      return false;
+    const auto colon = line.find (':');
+    if (colon == 0 || colon == line.npos || colon + 1 == line.size ())
+      return fail (
+          path + ":" + std::to_string (n_lines) + ": give NAME:PASSWORD, neither of them empty");
+    gst_rtsp_auth_add_digest (
+        auth, line.substr (0, colon).c_str (), line.c_str () + colon + 1, token);
     n_users++;
   }
   return n_users > 0 || fail ("--users: cannot read a line NAME:PASSWORD from " + path);
@@ -336,39 +347,22 @@ set_certificate (GstRTSPAuth *auth, const Options &options)
 bool
 set_auth (GstRTSPServer *server, const Options &options)
 {
-  const bool has_users = options.users || options.users_file;
   if (options.key && !options.certificate)
     return fail ("--key needs --cert FILE");
-  if (!has_users && !options.certificate)
+  if (!options.users && !options.certificate)
     return true;
   g_autoptr (GstRTSPAuth) auth = gst_rtsp_auth_new ();
   gst_rtsp_auth_set_supported_methods (auth, GST_RTSP_AUTH_DIGEST);
   g_autoptr (GstRTSPToken) token =
       gst_rtsp_token_new (GST_RTSP_TOKEN_MEDIA_FACTORY_ROLE, G_TYPE_STRING, kViewerRole, nullptr);
-  if (!has_users)
+  if (!options.users)
     gst_rtsp_auth_set_default_token (auth, token);
   gst_rtsp_server_set_auth (server, auth);
-  for (gchar **user = options.users; user && *user; user++)
-    if (!add_user (auth, token, *user, "--user"))
-      return false;
-  return (!options.users_file || read_users (auth, token, options.users_file)) &&
+  return (!options.users || read_users (auth, token, options.users)) &&
          (!options.certificate || set_certificate (auth, options));
 }
 
 /* ---- the command line ---- */
-
-/* Other users of this machine can read the arguments of a process. */
-void
-wipe_passwords (int argc, char **argv)
-{
-  for (int i = 1; i < argc && std::strcmp (argv[i], "--") != 0; i++) {
-    const bool is_next = std::strcmp (argv[i - 1], "--user") == 0;
-    if (!is_next && std::strncmp (argv[i], "--user=", 7) != 0)
-      continue;
-    if (char *colon = std::strchr (argv[i], ':'))
-      std::memset (colon + 1, '*', std::strlen (colon + 1));
-  }
-}
 
 bool
 check_range (const char *option, int value, int min, int max)
@@ -386,10 +380,8 @@ parse_arguments (int argc, char **argv, Options &options)
       {"port", 0, 0, G_OPTION_ARG_INT, &options.port, "TCP port (default 8554; 0: any)", "N"},
       {"mount", 0, 0, G_OPTION_ARG_STRING, &options.mount, "Path of the URL (default /live)",
           "/PATH"},
-      {"user", 0, 0, G_OPTION_ARG_STRING_ARRAY, &options.users,
-          "Allow this user; may be repeated (default: everybody)", "NAME:PASSWORD"},
-      {"users", 0, 0, G_OPTION_ARG_FILENAME, &options.users_file,
-          "File of allowed users, one NAME:PASSWORD per line", "FILE"},
+      {"users", 0, 0, G_OPTION_ARG_FILENAME, &options.users,
+          "File of allowed users, one NAME:PASSWORD per line (default: everybody)", "FILE"},
       {"cert", 0, 0, G_OPTION_ARG_FILENAME, &options.certificate,
           "TLS certificate (PEM): serves rtsps://, with frame sets inside the TLS connection",
           "FILE"},
@@ -412,12 +404,10 @@ parse_arguments (int argc, char **argv, Options &options)
                                              "named pay0.\n");
   g_option_context_add_main_entries (context, entries, nullptr);
   g_option_context_add_group (context, gst_init_get_option_group ());
-  g_auto (GStrv) arguments = g_strdupv (argv); /* the parser takes what it knows out of it */
   g_autoptr (GError) error = nullptr;
-  const bool parsed =
-      g_option_context_parse_strv (context, &arguments, &error) || fail (error->message);
-  wipe_passwords (argc, argv);
-  if (!parsed || !check_range ("--port", options.port, 0, 65535) ||
+  if (!g_option_context_parse (context, &argc, &argv, &error))
+    return fail (error->message);
+  if (!check_range ("--port", options.port, 0, 65535) ||
       !check_range ("--retransmission", options.retransmission_ms, 0, 10000) ||
       !check_range ("--max-viewers", options.max_viewers, 1, 100000))
     return false;

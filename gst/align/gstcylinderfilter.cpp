@@ -8,19 +8,18 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 avatartestsrc views=4 num-buffers=30 ! rangealign ! cylinderfilter ! plyenc !
- * multifilesink location=cloud-%05d.ply
+ * gst-launch-1.0 avatartestsrc views=4 num-buffers=30 ! rangealign ! cylinderfilter ! plyenc ! \
+ *   multifilesink location=cloud-%05d.ply
  * ]|
  *
  * Since: 0.1
  */
-#include "gstcylinderfilter.h"
+#include <gst/base/gstbasetransform.h>
 
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
-#include <rangecast/base/guarded.hpp>
 #include <rangecast/overlap/cylinder_filter.hpp>
 
 #include "common/elementproperties.hpp"
@@ -57,10 +56,6 @@ cylinder_properties ()
   static P table = {
       P::enumeration<&S::axis> (
           "axis", "Axis", "How to choose the axis of the cylinder", axis_type (), kMutablePlaying),
-      P::number<&S::max_clusters> ("max-clusters", "Maximum clusters",
-          "Maximum number of clusters of points, such as people, that get a cylinder each (1 = one "
-          "cylinder for everything, as with axis=world)",
-          1, rangecast::kMaxClusters, kMutablePlaying),
       P::number<&S::slice_height_m> ("slice-height", "Slice height",
           "Height of a slice of the cylinder in metres", 0.0002, 10., kMutablePlaying),
       P::number<&S::columns> (
@@ -85,13 +80,15 @@ struct GstCylinderFilterPrivate {
   std::mutex lock; /* guards what follows; never held while working, pushing or posting */
   CylinderFilterSettings settings;
   guint64 frames = 0, points_in = 0, points_out = 0, cells = 0, cells_shared = 0;
-  gint clusters = 0;
   StatsReporter reporter; /* has locks of its own */
 
   /* With the sink pad's stream lock. */
   rangecast::CylinderFilter core;
   rangecast::Rig rig; /* of core; no views: none */
 };
+
+G_DECLARE_FINAL_TYPE (
+    GstCylinderFilter, gst_cylinder_filter, GST, CYLINDER_FILTER, GstBaseTransform)
 
 struct _GstCylinderFilter {
   GstBaseTransform parent;
@@ -105,7 +102,7 @@ static GstStaticPadTemplate src_template =
 
 G_DEFINE_TYPE (GstCylinderFilter, gst_cylinder_filter, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
-    cylinderfilter, "cylinderfilter", GST_RANK_NONE, GST_TYPE_CYLINDER_FILTER)
+    cylinderfilter, "cylinderfilter", GST_RANK_NONE, gst_cylinder_filter_get_type ())
 
 namespace {
 
@@ -123,7 +120,7 @@ make_stats (const GstCylinderFilterPrivate *priv)
   return gst_structure_new ("application/x-cylinderfilter-stats", "frames", G_TYPE_UINT64,
       priv->frames, "points-in", G_TYPE_UINT64, priv->points_in, "points-out", G_TYPE_UINT64,
       priv->points_out, "cells", G_TYPE_UINT64, priv->cells, "cells-shared", G_TYPE_UINT64,
-      priv->cells_shared, "clusters", G_TYPE_INT, priv->clusters, nullptr);
+      priv->cells_shared, nullptr);
 }
 
 } // namespace
@@ -134,19 +131,16 @@ gst_cylinder_filter_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
   auto self = GST_CYLINDER_FILTER (base);
   auto priv = self->priv;
   GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT, in);
-  const Status status = rangecast::guarded ("cylinderfilter", [&] {
-    gstrange::RangeInfo info;
-    Status result = gstrange::parse_caps (in, info);
-    if (result.ok () && encode_rig (info.rig) == encode_rig (priv->rig))
-      return result; /* keeps the winners of the frame before */
-    priv->rig = {};
-    priv->reporter.set_views (info.rig);
-    if (result.ok ())
-      result = priv->core.set_rig (info.rig);
-    if (result.ok ())
-      priv->rig = info.rig;
-    return result;
-  });
+  gstrange::RangeInfo info;
+  Status status = gstrange::parse_caps (in, info);
+  if (status.ok () && encode_rig (info.rig) == encode_rig (priv->rig))
+    return TRUE; /* keeps the winners of the frame before */
+  priv->rig = {};
+  priv->reporter.set_views (info.rig);
+  if (status.ok ())
+    status = priv->core.set_rig (info.rig);
+  if (status.ok ())
+    priv->rig = info.rig;
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
@@ -172,11 +166,13 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
     settings = priv->settings;
   }
   rangecast::CylinderResult result;
-  const Status status = rangecast::guarded ("cylinderfilter", [&] {
+  Status status;
+  {
     const gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
-    return frame.status ().ok () ? priv->core.process (frame.views (), settings, result)
-                                 : frame.status ();
-  });
+    status = frame.status ();
+    if (status.ok ())
+      status = priv->core.process (frame.views (), settings, result);
+  }
   if (status.ok ()) {
     GST_LOG_OBJECT (self,
         "frame set of %" GST_TIME_FORMAT ": %" G_GUINT64_FORMAT " of %" G_GUINT64_FORMAT
@@ -188,7 +184,6 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
     priv->points_out += result.points_out;
     priv->cells += result.cells.cells;
     priv->cells_shared += result.cells.shared;
-    priv->clusters = result.clusters;
   }
   priv->reporter.passed (GST_ELEMENT (self), buffer);
   return gst_range_flow_return (GST_ELEMENT (self), status);
@@ -201,7 +196,6 @@ gst_cylinder_filter_start (GstBaseTransform *base)
   priv->reporter.start (GST_ELEMENT (base), collect_stats);
   const std::lock_guard guard (priv->lock);
   priv->frames = priv->points_in = priv->points_out = priv->cells = priv->cells_shared = 0;
-  priv->clusters = 0;
   return TRUE;
 }
 
@@ -215,13 +209,6 @@ gst_cylinder_filter_stop (GstBaseTransform *base)
   priv->rig = {};
   priv->core = {};
   return TRUE;
-}
-
-static void
-gst_cylinder_filter_finalize (GObject *object)
-{
-  delete GST_CYLINDER_FILTER (object)->priv;
-  G_OBJECT_CLASS (gst_cylinder_filter_parent_class)->finalize (object);
 }
 
 static void
@@ -240,10 +227,9 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
 
   GST_DEBUG_CATEGORY_INIT (gst_cylinder_filter_debug, "cylinderfilter", 0, "Cylinder filter");
 
-  object_class->finalize = gst_cylinder_filter_finalize;
-  install_properties<GstCylinderFilter, cylinder_properties, make_stats> (object_class,
-      "Counters since READY: frames, points-in, points-out, cells, cells-shared; of the last "
-      "frame: clusters");
+  object_class->finalize = delete_private<GstCylinderFilter>;
+  install_properties<GstCylinderFilter, cylinder_properties, make_stats> (
+      object_class, "Counters since READY: frames, points-in, points-out, cells, cells-shared");
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

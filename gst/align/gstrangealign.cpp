@@ -14,7 +14,7 @@
  *
  * Since: 0.1
  */
-#include "gstrangealign.h"
+#include <gst/base/gstbasetransform.h>
 
 #include <cmath>
 #include <gstrange/gstrangeframe.hpp>
@@ -22,7 +22,6 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
 #include <rangecast/alignment/view_alignment.hpp>
-#include <rangecast/base/guarded.hpp>
 
 #include "common/elementproperties.hpp"
 #include "common/streamlock.hpp"
@@ -59,7 +58,7 @@ align_properties ()
   using S = RangeAlignSettings;
   using P = PropertyTable<S>;
   static P table = {
-      P::flag_set<&S::corrections> ("corrections", "Corrections",
+      P::enumeration<&S::corrections> ("corrections", "Corrections",
           "What to correct (points needs colours)", corrections_type (), kMutablePlaying),
       P::number<&S::threads> ("n-threads", "Threads",
           "Number of threads that process views (0 = one per CPU core)", 0, 64, kMutablePlaying),
@@ -86,6 +85,8 @@ struct GstRangeAlignPrivate {
   guint64 skipped = 0;      /* views that a warning was posted for, a bit each */
 };
 
+G_DECLARE_FINAL_TYPE (GstRangeAlign, gst_range_align, GST, RANGE_ALIGN, GstBaseTransform)
+
 struct _GstRangeAlign {
   GstBaseTransform parent;
   GstRangeAlignPrivate *priv;
@@ -97,7 +98,7 @@ static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
 
 G_DEFINE_TYPE (GstRangeAlign, gst_range_align, GST_TYPE_BASE_TRANSFORM)
-GST_ELEMENT_REGISTER_DEFINE (rangealign, "rangealign", GST_RANK_NONE, GST_TYPE_RANGE_ALIGN)
+GST_ELEMENT_REGISTER_DEFINE (rangealign, "rangealign", GST_RANK_NONE, gst_range_align_get_type ())
 
 namespace {
 
@@ -188,24 +189,23 @@ gst_range_align_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *)
   auto self = GST_RANGE_ALIGN (base);
   auto priv = self->priv;
   GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT, in);
-  const Status status = rangecast::guarded ("rangealign", [&] {
-    gstrange::RangeInfo info;
-    Status result = gstrange::parse_caps (in, info);
-    priv->rig_pending = true;
-    /* The base class negotiates again on RECONFIGURE, too, and sends the caps as they came. */
-    if (result.ok () && priv->has_rig &&
-        encode_rig (info.rig) == encode_rig (priv->alignment.nominal_rig ()))
-      return result;
-    if (result.ok ())
-      result = priv->alignment.set_rig (info.rig);
-    priv->has_rig = result.ok ();
-    priv->reporter.set_views (info.rig);
+  gstrange::RangeInfo info;
+  Status status = gstrange::parse_caps (in, info);
+  priv->rig_pending = true;
+  /* The base class negotiates again on RECONFIGURE, too, and sends the caps as they came. */
+  if (status.ok () && priv->has_rig &&
+      encode_rig (info.rig) == encode_rig (priv->alignment.nominal_rig ()))
+    return TRUE;
+  if (status.ok ())
+    status = priv->alignment.set_rig (info.rig);
+  priv->has_rig = status.ok ();
+  priv->reporter.set_views (info.rig);
+  {
     const std::lock_guard guard (priv->lock);
     priv->views.clear ();
     for (const rangecast::View &view : info.rig.views)
       priv->views.emplace_back (view.id, rangecast::ViewConsistency{});
-    return result;
-  });
+  }
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
@@ -243,15 +243,15 @@ gst_range_align_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
     settings = {(corrections & kPoses) != 0, (corrections & kViews) != 0,
         (corrections & kPoints) != 0, (corrections & kColours) != 0, priv->settings.threads};
   }
-  const Status status = rangecast::guarded ("rangealign", [&] {
+  Status status;
+  {
     const gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
-    Status result = frame.status ();
-    if (result.ok ())
-      result = priv->alignment.process (frame.views (), settings);
-    if (result.ok () && (priv->rig_pending || priv->alignment.rig_changed ()))
+    status = frame.status ();
+    if (status.ok ())
+      status = priv->alignment.process (frame.views (), settings);
+    if (status.ok () && (priv->rig_pending || priv->alignment.rig_changed ()))
       send_rig (self);
-    return result;
-  });
+  }
   if (status.ok ()) {
     GST_LOG_OBJECT (self, "frame set of %" GST_TIME_FORMAT ": cleared %zu contradicted points",
         GST_TIME_ARGS (GST_BUFFER_PTS (buffer)), priv->alignment.contradicted_points ());
@@ -286,13 +286,6 @@ gst_range_align_stop (GstBaseTransform *base)
 }
 
 static void
-gst_range_align_finalize (GObject *object)
-{
-  delete GST_RANGE_ALIGN (object)->priv;
-  G_OBJECT_CLASS (gst_range_align_parent_class)->finalize (object);
-}
-
-static void
 gst_range_align_init (GstRangeAlign *self)
 {
   self->priv = new GstRangeAlignPrivate;
@@ -308,7 +301,7 @@ gst_range_align_class_init (GstRangeAlignClass *klass)
 
   GST_DEBUG_CATEGORY_INIT (gst_range_align_debug, "rangealign", 0, "Range image alignment");
 
-  object_class->finalize = gst_range_align_finalize;
+  object_class->finalize = delete_private<GstRangeAlign>;
   install_properties<GstRangeAlign, align_properties, make_stats> (
       object_class, "Counters since READY: frames, points-contradicted; of the last frame: views");
 

@@ -64,10 +64,8 @@ PadFronts::~PadFronts ()
 }
 
 GstClockTime
-max_capture_skew (const CameraInputs &cameras, GstClockTime max_skew)
+max_capture_skew (const CameraInputs &cameras)
 {
-  if (max_skew > 0)
-    return max_skew;
   GstClockTime shortest = GST_CLOCK_TIME_NONE;
   for (const auto &camera : cameras)
     if (camera->info && camera->info->fps_n > 0)

@@ -40,7 +40,6 @@ struct CalibrationImages {
   GstClockTime capture = 0, running = GST_CLOCK_TIME_NONE;
   guint64 number = 0;
   std::optional<rangecast::SessionSettings> begin; /* in the first set: starts the session */
-  int tile_width = 0;
   bool auto_finish = false;
 
   CalibrationImages () = default;
@@ -84,9 +83,9 @@ public:
   int missing = 0, ended = 0; ///< pads without an image that wait for one; that are at EOS
 };
 
-/** Maximum difference of the capture times of one set, ns.
- *  @param max_skew  the property; 0: half a frame of the fastest camera, or 5 ms */
-GstClockTime max_capture_skew (const CameraInputs &cameras, GstClockTime max_skew);
+/** Maximum difference of the capture times of one set, ns: half a frame of the fastest camera, or
+ *  5 ms. */
+GstClockTime max_capture_skew (const CameraInputs &cameras);
 
 /** Drops GAPs, images that are older than the newest by more than the tolerance, and all images
  *  while a camera has no caps yet. Each dropped image is logged.

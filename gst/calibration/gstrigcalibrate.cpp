@@ -10,19 +10,19 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 -m rigcalibrate name=c location=rig.yaml columns=9 rows=6 square-size=0.025
- * sink_0::view=0 sink_1::view=0 sink_1::role=right ! videoconvert ! autovideosink
- * multifilesrc location=left%02d.jpg index=1 caps=image/jpeg,framerate=1/1 ! jpegdec ! c.sink_0
- * multifilesrc location=right%02d.jpg index=1 caps=image/jpeg,framerate=1/1 ! jpegdec ! c.sink_1
+ * gst-launch-1.0 -m rigcalibrate name=c location=rig.yaml columns=9 rows=6 square-size=0.025 \
+ *   sink_0::view=0 sink_1::view=0 sink_1::role=right ! videoconvert ! autovideosink \
+ *   multifilesrc location=left%02d.jpg index=1 caps=image/jpeg,framerate=1/1 ! jpegdec ! c.sink_0 \
+ *   multifilesrc location=right%02d.jpg index=1 caps=image/jpeg,framerate=1/1 ! jpegdec ! c.sink_1
  * ]|
  *
  * Since: 0.1
  */
-#include "gstrigcalibrate.h"
+#include <gst/base/gstaggregator.h>
 
-#include "backgroundjobs.hpp"
-#include "common/bufferpools.hpp"
+#include "common/backgroundjobs.hpp"
 #include "common/elementproperties.hpp"
+#include "common/recycledmemories.hpp"
 #include "frames.hpp"
 #include "messages.hpp"
 #include "settings.hpp"
@@ -48,11 +48,14 @@ GST_DEBUG_CATEGORY_STATIC (gst_rig_calibrate_debug);
  * `calibrate` or with auto-finish, calibrate. If live, sets that arrive while a job runs are
  * skipped; otherwise the streaming thread waits for each job. It pushes the previews. */
 
-enum { SIGNAL_CALIBRATE, SIGNAL_RESET, LAST_SIGNAL };
-static guint signals[LAST_SIGNAL];
-
 /* Maximum frame rate of what is taken for single photographs instead of video, Hz. */
 static constexpr int kMaxPhotoRate = 2;
+
+/* Of these, the most redundant one is replaced by a better one. */
+static constexpr int kMaxFrames = 100;
+
+/* Width of each camera's image in the output, pixels. */
+static constexpr int kTileWidth = 480;
 
 /* Default of `latency`, ns: the time for which a late camera is waited for. Only the preview is
  * delayed by it, and only while a camera is late. */
@@ -79,7 +82,7 @@ struct GstRigCalibratePrivate {
 
   /* jobs, and the streaming thread while there are none */
   rangecast::CalibrationSession session;
-  RecycledBytes stills;
+  RecycledMemories stills;
 
   /* streaming thread */
   bool begin = true; /* no set was examined yet */
@@ -88,6 +91,8 @@ struct GstRigCalibratePrivate {
   GstClockTime waiting = GST_CLOCK_TIME_NONE, waiting_since = GST_CLOCK_TIME_NONE;
   TileLayout layout; /* of the output caps */
 };
+
+G_DECLARE_FINAL_TYPE (GstRigCalibrate, gst_rig_calibrate, GST, RIG_CALIBRATE, GstAggregator)
 
 struct _GstRigCalibrate {
   GstAggregator parent;
@@ -103,7 +108,8 @@ static void gst_rig_calibrate_child_proxy_init (gpointer iface, gpointer data);
 
 G_DEFINE_TYPE_WITH_CODE (GstRigCalibrate, gst_rig_calibrate, GST_TYPE_AGGREGATOR,
     G_IMPLEMENT_INTERFACE (GST_TYPE_CHILD_PROXY, gst_rig_calibrate_child_proxy_init))
-GST_ELEMENT_REGISTER_DEFINE (rigcalibrate, "rigcalibrate", GST_RANK_NONE, GST_TYPE_RIG_CALIBRATE)
+GST_ELEMENT_REGISTER_DEFINE (
+    rigcalibrate, "rigcalibrate", GST_RANK_NONE, gst_rig_calibrate_get_type ())
 
 static CameraInputs
 current_cameras (GstRigCalibrate *self)
@@ -138,7 +144,7 @@ handle_caps (GstRigCalibrate *self, CameraInput &camera, GstCaps *caps)
     return {StatusCode::kBadSize, "pad " + name + ": images changed from " +
                                       size_text (camera.info->width, camera.info->height) + " to " +
                                       size_text (info.width, info.height) +
-                                      "; expected one size throughout a calibration"};
+                                      ", but a calibration needs one size"};
   GST_INFO_OBJECT (camera.pad, "caps %" GST_PTR_FORMAT, caps);
   camera.info = info;
   return {};
@@ -200,12 +206,14 @@ static void
 draw_still (GstRigCalibrate *self, const CalibrationImages &set, const MappedImages &images)
 {
   GstRigCalibratePrivate *priv = self->priv;
-  const TileLayout layout = rangecast::lay_out (set.described, set.tile_width);
+  const TileLayout layout = rangecast::lay_out (set.described, kTileWidth);
   const gsize size = gsize (layout.width ()) * layout.height () * 4;
-  GstBuffer *still = priv->stills.acquire (GST_ELEMENT (self), size, "the still picture");
+  GstMemory *memory = priv->stills.acquire (size);
   GstMapInfo map;
-  if (!still)
+  if (!memory)
     return;
+  GstBuffer *still = gst_buffer_new ();
+  gst_buffer_append_memory (still, memory);
   if (gst_buffer_map (still, &map, GST_MAP_WRITE)) {
     priv->session.draw (images.views, {reinterpret_cast<rangecast::Rgbx *> (map.data),
                                           layout.width (), layout.height (), layout.width () * 4});
@@ -267,7 +275,7 @@ examine_job (GstRigCalibrate *self, CalibrationImages &set, std::stop_token stop
   priv->finished |= finished;
 }
 
-/* ---- action signals, from any thread ---- */
+/* ---- from any thread ---- */
 
 static void
 gst_rig_calibrate_calibrate (GstRigCalibrate *self)
@@ -276,17 +284,6 @@ gst_rig_calibrate_calibrate (GstRigCalibrate *self)
     const Status status = calibrate (self, std::move (stop));
     if (status.code () != StatusCode::kInterrupted)
       gst_range_post_warning (GST_ELEMENT (self), status);
-  });
-}
-
-static void
-gst_rig_calibrate_reset (GstRigCalibrate *self)
-{
-  self->priv->jobs.post ([self] (const std::stop_token &) {
-    self->priv->session.clear ();
-    std::lock_guard guard (self->priv->lock);
-    self->priv->examined = self->priv->taken = 0;
-    self->priv->stale = true;
   });
 }
 
@@ -349,9 +346,8 @@ begin_session (
     video |= info.fps_n > kMaxPhotoRate * std::max (info.fps_d, 1);
   rangecast::SessionSettings settings;
   settings.calibration = p.core;
-  settings.selection.max_frames = p.max_frames;
-  settings.selection.all =
-      p.selection == FrameSelection::kAll || (p.selection == FrameSelection::kAuto && !video);
+  settings.selection.max_frames = kMaxFrames;
+  settings.selection.all = !video; /* of photographs, each was taken for its place */
   settings.thorough = !video;
   set.begin = settings;
   self->priv->begin = false;
@@ -375,7 +371,6 @@ examine_set (GstRigCalibrate *self, std::shared_ptr<CalibrationImages> set, bool
   if (priv->begin)
     if (Status s = begin_session (self, *set, p, live); !s.ok ())
       return gst_range_flow_return (GST_ELEMENT (self), s);
-  set->tile_width = p.tile_width;
   set->auto_finish = p.auto_finish;
   priv->jobs.post (
       [self, set] (std::stop_token stop) { examine_job (self, *set, std::move (stop)); });
@@ -397,11 +392,11 @@ explain_no_images (const CameraInputs &cameras)
 {
   for (const auto &camera : cameras)
     if (!camera->info)
-      return {StatusCode::kNotFound, "pad " + calibration_camera (camera->pad).name +
-                                         ": no images arrived; expected some on every pad"};
-  return {StatusCode::kNotFound,
-      "no images with matching times arrived on all pads; expected capture "
-      "times that differ by less than half a frame, or by max-skew"};
+      return {StatusCode::kNotFound,
+          "pad " + calibration_camera (camera->pad).name + ": no images arrived"};
+  return {StatusCode::kNotFound, "no images with matching times arrived on all pads: capture times "
+                                 "of a set differ by less than "
+                                 "half a frame"};
 }
 
 /* All pads are at EOS: calibrates, unless that was done already. */
@@ -451,7 +446,7 @@ gst_rig_calibrate_aggregate (GstAggregator *aggregator, gboolean timeout)
     return finish (self, cameras);
   if (fronts.list.empty () || (fronts.missing > 0 && !timeout))
     return GST_AGGREGATOR_FLOW_NEED_DATA;
-  const GstClockTime tolerance = max_capture_skew (cameras, current_settings (self).max_skew);
+  const GstClockTime tolerance = max_capture_skew (cameras);
   guint64 dropped = 0;
   if (drop_unmatched (cameras, fronts, tolerance, GST_CAT_DEFAULT, dropped)) {
     std::lock_guard guard (priv->lock);
@@ -518,7 +513,12 @@ gst_rig_calibrate_release_pad (GstElement *element, GstPad *pad)
     std::erase_if (self->priv->cameras,
         [&] (const auto &camera) { return GST_PAD (camera->aggregator_pad ()) == pad; });
   }
-  gst_rig_calibrate_reset (self);
+  self->priv->jobs.post ([self] (const std::stop_token &) {
+    self->priv->session.clear ();
+    std::lock_guard guard (self->priv->lock);
+    self->priv->examined = self->priv->taken = 0;
+    self->priv->stale = true;
+  });
   gst_child_proxy_child_removed (GST_CHILD_PROXY (element), G_OBJECT (pad), GST_PAD_NAME (pad));
   GST_ELEMENT_CLASS (gst_rig_calibrate_parent_class)->release_pad (element, pad);
 }
@@ -563,7 +563,7 @@ gst_rig_calibrate_start (GstAggregator *aggregator)
   const RigCalibrateSettings p = current_settings (self);
   rangecast::SessionSettings settings;
   settings.calibration = p.core;
-  settings.selection.max_frames = p.max_frames;
+  settings.selection.max_frames = kMaxFrames;
   Status status;
   if (!p.location.empty ()) /* now, not after minutes of work */
     status = rangecast::check_output_path (p.location, rangecast::kRigExtensions);
@@ -631,39 +631,10 @@ make_stats (const GstRigCalibratePrivate *priv)
 }
 
 static void
-gst_rig_calibrate_finalize (GObject *object)
-{
-  delete GST_RIG_CALIBRATE (object)->priv;
-  G_OBJECT_CLASS (gst_rig_calibrate_parent_class)->finalize (object);
-}
-
-static void
 gst_rig_calibrate_init (GstRigCalibrate *self)
 {
   self->priv = new GstRigCalibratePrivate;
   g_object_set (self, "latency", kLatency, nullptr);
-}
-
-static void
-install_signals (GstRigCalibrateClass *klass)
-{
-  /**
-   * GstRigCalibrate::calibrate:
-   *
-   * Calibrates from the frames taken so far, in the background, and posts a rigcalibrate-result
-   * message or a warning. The stream continues.
-   */
-  signals[SIGNAL_CALIBRATE] = g_signal_new_class_handler ("calibrate", G_TYPE_FROM_CLASS (klass),
-      GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION), G_CALLBACK (gst_rig_calibrate_calibrate),
-      nullptr, nullptr, nullptr, G_TYPE_NONE, 0);
-  /**
-   * GstRigCalibrate::reset:
-   *
-   * Discards all frames.
-   */
-  signals[SIGNAL_RESET] = g_signal_new_class_handler ("reset", G_TYPE_FROM_CLASS (klass),
-      GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION), G_CALLBACK (gst_rig_calibrate_reset),
-      nullptr, nullptr, nullptr, G_TYPE_NONE, 0);
 }
 
 static void
@@ -675,10 +646,18 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
 
   GST_DEBUG_CATEGORY_INIT (gst_rig_calibrate_debug, "rigcalibrate", 0, "Rig calibration");
 
-  object_class->finalize = gst_rig_calibrate_finalize;
+  object_class->finalize = delete_private<GstRigCalibrate>;
   install_properties<GstRigCalibrate, rig_calibrate_properties, make_stats> (
       object_class, "Counters since the element was started: examined, taken, skipped, dropped");
-  install_signals (klass);
+  /**
+   * GstRigCalibrate::calibrate:
+   *
+   * Calibrates from the frames taken so far, in the background, and posts a rigcalibrate-result
+   * message or a warning. The stream continues.
+   */
+  g_signal_new_class_handler ("calibrate", G_TYPE_FROM_CLASS (klass),
+      GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION), G_CALLBACK (gst_rig_calibrate_calibrate),
+      nullptr, nullptr, nullptr, G_TYPE_NONE, 0);
 
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &sink_template, GST_TYPE_RIG_CALIBRATE_PAD);

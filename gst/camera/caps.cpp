@@ -54,22 +54,6 @@ set_range (GstStructure *structure, const char *field, const SizeRange &range)
   gst_structure_take_value (structure, field, &value);
 }
 
-/* The caps of one pixel format, without size. */
-GstCaps *
-caps_of_format (const std::string &name)
-{
-  GstCaps *all = gst_caps_normalize (camera_caps ()), *found = gst_caps_new_empty ();
-  for (guint i = 0; i < gst_caps_get_size (all); i++) {
-    GstCaps *one = gst_caps_copy_nth (all, i);
-    if (pixel_format_for_caps (one, {name}) == name)
-      gst_caps_append (found, one);
-    else
-      gst_caps_unref (one);
-  }
-  gst_caps_unref (all);
-  return found;
-}
-
 std::string
 formats_of (const CameraAbilities &camera)
 {
@@ -111,7 +95,7 @@ camera_source_caps (std::span<const CameraAbilities> cameras, std::span<const st
   }
   for (const std::string &name : common_formats (cameras))
     if (pixel_format.empty () || pixel_format == name)
-      gst_caps_append (caps, caps_of_format (name));
+      gst_caps_append (caps, camera_caps (name));
   if (gst_caps_is_empty (caps))
     why = "the cameras have no pixel format in common that is " +
           (pixel_format.empty () ? "carried" : pixel_format) +
@@ -128,21 +112,42 @@ camera_source_caps (std::span<const CameraAbilities> cameras, std::span<const st
 
 /* ---- what the peers accept ---- */
 
-bool
-choose_camera_format (GstCaps *offered, std::span<GstPad *const> pads,
-    std::span<const CameraAbilities> cameras, SourceFormat &format)
+namespace {
+
+std::string
+conflict (GstPad *pad, GstCaps *left)
 {
-  GstCaps *common = gst_caps_ref (offered);
+  GstCaps *asked = gst_pad_peer_query_caps (pad, nullptr);
+  GstCaps *simple = gst_caps_simplify (gst_caps_copy (left));
+  gchar *asked_text = gst_caps_to_string (asked), *left_text = gst_caps_to_string (simple);
+  std::string text = std::string ("pad ") + GST_PAD_NAME (pad) + ": downstream accepts " +
+                     asked_text + "; the cameras and the pads before it leave " + left_text;
+  g_free (asked_text);
+  g_free (left_text);
+  gst_caps_unref (asked);
+  gst_caps_unref (simple);
+  return text;
+}
+
+} // namespace
+
+void
+choose_camera_format (GstCaps *offered, std::span<GstPad *const> pads,
+    std::span<const CameraAbilities> cameras, SourceFormat &format, std::string &why)
+{
+  GstCaps *caps = gst_caps_ref (offered);
   for (GstPad *pad : pads) {
-    GstCaps *both = gst_pad_peer_query_caps (pad, common);
-    gst_caps_unref (common);
-    common = both;
-  }
-  GstCaps *caps = gst_caps_intersect_full (common, offered, GST_CAPS_INTERSECT_FIRST);
-  gst_caps_unref (common);
-  if (gst_caps_is_empty (caps)) {
+    GstCaps *peer = gst_pad_peer_query_caps (pad, caps);
+    GstCaps *both = gst_caps_intersect_full (peer, caps, GST_CAPS_INTERSECT_FIRST);
+    gst_caps_unref (peer);
+    if (gst_caps_is_empty (both)) {
+      why = conflict (pad, caps);
+      gst_caps_unref (both);
+      gst_caps_unref (caps);
+      return;
+    }
     gst_caps_unref (caps);
-    return false;
+    caps = both;
   }
   caps = gst_caps_make_writable (gst_caps_truncate (caps));
   GstStructure *structure = gst_caps_get_structure (caps, 0);
@@ -163,5 +168,4 @@ choose_camera_format (GstCaps *offered, std::span<GstPad *const> pads,
   gst_structure_get_fraction (structure, "framerate", &format.fps_n, &format.fps_d);
   format.pixel_format = pixel_format_for_caps (caps, cameras[0].pixel_formats);
   gst_caps_take (&format.caps, caps);
-  return !format.pixel_format.empty ();
 }

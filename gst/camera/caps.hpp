@@ -39,7 +39,7 @@ GstCaps *camera_source_caps (std::span<const CameraAbilities> cameras,
 
 /** The format that the peers of all pads accept: the largest images, the rate nearest to 30 per
  *  second. Pads without a peer accept all.
- *  @param offered  of camera_source_caps(); transfer none
- *  @return false if there is none */
-bool choose_camera_format (GstCaps *offered, std::span<GstPad *const> pads,
-    std::span<const CameraAbilities> cameras, SourceFormat &format);
+ *  @param offered   of camera_source_caps(); transfer none
+ *  @param[out] why  if there is none: the pad, what its peer accepts, and what is left to choose */
+void choose_camera_format (GstCaps *offered, std::span<GstPad *const> pads,
+    std::span<const CameraAbilities> cameras, SourceFormat &format, std::string &why);

@@ -20,7 +20,7 @@ Status
 parse_clock_server (const std::string &text, ClockServer &server)
 {
   const Status bad = {StatusCode::kBadValue,
-      "clock-server " + text + ": expected HOST:PORT (port 1 to 65535) or ptp:DOMAIN (0 to 255)"};
+      "clock-server " + text + " is neither HOST:PORT (port 1 to 65535) nor ptp:DOMAIN (0 to 255)"};
   const auto colon = text.rfind (':');
   if (colon == std::string::npos || colon == 0)
     return bad;
@@ -62,12 +62,11 @@ NetworkClock::open (const std::string &text)
   } else {
     if (!gst_ptp_init (GST_PTP_CLOCK_ID_NONE, nullptr))
       return {StatusCode::kNotFound, "clock-server " + text +
-                                         ": PTP is not available; expected gst-ptp-helper with the "
+                                         ": PTP is not available: gst-ptp-helper needs the "
                                          "right to bind ports 319 and 320"};
     clock_ = gst_ptp_clock_new ("stereocamsrc-clock", static_cast<guint> (server.port));
   }
   if (!clock_)
     return {StatusCode::kNotFound, "clock-server " + text + ": no such clock"};
-  gst_object_ref_sink (clock_);
   return {};
 }

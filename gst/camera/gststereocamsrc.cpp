@@ -13,21 +13,20 @@
  * simultaneously. Images are not copied: buffers return to their camera when released.
  *
  * ## Element messages
- * - `stereocamsrc-stats`, every 5 s: the fields of #GstStereoCamSrc:stats.
  * - `stereocamsrc-lost` (`reason`: string) and `stereocamsrc-back` (`left`: string): with
  *   #GstStereoCamSrc:reconnect, a camera went away, or all are there again.
  * - `stereocamsrc-clock` (`server`: string): the pipeline clock is synchronised with clock-server.
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 stereocamsrc name=c left=21512345 right=21512346 trigger=software c.left ! queue !
- * d.left c.right ! queue ! d.right stereodepth name=d rig=rig.yaml ! rangesplit name=s s.depth !
- * videoconvert ! autovideosink
+ * gst-launch-1.0 stereocamsrc name=c left=21512345 right=21512346 trigger=software \
+ *   c.left ! queue ! d.left c.right ! queue ! d.right stereodepth name=d rig=rig.yaml ! \
+ *   rangesplit name=s s.depth ! videoconvert ! autovideosink
  * ]|
  *
  * Since: 0.1
  */
-#include "gststereocamsrc.h"
+#include <gst/gst.h>
 
 #include <gstrange/gstrangestatus.hpp>
 #include <memory>
@@ -36,11 +35,8 @@
 
 #include "camera/aravis/debug.hpp"
 #include "clock.hpp"
-#include "common/properties.hpp"
-#include "common/statsreporter.hpp"
+#include "common/elementproperties.hpp"
 #include "session.hpp"
-
-enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_SETTINGS };
 
 enum { SIGNAL_CAPTURE, N_SIGNALS };
 static guint signals[N_SIGNALS];
@@ -49,7 +45,7 @@ static guint signals[N_SIGNALS];
 static constexpr std::chrono::milliseconds kMaxClose{2000};
 
 struct GstStereoCamSrcPrivate {
-  std::mutex lock; /* guards settings and session; held while no other lock is taken */
+  std::mutex lock; /* guards settings and session; taken before those of the session */
   StereoCamSettings settings;
   std::shared_ptr<CameraSession> session; ///< the last one, which may have ended
 
@@ -64,6 +60,8 @@ struct GstStereoCamSrcPrivate {
     return session;
   }
 };
+
+G_DECLARE_FINAL_TYPE (GstStereoCamSrc, gst_stereo_cam_src, GST, STEREO_CAM_SRC, GstElement)
 
 struct _GstStereoCamSrc {
   GstElement parent;
@@ -84,7 +82,8 @@ static GstStaticPadTemplate third_template = GST_STATIC_PAD_TEMPLATE (
     "third", GST_PAD_SRC, GST_PAD_SOMETIMES, GST_STATIC_CAPS (CAMERA_CAPS));
 
 G_DEFINE_TYPE (GstStereoCamSrc, gst_stereo_cam_src, GST_TYPE_ELEMENT)
-GST_ELEMENT_REGISTER_DEFINE (stereocamsrc, "stereocamsrc", GST_RANK_NONE, GST_TYPE_STEREO_CAM_SRC)
+GST_ELEMENT_REGISTER_DEFINE (
+    stereocamsrc, "stereocamsrc", GST_RANK_NONE, gst_stereo_cam_src_get_type ())
 
 /* ---- queries and events ---- */
 
@@ -119,28 +118,11 @@ gst_stereo_cam_src_event (GstPad *pad, GstObject *parent, GstEvent *event)
 static gboolean
 gst_stereo_cam_src_send_event (GstElement *element, GstEvent *event)
 {
-  GstStereoCamSrcPrivate *priv = GST_STEREO_CAM_SRC (element)->priv;
-  const auto session = priv->current ();
-  switch (GST_EVENT_TYPE (event)) {
-    case GST_EVENT_EOS:
-      if (session)
-        session->send_eos (gst_event_get_seqnum (event));
-      break;
-    case GST_EVENT_FLUSH_START:
-      for (const auto &pad : priv->pads)
-        if (session)
-          pad->flush_start (event);
-      break;
-    case GST_EVENT_FLUSH_STOP:
-      if (session)
-        session->flush ();
-      for (const auto &pad : priv->pads)
-        if (session)
-          pad->flush_stop (event);
-      break;
-    default:
-      return GST_ELEMENT_CLASS (gst_stereo_cam_src_parent_class)->send_event (element, event);
-  }
+  if (GST_EVENT_TYPE (event) != GST_EVENT_EOS)
+    return GST_ELEMENT_CLASS (gst_stereo_cam_src_parent_class)->send_event (element, event);
+  const auto session = GST_STEREO_CAM_SRC (element)->priv->current ();
+  if (session)
+    session->send_eos (gst_event_get_seqnum (event));
   gst_event_unref (event);
   return session != nullptr;
 }
@@ -197,37 +179,14 @@ remove_third_pad (GstStereoCamSrc *self)
 
 /* ---- state changes ---- */
 
-/* The session's counters under the names of rangecast-stats. Latency is the delay of images. */
 static std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
   GstStereoCamSrcPrivate *priv = GST_STEREO_CAM_SRC (element)->priv;
-  std::vector<StatsRow> rows (1);
-  {
-    std::lock_guard guard (priv->lock);
-    rows[0].views = guint64{1} << (priv->settings.view_id & 63);
-  }
-  const auto session = priv->current ();
-  if (!session)
-    return rows;
-  GstStructure *stats = session->stats ();
-  const auto count = [stats] (const std::string &field) {
-    guint64 value = 0;
-    gst_structure_get_uint64 (stats, field.c_str (), &value);
-    return value;
-  };
-  guint64 lost = 0;
-  for (const char *side : {"left", "right", "third"})
-    lost += count (std::string ("dropped-") + side) + count (std::string ("incomplete-") + side);
-  rows[0].counters = {.frames = count ("sets"), .lost = lost, .late = count ("missed-ticks")};
-  gint64 p50, p99;
-  if (gst_structure_get_int64 (stats, "delay-p50", &p50) &&
-      gst_structure_get_int64 (stats, "delay-p99", &p99)) {
-    rows[0].latency_p50 = p50;
-    rows[0].latency_p99 = p99;
-  }
-  gst_structure_free (stats);
-  return rows;
+  std::lock_guard guard (priv->lock);
+  StatsRow row = priv->session ? priv->session->stats_row () : StatsRow ();
+  row.views = guint64{1} << (priv->settings.view_id & 63);
+  return {row};
 }
 
 static bool
@@ -327,7 +286,7 @@ gst_stereo_cam_src_change_state (GstElement *element, GstStateChange transition)
     remove_third_pad (self);
   if (transition == GST_STATE_CHANGE_READY_TO_NULL) { /* other programs may use the cameras now */
     const auto session = self->priv->current ();
-    if (session && !session->wait_until_closed (kMaxClose))
+    if (session && !session->wait_until_ended (kMaxClose))
       GST_INFO_OBJECT (self, "a camera does not answer; it is released later");
   }
   if (result == GST_STATE_CHANGE_FAILURE)
@@ -355,43 +314,10 @@ gst_stereo_cam_src_capture (GstStereoCamSrc *self, guint64 time)
   return session && session->capture (time);
 }
 
-static void
-gst_stereo_cam_src_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+static GstStructure *
+make_stats (const GstStereoCamSrcPrivate *priv)
 {
-  auto priv = GST_STEREO_CAM_SRC (object)->priv;
-  if (id == PROP_STATS_INTERVAL) {
-    priv->reporter.set_interval (g_value_get_uint (value));
-    return;
-  }
-  std::lock_guard guard (priv->lock);
-  if (!stereo_cam_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_stereo_cam_src_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  auto priv = GST_STEREO_CAM_SRC (object)->priv;
-  if (id == PROP_STATS) {
-    const auto session = priv->current ();
-    g_value_take_boxed (
-        value, session ? session->stats () : gst_structure_new_empty ("stereocamsrc-stats"));
-    return;
-  }
-  if (id == PROP_STATS_INTERVAL) {
-    g_value_set_uint (value, priv->reporter.interval ());
-    return;
-  }
-  std::lock_guard guard (priv->lock);
-  if (!stereo_cam_properties ().get (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_stereo_cam_src_finalize (GObject *object)
-{
-  delete GST_STEREO_CAM_SRC (object)->priv;
-  G_OBJECT_CLASS (gst_stereo_cam_src_parent_class)->finalize (object);
+  return priv->session ? priv->session->stats () : gst_structure_new_empty ("stereocamsrc-stats");
 }
 
 static void
@@ -411,12 +337,9 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
 {
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
-  object_class->set_property = gst_stereo_cam_src_set_property;
-  object_class->get_property = gst_stereo_cam_src_get_property;
-  object_class->finalize = gst_stereo_cam_src_finalize;
-  stereo_cam_properties ().install (object_class, PROP_SETTINGS);
-  install_stats (object_class, PROP_STATS, "Counters since the element was started");
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+  object_class->finalize = delete_private<GstStereoCamSrc>;
+  install_properties<GstStereoCamSrc, stereo_cam_properties, make_stats> (
+      object_class, "Counters since the element was started");
   /**
    * GstStereoCamSrc::capture:
    * @time: time on the pipeline clock; now if it is GST_CLOCK_TIME_NONE or has passed

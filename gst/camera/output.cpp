@@ -17,14 +17,6 @@ SetOutput::set_format (const SourceFormat &format)
     pad->set_caps (group_id_, format.caps);
 }
 
-void
-SetOutput::reset_time ()
-{
-  last_pts_ = GST_CLOCK_TIME_NONE;
-  last_sent_ns_ = 0;
-  covered_until_ = gap_until_ = 0;
-}
-
 bool
 SetOutput::send (ImageSet &set)
 {
@@ -42,7 +34,6 @@ SetOutput::send (ImageSet &set)
       element_, "set %" G_GUINT64_FORMAT " at %" GST_TIME_FORMAT, sent_, GST_TIME_ARGS (pts));
   for (std::size_t i = 0; i < pads_.size (); i++) {
     GstBuffer *buffer = set.images[i].release ();
-    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DISCONT);
     GST_BUFFER_PTS (buffer) = pts;
     GST_BUFFER_DTS (buffer) = GST_CLOCK_TIME_NONE;
     GST_BUFFER_DURATION (buffer) = period_ > 0 ? period_ : GST_CLOCK_TIME_NONE;

@@ -22,8 +22,6 @@ public:
   }
 
   void set_format (const SourceFormat &format);
-  /** After a flush, running time may begin again. */
-  void reset_time ();
   /** Sends a set, unless it was captured before running time 0, or in time that GAPs covered.
    *  @return false: this was the last of num-buffers */
   bool send (ImageSet &set);
@@ -32,7 +30,7 @@ public:
   void send_gaps (GstClockTime until_ago = 0);
   void send_eos (guint32 seqnum) const;
 
-  /** When the last set was sent, g_get_monotonic_time, ns; 0: none since reset_time(). */
+  /** When the last set was sent, g_get_monotonic_time, ns; 0: none. */
   [[nodiscard]] std::int64_t last_sent_ns () const { return last_sent_ns_; }
 
 private:

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "pad.hpp"
 
-#include <chrono>
 #include <utility>
 
 #include "camera/aravis/debug.hpp"
@@ -10,13 +9,10 @@ CameraPad::CameraPad (GstElement *element, GstPad *pad, FlowChanged flow_changed
     : element_ (element), pad_ (GST_PAD (gst_object_ref (pad))),
       flow_changed_ (std::move (flow_changed))
 {
-  flush_probe_ = gst_pad_add_probe (
-      pad_, GST_PAD_PROBE_TYPE_EVENT_FLUSH, GST_DEBUG_FUNCPTR (probe_flush), this, nullptr);
 }
 
 CameraPad::~CameraPad ()
 {
-  gst_pad_remove_probe (pad_, flush_probe_);
   clear ();
   gst_queue_array_free (queue_);
   gst_clear_caps (&caps_);
@@ -45,14 +41,16 @@ CameraPad::send (guint group_id, GstBuffer *buffer)
     gst_buffer_unref (buffer);
 }
 
-/* Before there are caps nobody waits. Some of many gaps in a row are enough. */
+/* Before there are caps nobody waits. Some of many gaps in a row are enough, and bound the queue.
+ */
 void
 CameraPad::send_gap (guint group_id, GstClockTime begin, GstClockTime duration)
 {
   std::lock_guard guard (lock_);
-  discont_ = true;
-  if (group_id == group_id_ && caps_ && gst_queue_array_get_length (queue_) < kMaxItems / 2)
+  if (group_id == group_id_ && caps_ && gst_queue_array_get_length (queue_) < kMaxItems)
     put (GST_MINI_OBJECT_CAST (gst_event_new_gap (begin, duration)));
+  else
+    discont_ = true;
 }
 
 void
@@ -78,37 +76,24 @@ CameraPad::put (GstMiniObject *item)
   const bool image = GST_IS_BUFFER (item);
   if (image && images_ >= kMaxImages) {
     GST_DEBUG_OBJECT (pad_, "downstream is blocked: dropping the oldest queued image");
-    drop_oldest (false);
+    drop_oldest_image ();
     overrun_++;
     discont_ = true;
-  } else if (gst_queue_array_get_length (queue_) >= kMaxItems && !drop_oldest (true)) {
-    gst_mini_object_unref (item); /* a queue full of caps events */
-    return;
-  }
-  if (image && discont_) {
-    GST_BUFFER_FLAG_SET (GST_BUFFER_CAST (item), GST_BUFFER_FLAG_DISCONT);
-    discont_ = false;
   }
   gst_queue_array_push_tail (queue_, item);
   images_ += image;
   changed_.notify_all ();
 }
 
-/* The oldest image, or GAP event. With the lock. @return false: there is none */
-bool
-CameraPad::drop_oldest (bool or_gap)
+/* With the lock. */
+void
+CameraPad::drop_oldest_image ()
 {
-  for (guint i = 0; i < gst_queue_array_get_length (queue_); i++) {
-    auto item = static_cast<GstMiniObject *> (gst_queue_array_peek_nth (queue_, i));
-    const bool image = GST_IS_BUFFER (item);
-    if (!image && !(or_gap && GST_EVENT_TYPE (GST_EVENT_CAST (item)) == GST_EVENT_GAP))
-      continue;
-    gst_queue_array_drop_element (queue_, i);
-    images_ -= image;
-    gst_mini_object_unref (item);
-    return true;
-  }
-  return false;
+  guint i = 0;
+  while (!GST_IS_BUFFER (gst_queue_array_peek_nth (queue_, i)))
+    i++;
+  gst_buffer_unref (GST_BUFFER_CAST (gst_queue_array_drop_element (queue_, i)));
+  images_--;
 }
 
 /* With the lock. */
@@ -145,7 +130,10 @@ CameraPad::push_next ()
     if (!flushing_) {
       item = static_cast<GstMiniObject *> (gst_queue_array_pop_head (queue_));
       images_ -= GST_IS_BUFFER (item);
-      needs_segment_ |= std::exchange (flushed_, false);
+      if (GST_IS_EVENT (item))
+        discont_ |= GST_EVENT_TYPE (item) == GST_EVENT_GAP;
+      else if (std::exchange (discont_, false))
+        GST_BUFFER_FLAG_SET (GST_BUFFER_CAST (item), GST_BUFFER_FLAG_DISCONT);
     }
   }
   if (!item) {
@@ -154,13 +142,15 @@ CameraPad::push_next ()
   }
   const bool image = GST_IS_BUFFER (item);
   const GstFlowReturn flow = push (item);
+  if (image && flow != GST_FLOW_OK) { /* it is lost */
+    std::lock_guard guard (lock_);
+    discont_ = true;
+  }
   const bool tells_flow = image || flow == GST_FLOW_NOT_NEGOTIATED; /* other events do not */
   if (tells_flow && flow != GST_FLOW_FLUSHING && std::exchange (last_flow_, flow) != flow)
     flow_changed_ (*this, flow);
-  if (flow == GST_FLOW_FLUSHING) { /* pushing fails until the flush ends */
-    std::unique_lock guard (lock_);
-    changed_.wait_for (guard, std::chrono::milliseconds (20), [this] { return flushing_; });
-  } else if (flow != GST_FLOW_OK && flow != GST_FLOW_NOT_LINKED) /* that may be linked again */ {
+  /* Downstream may be linked again, or come back from READY. */
+  if (flow != GST_FLOW_OK && flow != GST_FLOW_NOT_LINKED && flow != GST_FLOW_FLUSHING) {
     GST_DEBUG_OBJECT (pad_, "pausing: %s", gst_flow_get_name (flow));
     gst_pad_pause_task (pad_);
   }
@@ -192,55 +182,6 @@ CameraPad::push_segment ()
   GstSegment segment;
   gst_segment_init (&segment, GST_FORMAT_TIME);
   gst_pad_push_event (pad_, gst_event_new_segment (&segment));
-}
-
-/* ---- flushes ---- */
-
-/* A flush that the application pushed on this pad: it removed the segment, and the task may have
- * paused because downstream had ended. */
-GstPadProbeReturn
-CameraPad::probe_flush (GstPad *, GstPadProbeInfo *info, gpointer data)
-{
-  auto self = static_cast<CameraPad *> (data);
-  if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) != GST_EVENT_FLUSH_STOP)
-    return GST_PAD_PROBE_OK;
-  std::lock_guard guard (self->lock_);
-  if (self->flushing_) /* the element's own flush, or the pad is inactive */
-    return GST_PAD_PROBE_OK;
-  self->flushed_ = self->discont_ = true;
-  gst_pad_start_task (self->pad_, loop, self, nullptr);
-  return GST_PAD_PROBE_OK;
-}
-
-void
-CameraPad::flush_start (GstEvent *event)
-{
-  {
-    std::lock_guard guard (lock_);
-    flushing_ = true;
-    clear ();
-    changed_.notify_all ();
-  }
-  gst_pad_push_event (pad_, gst_event_ref (event));
-  gst_pad_pause_task (pad_);
-}
-
-void
-CameraPad::flush_stop (GstEvent *event)
-{
-  GST_PAD_STREAM_LOCK (pad_); /* the task is paused */
-  gst_pad_push_event (pad_, gst_event_ref (event));
-  needs_segment_ = true;
-  last_flow_ = GST_FLOW_OK;
-  {
-    std::lock_guard guard (lock_);
-    flushing_ = ended_ = false;
-    discont_ = true;
-    if (caps_)
-      put (GST_MINI_OBJECT_CAST (gst_event_new_caps (caps_)));
-  }
-  GST_PAD_STREAM_UNLOCK (pad_);
-  gst_pad_start_task (pad_, loop, this, nullptr);
 }
 
 /* ---- state changes ---- */

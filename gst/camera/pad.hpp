@@ -27,7 +27,6 @@ public:
   CameraPad &operator= (const CameraPad &) = delete;
 
   [[nodiscard]] GstPad *pad () const { return pad_; }
-  [[nodiscard]] const char *name () const { return GST_PAD_NAME (pad_); }
 
   /** Begins a new stream; before the pad becomes active. */
   void prepare (guint group_id);
@@ -42,11 +41,8 @@ public:
   void send (guint group_id, GstBuffer *buffer);
   /** No image comes for that time. */
   void send_gap (guint group_id, GstClockTime begin, GstClockTime duration);
-  /** After what is queued. What is sent after it is dropped, until a flush. */
+  /** After what is queued. What is sent after it is dropped. */
   void send_eos (guint group_id, guint32 seqnum);
-
-  void flush_start (GstEvent *event);
-  void flush_stop (GstEvent *event);
 
   /** Images that were dropped from a full queue. */
   [[nodiscard]] guint64 overrun () const { return overrun_; }
@@ -54,13 +50,12 @@ public:
 
 private:
   static constexpr guint kMaxImages = 3; ///< besides the one that is being pushed
-  static constexpr guint kMaxItems = 16; ///< with events
+  static constexpr guint kMaxItems = 8;  ///< with events, before a GAP event is queued
 
-  static GstPadProbeReturn probe_flush (GstPad *pad, GstPadProbeInfo *info, gpointer self);
   static void loop (gpointer self);
   void push_next ();
   void put (GstMiniObject *item);
-  bool drop_oldest (bool or_gap);
+  void drop_oldest_image ();
   void clear ();
   void push_segment ();
   GstFlowReturn push (GstMiniObject *item);
@@ -68,7 +63,6 @@ private:
   GstElement *element_;
   GstPad *pad_;
   FlowChanged flow_changed_;
-  gulong flush_probe_ = 0;
   std::atomic<guint64> overrun_ = 0;
 
   std::mutex lock_; /* guards down to the blank line */
@@ -76,7 +70,6 @@ private:
   GstQueueArray *queue_ = gst_queue_array_new (kMaxItems); ///< of GstMiniObject
   guint images_ = 0;                                       ///< in the queue
   bool flushing_ = true, ended_ = false, discont_ = true;
-  bool flushed_ = false;    ///< by an event that the application pushed on the pad
   GstCaps *caps_ = nullptr; ///< the last ones queued
   guint group_id_ = 0;
 

@@ -172,9 +172,10 @@ FramePairing::add_frame (int camera, CameraFrame frame)
   last_number_[camera] = frame.number;
   if (!frame.buffer) {
     counters_.incomplete[camera]++;
-    GST_DEBUG_OBJECT (element_, "camera %d: image %" G_GUINT64_FORMAT " dropped: %s", camera,
-        guint64 (frame.number),
-        frame.state == FrameState::kUnfit ? "wrong size or pixel format" : "packets are missing");
+    GST_DEBUG_OBJECT (element_,
+        "camera %d: image %" G_GUINT64_FORMAT
+        " dropped: packets are missing, or another size or pixel format came",
+        camera, guint64 (frame.number));
   }
   if (by_ == TriggeredBy::kElement)
     add_triggered_frame (camera, std::move (frame));
@@ -344,7 +345,7 @@ FramePairing::complete (ImageSet &set)
   if (apart_ns > tolerance_ns_) {
     for (int c = 0; c < cameras_; c++)
       drop (c, "exposed too far apart from its partners");
-    counters_.apart++;
+    counters_.time_mismatch++;
     return false;
   }
   spread_.add (spread_ns);

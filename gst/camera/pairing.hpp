@@ -3,8 +3,7 @@
 
 #include <gst/gst.h>
 
-#include "camera/aravis/frame.hpp"
-#include "camera/aravis/settings.hpp"
+#include "camera/aravis/types.hpp"
 #include "common/matcher.hpp"
 #include <array>
 #include <mutex>
@@ -24,8 +23,8 @@ struct PairingStatistics {
   guint64 sets = 0;
   std::array<guint64, kMaxCameras> dropped{};    ///< complete images without partner
   std::array<guint64, kMaxCameras> incomplete{}; ///< images with missing packets, or lost
-  guint64 apart = 0;   ///< sets that were dropped because their exposures lie too far apart
-  guint64 unknown = 0; ///< images that answer no known trigger
+  guint64 time_mismatch = 0; ///< sets that were dropped because of different exposure times
+  guint64 unknown = 0;       ///< images that answer no known trigger
   guint64 missing_packets = 0;
   bool has_spread = false;                           ///< the following are valid
   std::int64_t spread_p50_ns = 0, spread_p99_ns = 0; ///< of the exposures within a set

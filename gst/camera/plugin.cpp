@@ -7,18 +7,14 @@
 #include <gst/gst.h>
 
 GST_ELEMENT_REGISTER_DECLARE (stereocamsrc)
-#ifdef RANGECAST_HAVE_DEVICE_PROVIDER
 GST_DEVICE_PROVIDER_REGISTER_DECLARE (rangecastdeviceprovider)
-#endif
 
 static gboolean
 plugin_init (GstPlugin *plugin)
 {
   gboolean registered = FALSE;
   registered |= GST_ELEMENT_REGISTER (stereocamsrc, plugin);
-#ifdef RANGECAST_HAVE_DEVICE_PROVIDER
   registered |= GST_DEVICE_PROVIDER_REGISTER (rangecastdeviceprovider, plugin);
-#endif
   return registered;
 }
 

@@ -2,8 +2,6 @@
 /* A session from its beginning to its end; streaming.cpp has what it does while cameras stream. */
 #include "session.hpp"
 
-#include <future>
-#include <thread>
 #include <utility>
 
 #include "camera/aravis/debug.hpp"
@@ -14,10 +12,6 @@ namespace {
 
 constexpr Milliseconds kRetry{1000}, kGapInterval{100};
 constexpr GstClockTime kMaxClockWait = 10 * GST_SECOND;
-
-/* Sessions of this process that were asked to stop and have not ended. One that is still looking
- * for its cameras may open one, until it sees that it is to stop. */
-std::atomic<int> stopping_sessions = 0;
 
 /* Exposure and transfer; a transfer takes no longer than a frame period, else images would pile
  * up. @param period  0: single shots */
@@ -39,28 +33,28 @@ first_latency (const CameraSession::Setup &setup)
       setup.settings.single_shot ? 0 : GST_SECOND / 30);
 }
 
+std::vector<GstPad *>
+gst_pads_of (const CameraPads &pads)
+{
+  std::vector<GstPad *> list;
+  for (const auto &pad : pads)
+    list.push_back (pad->pad ());
+  return list;
+}
+
 } // namespace
 
 CameraSession::CameraSession (Setup setup)
     : element_ (GST_ELEMENT (gst_object_ref (setup.element))), settings_ (setup.settings),
-      names_ (setup.names), pads_ (setup.pads),
+      names_ (setup.names), pads_ (setup.pads), gst_pads_ (gst_pads_of (setup.pads)),
       clock_ (setup.clock ? GST_CLOCK (gst_object_ref (setup.clock)) : nullptr),
-      pairing_ (element_), trigger_ (element_, settings_, pairing_),
-      cameras_ (element_, settings_, names_, pads_, pairing_,
-          {.add_frame =
-                  [this] (int camera, CameraFrame frame) {
-                    std::lock_guard guard (lock_);
-                    inbox_.push_back ({camera, std::move (frame)});
-                    changed_.notify_all ();
-                  },
-              .fail = [this] (CameraStatus fault) { fail (std::move (fault)); },
-              .wait = [this] (Milliseconds time) { return wait (time); },
-              .wait_for_other_sessions = [this] { return wait_for_other_sessions (); }}),
+      pairing_ (element_), trigger_ (element_, settings_, pairing_, events_),
+      cameras_ (element_, settings_, names_, gst_pads_, pairing_, events_),
       output_ (element_, pads_, setup.group_id, settings_), latency_ (first_latency (setup)),
       previous_ (std::move (setup.previous))
 {
-  for (const auto &pad : pads_)
-    gst_flow_combiner_add_pad (combiner_, pad->pad ());
+  for (GstPad *pad : gst_pads_)
+    gst_flow_combiner_add_pad (combiner_, pad);
 }
 
 CameraSession::~CameraSession ()
@@ -79,10 +73,9 @@ CameraSession::begin (Setup setup)
     GstElement *element = self->element_;
     self->run ();
     {
-      std::lock_guard guard (self->lock_);
+      std::lock_guard guard (self->events_.lock);
       self->ended_ = true;
-      stopping_sessions -= self->stop_;
-      self->changed_.notify_all ();
+      self->events_.changed.notify_all ();
     }
     self.reset ();
     gst_object_unref (element); /* perhaps the last: with it go the pads, which are used above */
@@ -104,16 +97,12 @@ void
 CameraSession::run ()
 {
   if (previous_) {
-    std::unique_lock guard (previous_->lock_);
-    previous_->changed_.wait (guard, [this] { return previous_->ended_; });
+    std::unique_lock guard (previous_->events_.lock);
+    previous_->events_.changed.wait (guard, [this] { return previous_->ended_; });
   }
   previous_.reset ();
-  while (!stopping () && run_cameras () == End::kFault) {
-    const bool retry = report_fault ();
-    stop_cameras ();
-    if (!retry)
-      break;
-    GST_DEBUG_OBJECT (element_, "cameras closed; opening them again in a second");
+  while (!events_.stopping () && run_cameras () == End::kFault && report_fault ()) {
+    GST_DEBUG_OBJECT (element_, "opening the cameras again in a second");
     wait_before_retry ();
   }
   stop_cameras ();
@@ -124,44 +113,45 @@ CameraSession::End
 CameraSession::run_cameras ()
 {
   End end = End::kRenegotiate;
-  try {
-    GST_DEBUG_OBJECT (element_, "opening cameras");
-    CameraStatus status = open_cameras ();
-    if (status.ok ())
-      status = wait_for_clock ();
-    while (status.ok () && end == End::kRenegotiate) {
-      status = start_cameras ();
-      if (!status.ok ())
-        break;
-      if (std::exchange (lost_, false)) {
-        reconnects_++;
-        post_element_message ("stereocamsrc-back", "left", cameras_.cameras ()[0]->label ());
-      }
-      GST_DEBUG_OBJECT (element_, "streaming");
-      end = stream ();
-      if (end == End::kFault)
-        (void)report_fault (); /* stopping may have to wait for a camera that does not answer */
-      trigger_.stop ();
-      cameras_.stop ();
-    }
+  GST_DEBUG_OBJECT (element_, "opening cameras");
+  CameraStatus status = open_cameras ();
+  if (status.ok ())
+    status = wait_for_clock ();
+  while (status.ok () && end == End::kRenegotiate) {
+    status = start_cameras ();
     if (!status.ok ())
-      fail (std::move (status));
-  } catch (const std::exception &e) { /* the system gives no more threads */
-    fail ({CameraFault::kFailed, std::string ("cannot run the camera loop: ") + e.what ()});
+      break;
+    if (std::exchange (lost_, false)) {
+      reconnects_++;
+      post_element_message ("stereocamsrc-back", "left", cameras_.cameras ()[0]->label ());
+    }
+    GST_DEBUG_OBJECT (element_, "streaming");
+    end = stream ();
+    if (end == End::kFault)
+      (void)report_fault (); /* stopping may have to wait for a camera that does not answer */
+    trigger_.stop ();
+    cameras_.stop ();
   }
-  if (stopping ())
-    return End::kStopped;
-  return end == End::kRenegotiate ? End::kFault : end;
+  if (!status.ok ())
+    events_.fail (std::move (status));
+  return events_.stopping () ? End::kStopped : End::kFault;
 }
 
-/* Looking for a camera that is away takes seconds; downstream goes on meanwhile. */
+/* Closing a camera that is away, and looking for it, takes seconds; downstream goes on meanwhile.
+ */
 CameraStatus
 CameraSession::open_cameras ()
 {
-  auto opened = std::async (std::launch::async, [this] { return cameras_.open (); });
-  while (opened.wait_for (kGapInterval) != std::future_status::ready)
+  CameraStatus status (CameraFault::kFailed, "cannot start the thread that opens the cameras");
+  if (!opening_.start ())
+    return status;
+  opening_.post ([this, &status] (const std::stop_token &) {
+    stop_cameras ();
+    status = cameras_.open ();
+  });
+  while (!opening_.wait_until_idle (kGapInterval))
     send_gaps ();
-  return opened.get ();
+  return status;
 }
 
 /* Running time jumps forward with the clock when it is synchronised. */
@@ -172,10 +162,10 @@ CameraSession::wait_for_clock ()
     return {};
   for (GstClockTime waited = 0; !gst_clock_wait_for_sync (clock_, 100 * GST_MSECOND);
        waited += 100 * GST_MSECOND)
-    if (stopping () || waited >= kMaxClockWait)
-      return {CameraFault::kTimedOut, "clock-server " + settings_.clock_server +
-                                          " does not answer; expected a network clock there, as "
-                                          "rangemux with clock-port provides"};
+    if (events_.stopping () || waited >= kMaxClockWait)
+      return {CameraFault::kTimedOut,
+          "clock-server " + settings_.clock_server +
+              " does not answer; rangemux with clock-port provides a network clock"};
   clock_ready_ = true;
   post_element_message ("stereocamsrc-clock", "server", settings_.clock_server);
   return {};
@@ -193,17 +183,13 @@ CameraSession::start_cameras ()
   const GstClockTime latency = expected_latency (cameras_.exposure (), format.period ());
   if (latency_.exchange (latency) != latency)
     gst_element_post_message (element_, gst_message_new_latency (GST_OBJECT (element_)));
-  clear_inbox ();
+  clear_frames ();
   was_playing_ = false;
-  status =
-      wait (Milliseconds (0)) ? cameras_.start () : CameraStatus (CameraFault::kFailed, "stopped");
-  if (!status.ok ())
-    return status;
   output_.set_format (format);
-  status = cameras_.synchronise ();
+  status = cameras_.start ();
   if (status.ok ())
-    status = trigger_.start (cameras_.cameras (), {format.fps_n, format.fps_d},
-        [this] (CameraStatus fault) { fail (std::move (fault)); });
+    status =
+        trigger_.start (cameras_.cameras (), cameras_.action_key (), {format.fps_n, format.fps_d});
   return status;
 }
 
@@ -212,37 +198,16 @@ CameraSession::stop_cameras ()
 {
   trigger_.stop ();
   cameras_.close ();
-  clear_inbox ();
+  clear_frames ();
 }
 
 void
-CameraSession::clear_inbox ()
+CameraSession::clear_frames ()
 {
-  std::vector<CameraEvent> late; /* destroyed without the lock: buffers return to their camera */
+  std::vector<CameraEvents::Frame> late; /* destroyed without the lock: buffers return */
   late.reserve (pads_.size () * static_cast<std::size_t> (settings_.n_buffers) + 8);
-  std::lock_guard guard (lock_);
-  late.swap (inbox_);
-}
-
-bool
-CameraSession::wait_for_other_sessions ()
-{
-  constexpr Milliseconds kInterval (50), kMax (5000);
-  bool waited = false;
-  for (Milliseconds passed (0); stopping_sessions > 0 && !stopping () && passed < kMax;
-       passed += kInterval) {
-    waited = true;
-    std::this_thread::sleep_for (kInterval);
-  }
-  return waited && !stopping ();
-}
-
-/* @return false: the session is to stop, or has failed */
-bool
-CameraSession::wait (Milliseconds time)
-{
-  std::unique_lock guard (lock_);
-  return !changed_.wait_for (guard, time, [this] { return stop_ || !fault_.ok (); });
+  std::lock_guard guard (events_.lock);
+  late.swap (events_.frames);
 }
 
 void
@@ -250,9 +215,9 @@ CameraSession::wait_before_retry ()
 {
   retry_.reset ();
   for (Milliseconds waited{0}; waited < kRetry; waited += kGapInterval) {
-    std::unique_lock guard (lock_);
-    fault_ = {};
-    if (changed_.wait_for (guard, kGapInterval, [this] { return stop_; }))
+    std::unique_lock guard (events_.lock);
+    events_.fault = {};
+    if (events_.changed.wait_for (guard, kGapInterval, [this] { return events_.stop; }))
       return;
     guard.unlock ();
     send_gaps ();
@@ -263,7 +228,7 @@ void
 CameraSession::send_gaps (GstClockTime until_ago)
 {
   {
-    std::lock_guard guard (lock_);
+    std::lock_guard guard (events_.lock);
     if (!playing_ || eos_)
       return;
   }
@@ -271,18 +236,6 @@ CameraSession::send_gaps (GstClockTime until_ago)
 }
 
 /* ---- faults ---- */
-
-/* Any thread. */
-void
-CameraSession::fail (CameraStatus fault)
-{
-  std::lock_guard guard (lock_);
-  if (!fault_.ok ())
-    return;
-  GST_DEBUG_OBJECT (element_, "%s", fault.message ().c_str ());
-  fault_ = std::move (fault);
-  changed_.notify_all ();
-}
 
 /* Posts the fault that ended streaming, once. @return whether to try again */
 bool
@@ -293,10 +246,10 @@ CameraSession::report_fault ()
   CameraStatus fault;
   GstFlowReturn flow = GST_FLOW_OK;
   {
-    std::lock_guard guard (lock_);
-    if (stop_)
+    std::lock_guard guard (events_.lock);
+    if (events_.stop)
       return false;
-    fault = fault_;
+    fault = events_.fault;
     flow = flow_;
   }
   retry_ = flow == GST_FLOW_OK && settings_.reconnect && fault.may_recover ();
@@ -316,34 +269,25 @@ CameraSession::report_fault ()
 void
 CameraSession::post_fault (const CameraStatus &fault, bool warning)
 {
+  static constexpr std::pair<CameraFault, GstResourceError> kCodes[] = {
+      {CameraFault::kNotFound, GST_RESOURCE_ERROR_NOT_FOUND},
+      {CameraFault::kBusy, GST_RESOURCE_ERROR_BUSY},
+      {CameraFault::kNoPermission, GST_RESOURCE_ERROR_NOT_AUTHORIZED},
+      {CameraFault::kTimedOut, GST_RESOURCE_ERROR_READ},
+      {CameraFault::kLost, GST_RESOURCE_ERROR_READ},
+      {CameraFault::kBadSetting, GST_RESOURCE_ERROR_SETTINGS},
+  };
   GQuark domain = GST_RESOURCE_ERROR;
   gint code = GST_RESOURCE_ERROR_FAILED;
-  switch (fault.fault ()) {
-    case CameraFault::kNotFound:
-      code = GST_RESOURCE_ERROR_NOT_FOUND;
-      break;
-    case CameraFault::kBusy:
-      code = GST_RESOURCE_ERROR_BUSY;
-      break;
-    case CameraFault::kNoPermission:
-      code = GST_RESOURCE_ERROR_NOT_AUTHORIZED;
-      break;
-    case CameraFault::kTimedOut:
-    case CameraFault::kLost:
-      code = GST_RESOURCE_ERROR_READ;
-      break;
-    case CameraFault::kBadSetting:
-      code = GST_RESOURCE_ERROR_SETTINGS;
-      break;
-    case CameraFault::kUnsupported:
-      domain = GST_STREAM_ERROR;
-      code = GST_STREAM_ERROR_FORMAT;
-      break;
-    default:
-      break;
+  for (const auto &[kind, resource_error] : kCodes)
+    if (kind == fault.fault ())
+      code = resource_error;
+  if (fault.fault () == CameraFault::kUnsupported) {
+    domain = GST_STREAM_ERROR;
+    code = GST_STREAM_ERROR_FORMAT;
   }
   const std::string text = fault.message () + (warning ? "; trying again until it comes back" : "");
-  if (!stopping ())
+  if (!events_.stopping ())
     gst_element_message_full (element_, warning ? GST_MESSAGE_WARNING : GST_MESSAGE_ERROR, domain,
         code, g_strdup (text.c_str ()), nullptr, __FILE__, GST_FUNCTION, __LINE__);
 }
@@ -351,7 +295,7 @@ CameraSession::post_fault (const CameraStatus &fault, bool warning)
 void
 CameraSession::post_element_message (const char *name, const char *field, const std::string &value)
 {
-  if (stopping ())
+  if (events_.stopping ())
     return;
   GstStructure *structure = gst_structure_new (name, field, G_TYPE_STRING, value.c_str (), nullptr);
   gst_element_post_message (element_, gst_message_new_element (GST_OBJECT (element_), structure));
@@ -363,9 +307,9 @@ void
 CameraSession::set_playing (bool playing)
 {
   {
-    std::lock_guard guard (lock_);
+    std::lock_guard guard (events_.lock);
     playing_ = playing;
-    changed_.notify_all ();
+    events_.changed.notify_all ();
   }
   trigger_.set_playing (playing);
 }
@@ -374,26 +318,25 @@ void
 CameraSession::request_stop ()
 {
   {
-    std::lock_guard guard (lock_);
-    stopping_sessions += !stop_ && !ended_;
-    stop_ = true;
-    changed_.notify_all ();
+    std::lock_guard guard (events_.lock);
+    events_.stop = true;
+    events_.changed.notify_all ();
   }
   trigger_.set_playing (false);
 }
 
 bool
-CameraSession::stopping ()
+CameraSession::wait_until_ended (Milliseconds limit)
 {
-  std::lock_guard guard (lock_);
-  return stop_;
+  std::unique_lock guard (events_.lock);
+  return events_.changed.wait_for (guard, limit, [this] { return ended_; });
 }
 
 void
 CameraSession::send_eos (guint32 seqnum)
 {
   {
-    std::lock_guard guard (lock_);
+    std::lock_guard guard (events_.lock);
     if (std::exchange (eos_, true))
       return;
   }
@@ -402,32 +345,16 @@ CameraSession::send_eos (guint32 seqnum)
 }
 
 void
-CameraSession::flush ()
-{
-  pairing_.drop_waiting ();
-  bool playing;
-  {
-    std::lock_guard guard (lock_);
-    eos_ = false;
-    flushed_ = true;
-    flow_ = GST_FLOW_OK;
-    gst_flow_combiner_reset (combiner_);
-    playing = playing_;
-  }
-  trigger_.set_playing (playing);
-}
-
-void
 CameraSession::handle_flow (const CameraPad &pad, GstFlowReturn flow)
 {
-  std::lock_guard guard (lock_);
+  std::lock_guard guard (events_.lock);
   const GstFlowReturn all = gst_flow_combiner_update_pad_flow (combiner_, pad.pad (), flow);
   GST_DEBUG_OBJECT (
       pad.pad (), "flow %s, of all pads %s", gst_flow_get_name (flow), gst_flow_get_name (all));
   if (all == GST_FLOW_OK || all == GST_FLOW_FLUSHING || flow_ != GST_FLOW_OK)
     return;
   flow_ = all;
-  changed_.notify_all ();
+  events_.changed.notify_all ();
 }
 
 GstStructure *
@@ -437,11 +364,11 @@ CameraSession::stats ()
   const PairingStatistics pairing = pairing_.stats ();
   const CameraStatistics cameras = cameras_.statistics ();
   GstStructure *s = gst_structure_new ("stereocamsrc-stats", "sets", G_TYPE_UINT64, pairing.sets,
-      "apart", G_TYPE_UINT64, pairing.apart, "unknown", G_TYPE_UINT64, pairing.unknown,
-      "missed-ticks", G_TYPE_UINT64, trigger_.missed (), "missing-packets", G_TYPE_UINT64,
-      pairing.missing_packets, "resent-packets", G_TYPE_UINT64, guint64 (cameras.resent_packets),
-      "underruns", G_TYPE_UINT64, guint64 (cameras.underruns), "reconnects", G_TYPE_UINT64,
-      reconnects_.load (), nullptr);
+      "time-mismatch", G_TYPE_UINT64, pairing.time_mismatch, "unknown", G_TYPE_UINT64,
+      pairing.unknown, "missed-ticks", G_TYPE_UINT64, trigger_.missed (), "missing-packets",
+      G_TYPE_UINT64, pairing.missing_packets, "resent-packets", G_TYPE_UINT64,
+      guint64 (cameras.resent_packets), "underruns", G_TYPE_UINT64, guint64 (cameras.underruns),
+      "reconnects", G_TYPE_UINT64, reconnects_.load (), nullptr);
   for (std::size_t i = 0; i < pads_.size (); i++) {
     const std::string name = kNames[i];
     gst_structure_set (s, ("dropped-" + name).c_str (), G_TYPE_UINT64, pairing.dropped[i],
@@ -454,4 +381,19 @@ CameraSession::stats ()
         gint64 (pairing.delay_p50_ns), "delay-p99", G_TYPE_INT64, gint64 (pairing.delay_p99_ns),
         nullptr);
   return s;
+}
+
+StatsRow
+CameraSession::stats_row ()
+{
+  const PairingStatistics pairing = pairing_.stats ();
+  guint64 lost = 0;
+  for (int i = 0; i < kMaxCameras; i++)
+    lost += pairing.dropped[i] + pairing.incomplete[i];
+  StatsRow row{.counters = {.frames = pairing.sets, .lost = lost, .late = trigger_.missed ()}};
+  if (pairing.has_spread) {
+    row.latency_p50 = pairing.delay_p50_ns;
+    row.latency_p99 = pairing.delay_p99_ns;
+  }
+  return row;
 }

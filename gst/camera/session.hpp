@@ -6,13 +6,15 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
+#include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <vector>
 
 #include "cameras.hpp"
+#include "common/backgroundjobs.hpp"
+#include "common/statsreporter.hpp"
+#include "events.hpp"
 #include "output.hpp"
 #include "pad.hpp"
 #include "pairing.hpp"
@@ -26,9 +28,9 @@
  *  The thread keeps this object and the element alive, so that no state change waits for a camera
  *  that does not answer. The thread is not a GstTask, since that must be joined.
  *
- *  Threads: this one; Aravis' and the trigger threads, which only report frames and faults; the
- *  pads' tasks, which report flows. No lock is held while anything waits for a camera, pushes or
- *  posts. */
+ *  Threads: this one; Aravis' and the trigger threads, which only report to CameraEvents; the pads'
+ *  tasks, which report flows. No lock is held while anything waits for a camera, pushes or posts.
+ */
 class CameraSession {
 public:
   struct Setup {
@@ -50,15 +52,10 @@ public:
   void set_playing (bool playing);
   /** Ends the thread soon; nothing is posted or sent any more. */
   void request_stop ();
-  /** @return false if a camera is still open after that time */
-  bool wait_until_closed (std::chrono::milliseconds limit)
-  {
-    return cameras_.wait_until_closed (limit);
-  }
+  /** @return false if the thread has not ended after that time, and may still hold a camera */
+  bool wait_until_ended (std::chrono::milliseconds limit);
   /** Ends all pads. */
   void send_eos (guint32 seqnum);
-  /** The application flushes: drops images between cameras and pads, and goes on after EOS. */
-  void flush ();
   bool capture (GstClockTime time) { return trigger_.request (time); }
   /** Pushing on a pad gives a new flow. */
   void handle_flow (const CameraPad &pad, GstFlowReturn flow);
@@ -67,12 +64,10 @@ public:
   [[nodiscard]] GstClockTime latency () const { return latency_; }
   /** Transfer full. */
   GstStructure *stats ();
+  /** For rangecast-stats; its latency is the delay of images. */
+  StatsRow stats_row ();
 
 private:
-  struct CameraEvent {
-    int camera;
-    CameraFrame frame;
-  };
   /** Why streaming ended. */
   enum class End { kStopped, kRenegotiate, kFault };
 
@@ -85,24 +80,19 @@ private:
   CameraStatus wait_for_clock ();
   CameraStatus start_cameras ();
   void stop_cameras ();
-  void clear_inbox ();
-  bool wait_for_other_sessions ();
-  bool wait (std::chrono::milliseconds time);
+  void clear_frames ();
   void wait_before_retry ();
-  void fail (CameraStatus fault);
   bool report_fault ();
   void post_fault (const CameraStatus &fault, bool warning);
   void post_element_message (const char *name, const char *field, const std::string &value);
-  [[nodiscard]] bool stopping ();
   void send_gaps (GstClockTime until_ago = 0);
 
   /* streaming.cpp: while cameras stream */
   End stream ();
   void handle_frames ();
   void begin_playing ();
-  void warn_if_not_ptp (GstClock *clock);
   void run_periodic_checks ();
-  void check_silence (std::int64_t now_ns);
+  CameraStatus check_silence (std::int64_t now_ns);
   void warn_about_losses ();
   void update_latency ();
 
@@ -111,9 +101,11 @@ private:
   const StereoCamSettings settings_;
   const CameraNames names_;
   const CameraPads pads_;
+  const std::vector<GstPad *> gst_pads_;
   GstClock *clock_;
 
   /* Each has its own rules for threads. */
+  CameraEvents events_;
   FramePairing pairing_;
   CameraTrigger trigger_;
   CameraGroup cameras_;
@@ -121,22 +113,19 @@ private:
   std::atomic<GstClockTime> latency_;
   std::atomic<guint64> reconnects_ = 0;
 
-  /* Between threads. */
-  std::mutex lock_; /* guards what follows */
-  std::condition_variable changed_;
-  bool stop_ = false, ended_ = false, playing_ = false, eos_ = false, flushed_ = false;
-  CameraStatus fault_; ///< the first since the cameras were opened: the cause of others
+  /* Between threads: guarded by the lock of events_. */
+  bool ended_ = false, playing_ = false, eos_ = false;
   GstFlowReturn flow_ = GST_FLOW_OK; ///< of all pads together, if it ends the stream
   GstFlowCombiner *combiner_ = gst_flow_combiner_new ();
-  std::vector<CameraEvent> inbox_;
 
   /* The thread's. */
   std::shared_ptr<CameraSession> previous_;
-  std::vector<CameraEvent> events_; ///< swapped with the inbox
+  std::vector<CameraEvents::Frame> frames_; ///< swapped with those of events_
+  BackgroundJobs opening_;
   std::optional<bool> retry_; ///< once the fault was reported: whether it is worth trying again
   bool clock_ready_ = false;  ///< clock-server answered
   bool lost_ = false;         ///< stereocamsrc-lost was posted, stereocamsrc-back was not
   bool warned_buffers_ = false, warned_incomplete_ = false;
   bool was_playing_ = false;
-  std::int64_t playing_since_ns_ = 0, checked_ns_ = 0, stats_posted_ns_ = 0;
+  std::int64_t playing_since_ns_ = 0, checked_ns_ = 0, latency_updated_ns_ = 0;
 };

@@ -55,7 +55,7 @@ stereo_cam_properties ()
           kMutableReady),
       P::text<&S::features> ("features", "Features",
           "GenICam features to set on all cameras after all other settings: \"Name=Value "
-          "Name=Value Command ...\"",
+          "Name='a text' Command ...\"",
           kMutableReady),
       P::text<&S::trigger_line> ("trigger-line", "Trigger line",
           "Input line of the cameras for trigger=hardware", kMutableReady),
@@ -85,12 +85,6 @@ stereo_cam_properties ()
       P::number<&S::num_buffers> ("num-buffers", "num-buffers",
           "Number of image sets to output before EOS (-1 = unlimited)", -1, G_MAXINT,
           kMutableReady),
-      P::number<&S::action_device_key> ("action-device-key", "Action device key",
-          "ActionDeviceKey of the cameras for trigger=action", 0u, G_MAXUINT, kMutableReady),
-      P::number<&S::action_group_key> ("action-group-key", "Action group key",
-          "ActionGroupKey of the cameras for trigger=action", 0u, G_MAXUINT, kMutableReady),
-      P::number<&S::action_group_mask> ("action-group-mask", "Action group mask",
-          "ActionGroupMask of the cameras for trigger=action", 0u, G_MAXUINT, kMutableReady),
       P::boolean<&S::auto_exposure> ("auto-exposure", "Automatic exposure",
           "Automatic exposure time on the left camera", kMutableReady),
       P::boolean<&S::auto_gain> (
@@ -103,13 +97,6 @@ stereo_cam_properties ()
           kMutableReady),
       P::boolean<&S::packet_resend> ("packet-resend", "Packet resend",
           "Request retransmission of missing GigE Vision packets", kMutableReady),
-      P::boolean<&S::action_send> ("action-send", "Action send",
-          "Send the action commands for trigger=action; exactly one element per rig does",
-          kMutableReady),
-      P::boolean<&S::action_scheduled> ("action-scheduled", "Action scheduled",
-          "Send action commands ahead of time with the time to execute them; requires cameras and "
-          "pipeline on one PTP clock",
-          kMutableReady),
       P::boolean<&S::single_shot> ("single-shot", "Single shot",
           "Capture only when the capture signal is emitted", kMutableReady),
       P::boolean<&S::reconnect> ("reconnect", "Reconnect",
@@ -147,8 +134,8 @@ names_from_rig (const StereoCamSettings &settings, CameraNames &found)
   found = camera_names (*view);
   for (int i = 0; i < 2; i++)
     if (found[i].empty ())
-      return {StatusCode::kNotFound, which + " does not name its " + (i ? "right" : "left") +
-                                         " camera; expected the names of a stereo pair"};
+      return {StatusCode::kNotFound,
+          which + " does not name its " + (i ? "right" : "left") + " camera"};
   return {};
 }
 
@@ -172,33 +159,28 @@ StereoCamSettings::find_names (CameraNames &found) const
       return s;
     found = {of_rig[0], of_rig[1], names[2].empty () ? of_rig[2] : names[2]};
   }
-  if (found[0].empty () != found[1].empty () && !rig.empty ())
+  if (found[0].empty () || found[1].empty ()) {
+    const std::string missing = found[0].empty () ? "left" : "right";
     return {StatusCode::kNotFound,
-        std::string ("no ") + (found[0].empty () ? "left" : "right") + " camera: property " +
-            (found[0].empty () ? "right" : "left") +
-            " names one, so rig is ignored; expected both left and right, or neither and rig"};
-  if (found[0].empty () || found[1].empty ())
-    return {StatusCode::kNotFound, std::string ("no ") + (found[0].empty () ? "left" : "right") +
-                                       " camera: expected property " +
-                                       (found[0].empty () ? "left" : "right") +
-                                       ", or rig with a file that names the cameras"};
+        "no " + missing + " camera: set property " + missing +
+            (found[0] == found[1] ? ", or rig to a file that names the cameras"
+                : rig.empty ()    ? ""
+                                  : "; rig is ignored where one of left and right is set")};
+  }
   for (int i = 0; i < kMaxCameras; i++)
     for (int j = 0; j < i; j++)
       if (found[i] == found[j])
-        return {StatusCode::kBadValue,
-            "camera " + found[i] + " is named twice; expected different cameras"};
+        return {StatusCode::kBadValue, "camera " + found[i] + " is named twice"};
   return {};
 }
 
 Status
 StereoCamSettings::check () const
 {
-  const bool by_element = trigger == TriggerMode::kSoftware || trigger == TriggerMode::kAction;
-  if (single_shot && !by_element)
-    return {StatusCode::kBadValue,
-        std::string ("single-shot with trigger=") +
-            (trigger == TriggerMode::kFreeRun ? "free-run" : "hardware") +
-            ": this element does not trigger the cameras; expected trigger=software or action"};
+  if (single_shot && !triggers_cameras ())
+    return {
+        StatusCode::kBadValue, std::string ("single-shot needs trigger=software or action, got ") +
+                                   (trigger == TriggerMode::kFreeRun ? "free-run" : "hardware")};
   return {};
 }
 
@@ -210,11 +192,9 @@ StereoCamSettings::for_camera (int camera) const
   s.x = offset_x;
   s.y = offset_y;
   s.trigger = trigger;
-  s.line.source = trigger_line;
-  s.line.master = left && !output_line.empty ();
-  if (!output_line.empty ())
-    s.line.output_line = output_line;
-  s.action = {action_device_key, action_group_key, action_group_mask, action_scheduled};
+  s.trigger_line = trigger_line;
+  if (left)
+    s.output_line = output_line;
   s.exposure_mode = mode_of (auto_exposure, lock_exposure, left, exposure_us > 0);
   s.gain_mode = mode_of (auto_gain, lock_exposure, left, gain >= 0);
   s.white_balance_mode = mode_of (auto_white_balance, lock_exposure, left, false);

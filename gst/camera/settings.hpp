@@ -3,8 +3,7 @@
 
 #include <gst/gst.h>
 
-#include "camera/aravis/frame.hpp"
-#include "camera/aravis/settings.hpp"
+#include "camera/aravis/types.hpp"
 #include <array>
 #include <rangecast/base/status.hpp>
 #include <rangecast/geometry/rig.hpp>
@@ -37,8 +36,6 @@ struct StereoCamSettings {
   gint64 packet_delay_ns = -1;
   bool packet_resend = true;
   std::string trigger_line = "Line1", output_line; ///< output line empty: external signal
-  guint action_device_key = 0x52414e47, action_group_key = 1, action_group_mask = 1;
-  bool action_send = true, action_scheduled = false; ///< send: by this element
   bool single_shot = false, reconnect = false;
   int num_buffers = -1;
   std::string clock_server;
@@ -53,7 +50,7 @@ struct StereoCamSettings {
   /** Whether this element triggers the cameras. */
   [[nodiscard]] bool triggers_cameras () const
   {
-    return trigger == TriggerMode::kSoftware || (trigger == TriggerMode::kAction && action_send);
+    return trigger == TriggerMode::kSoftware || trigger == TriggerMode::kAction;
   }
   /** Whether the left camera's automatic settings are copied to the others. */
   [[nodiscard]] bool follows_left () const

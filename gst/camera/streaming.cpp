@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::int64_t kCheckInterval_ns = kSecond_ns / 10;
-constexpr std::int64_t kStatsInterval_ns = 5 * kSecond_ns;
+constexpr std::int64_t kLatencyInterval_ns = 5 * kSecond_ns;
 constexpr std::int64_t kSilence_ns = kSecond_ns;        /* of all cameras, before GAPs are sent */
 constexpr std::int64_t kMaxSilence_ns = 3 * kSecond_ns; /* of a camera that should send */
 constexpr int kMaxSilentPeriods = 3;                    /* ... if that is longer */
@@ -27,16 +27,16 @@ CameraSession::stream ()
   for (;;) {
     bool playing = false;
     {
-      std::unique_lock guard (lock_);
-      changed_.wait_for (guard, std::chrono::nanoseconds (kCheckInterval_ns),
-          [this] { return stop_ || !inbox_.empty () || !fault_.ok () || flow_ != GST_FLOW_OK; });
-      if (stop_)
+      std::unique_lock guard (events_.lock);
+      events_.changed.wait_for (guard, std::chrono::nanoseconds (kCheckInterval_ns), [this] {
+        return events_.stop || !events_.frames.empty () || !events_.fault.ok () ||
+               flow_ != GST_FLOW_OK;
+      });
+      if (events_.stop)
         return End::kStopped;
-      if (!fault_.ok () || flow_ != GST_FLOW_OK)
+      if (!events_.fault.ok () || flow_ != GST_FLOW_OK)
         return End::kFault;
-      events_.swap (inbox_);
-      if (std::exchange (flushed_, false))
-        output_.reset_time ();
+      frames_.swap (events_.frames);
       playing = playing_ && !eos_;
     }
     if (playing && !was_playing_)
@@ -64,29 +64,7 @@ CameraSession::begin_playing ()
          "will not be captured simultaneously",
             settings_.clock_server.c_str ()),
         ("it uses %s", GST_OBJECT_NAME (clock)));
-  if (clock && settings_.action_scheduled && settings_.trigger == TriggerMode::kAction)
-    warn_if_not_ptp (clock);
   gst_clear_object (&clock);
-}
-
-/* Scheduled action commands name times of the pipeline clock, which cameras take for times of
- * theirs. */
-void
-CameraSession::warn_if_not_ptp (GstClock *clock)
-{
-  Camera &left = *cameras_.cameras ()[0];
-  std::uint64_t camera_ns = 0;
-  std::int64_t read_at_us = 0;
-  if (!left.read_clock (camera_ns, read_at_us).ok ())
-    return;
-  const auto pipeline_ns = static_cast<std::int64_t> (gst_clock_get_time (clock));
-  const std::int64_t off_s = (pipeline_ns - static_cast<std::int64_t> (camera_ns)) / kSecond_ns;
-  if (off_s != 0)
-    GST_ELEMENT_WARNING (element_, CORE, CLOCK,
-        ("The pipeline's clock and that of %s differ by %d s: scheduled action commands need one "
-         "PTP clock for both (clock-server=ptp:DOMAIN)",
-            left.label ().c_str (), int (off_s)),
-        (nullptr));
 }
 
 /* In PAUSED a live source has no data, but late frames still tell the cameras' delays and clocks.
@@ -94,7 +72,7 @@ CameraSession::warn_if_not_ptp (GstClock *clock)
 void
 CameraSession::handle_frames ()
 {
-  for (CameraEvent &event : events_) {
+  for (CameraEvents::Frame &event : frames_) {
     pairing_.add_frame (event.camera, std::move (event.frame));
     ImageSet set;
     while (pairing_.next_set (set)) {
@@ -105,7 +83,7 @@ CameraSession::handle_frames ()
       set = {};
     }
   }
-  events_.clear ();
+  frames_.clear ();
 }
 
 /* ---- ten times a second ---- */
@@ -113,21 +91,20 @@ CameraSession::handle_frames ()
 void
 CameraSession::run_periodic_checks ()
 {
-  if (CameraStatus status = cameras_.check_heartbeats (checked_ns_); !status.ok ())
-    fail (std::move (status));
-  check_silence (checked_ns_);
   warn_about_losses ();
-  if (CameraStatus status = cameras_.update_clocks (checked_ns_); !status.ok ())
-    fail (std::move (status));
-  if (was_playing_ && checked_ns_ - stats_posted_ns_ > kStatsInterval_ns) {
-    stats_posted_ns_ = checked_ns_;
+  CameraStatus status = check_silence (checked_ns_);
+  if (status.ok ())
+    status = cameras_.synchronise (checked_ns_);
+  if (!status.ok ())
+    events_.fail (std::move (status));
+  if (was_playing_ && checked_ns_ - latency_updated_ns_ > kLatencyInterval_ns) {
+    latency_updated_ns_ = checked_ns_;
     update_latency ();
-    gst_element_post_message (element_, gst_message_new_element (GST_OBJECT (element_), stats ()));
   }
 }
 
-/* Cameras that should send images, and answer, but send none. */
-void
+/* Cameras that should send images, but send none. */
+CameraStatus
 CameraSession::check_silence (std::int64_t now_ns)
 {
   const bool ticks = settings_.triggers_cameras () && !settings_.single_shot;
@@ -135,23 +112,23 @@ CameraSession::check_silence (std::int64_t now_ns)
       ticks || settings_.trigger == TriggerMode::kFreeRun ||
       (settings_.trigger == TriggerMode::kHardware && !settings_.output_line.empty ());
   if (!should_send || !was_playing_)
-    return;
+    return {};
   const auto period_ns =
       static_cast<std::int64_t> (cameras_.format ().period () + cameras_.exposure ());
   const std::int64_t max_ns = std::max (kMaxSilence_ns, kMaxSilentPeriods * period_ns);
   if (output_.last_sent_ns () > 0 &&
       now_ns - output_.last_sent_ns () > std::max (kSilence_ns, max_ns / 2))
     send_gaps (latency_); /* up to `latency_` ago: later images may be in transfer */
+  if (trigger_.busy ())   /* a camera that does not answer a trigger is reported by it */
+    return {};
   if (ticks && now_ns - std::max (trigger_.last_trigger_ns (), playing_since_ns_) > max_ns)
-    fail ({CameraFault::kTimedOut,
+    return {CameraFault::kTimedOut,
         "the pipeline clock has stopped: no tick for " + std::to_string (max_ns / kSecond_ns) +
             " s" +
             (settings_.clock_server.empty ()
                     ? ""
-                    : "; is clock-server " + settings_.clock_server + " still the same server?")});
-  if (CameraStatus status = cameras_.check_frames (now_ns, playing_since_ns_, max_ns);
-      !status.ok ())
-    fail (std::move (status));
+                    : "; is clock-server " + settings_.clock_server + " still the same server?")};
+  return cameras_.check_frames (now_ns, playing_since_ns_, max_ns);
 }
 
 void

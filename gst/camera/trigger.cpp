@@ -12,13 +12,10 @@ namespace {
 /* A requested trigger keeps its time if it is not later than this: the host is busy. */
 constexpr GstClockTime kMaxLateness = 20 * GST_MSECOND;
 
-/* Scheduled action commands are sent this long before their tick. */
-constexpr GstClockTime kActionLead = 20 * GST_MSECOND;
-
 } // namespace
 
 CameraStatus
-CameraTrigger::start (Cameras cameras, rangecast::TickRate rate, Failed failed)
+CameraTrigger::start (Cameras cameras, std::uint32_t action_key, rangecast::TickRate rate)
 {
   stop ();
   if (!settings_.triggers_cameras ())
@@ -29,10 +26,11 @@ CameraTrigger::start (Cameras cameras, rangecast::TickRate rate, Failed failed)
       interfaces.push_back (camera->interface_address ());
     if (CameraStatus status = action_.open (interfaces); !status.ok ())
       return status;
-    lead_ = settings_.action_scheduled ? kActionLead : 0;
   }
+  if (settings_.trigger == TriggerMode::kSoftware && !start_callers (cameras.size ()))
+    return {CameraFault::kFailed, "cannot start the threads that trigger the cameras"};
   cameras_ = std::move (cameras);
-  failed_ = std::move (failed);
+  action_key_ = action_key;
   rate_ = rate;
   last_tick_ = -1;
   last_requested_ = 0;
@@ -40,8 +38,13 @@ CameraTrigger::start (Cameras cameras, rangecast::TickRate rate, Failed failed)
   std::lock_guard guard (lock_);
   running_ = paused_since_tick_ = true;
   requests_.clear ();
-  thread_ = std::thread ([this] { run (); });
-  return {};
+  const auto body = [] (gpointer self) -> gpointer {
+    static_cast<CameraTrigger *> (self)->run ();
+    return nullptr;
+  };
+  thread_ = g_thread_try_new ("camera-trigger", body, this, nullptr);
+  return thread_ ? CameraStatus ()
+                 : CameraStatus (CameraFault::kFailed, "cannot start the trigger thread");
 }
 
 void
@@ -53,8 +56,10 @@ CameraTrigger::stop ()
     changed_.notify_all ();
     clock_wait_.interrupt ();
   }
-  if (thread_.joinable ())
-    thread_.join ();
+  if (thread_)
+    g_thread_join (std::exchange (thread_, nullptr));
+  if (pool_)
+    g_thread_pool_free (std::exchange (pool_, nullptr), FALSE, TRUE);
   clock_wait_.reset ();
   action_.close ();
   cameras_.clear ();
@@ -85,32 +90,32 @@ CameraTrigger::request (GstClockTime time)
 
 /* ---- the thread ---- */
 
+bool
+CameraTrigger::start_callers (std::size_t count)
+{
+  const auto call = [] (gpointer camera, gpointer self) {
+    /* For this call only: GLib gives threads of a pool to other pools afterwards. */
+    const ScopedRealtimePriority priority;
+    auto trigger = static_cast<CameraTrigger *> (self);
+    auto called = static_cast<Camera *> (camera);
+    CameraStatus status = called->loss_or_fault (called->trigger_software ());
+    if (!status.ok ())
+      trigger->events_.fail (std::move (status));
+    std::lock_guard guard (trigger->lock_);
+    trigger->calls_pending_--;
+    trigger->changed_.notify_all ();
+  };
+  GError *error = nullptr;
+  pool_ = g_thread_pool_new (call, this, static_cast<gint> (count), TRUE, &error);
+  const bool started = !error;
+  g_clear_error (&error);
+  return started;
+}
+
 void
 CameraTrigger::run ()
 {
-  if (settings_.trigger == TriggerMode::kSoftware) {
-    const auto call = [] (gpointer camera, gpointer self) {
-      /* For this call only: GLib gives threads of a pool to other pools afterwards. */
-      const ScopedRealtimePriority priority;
-      auto trigger = static_cast<CameraTrigger *> (self);
-      const CameraStatus status = static_cast<Camera *> (camera)->trigger_software ();
-      if (!status.ok ())
-        trigger->failed_ (loss_or_fault (*static_cast<Camera *> (camera), status));
-      std::lock_guard guard (trigger->lock_);
-      trigger->calls_pending_--;
-      trigger->changed_.notify_all ();
-    };
-    GError *error = nullptr;
-    pool_ = g_thread_pool_new (call, this, static_cast<gint> (cameras_.size ()), TRUE, &error);
-    if (error) {
-      failed_ (
-          {CameraFault::kFailed, std::string ("cannot start trigger threads: ") + error->message});
-      g_clear_error (&error);
-      std::lock_guard guard (lock_);
-      running_ = false;
-    }
-  }
-  const ScopedRealtimePriority priority; /* not before: threads of the pool would inherit it */
+  const ScopedRealtimePriority priority;
   std::unique_lock guard (lock_);
   while (running_) {
     if (!playing_ || (on_request_ && requests_.empty ())) {
@@ -121,7 +126,7 @@ CameraTrigger::run ()
     const GstClockTime base = gst_element_get_base_time (element_);
     GstClockTime now = gst_clock_get_time (clock);
     const GstClockTime time = on_request_ ? next_request (now) : next_tick (now, base);
-    const bool due = clock_wait_.wait_until (guard, clock, time - MIN (time, lead_));
+    const bool due = clock_wait_.wait_until (guard, clock, time);
     now = gst_clock_get_time (clock);
     gst_object_unref (clock);
     if (!due)
@@ -133,9 +138,6 @@ CameraTrigger::run ()
       handle_tick (time, now);
     guard.lock ();
   }
-  guard.unlock ();
-  if (pool_)
-    g_thread_pool_free (std::exchange (pool_, nullptr), FALSE, TRUE);
 }
 
 /* With the lock. */
@@ -144,7 +146,7 @@ CameraTrigger::next_request (GstClockTime now)
 {
   for (GstClockTime &time : requests_)
     if (!GST_CLOCK_TIME_IS_VALID (time))
-      time = now + lead_;
+      time = now;
   return *std::ranges::min_element (requests_);
 }
 
@@ -152,7 +154,7 @@ CameraTrigger::next_request (GstClockTime now)
 GstClockTime
 CameraTrigger::next_tick (GstClockTime now, GstClockTime base) const
 {
-  std::int64_t tick = rate_.at_or_after (static_cast<std::int64_t> (MAX (now + lead_, base)));
+  std::int64_t tick = rate_.at_or_after (static_cast<std::int64_t> (MAX (now, base)));
   if (tick <= last_tick_ && !paused_since_tick_)
     tick = last_tick_ + 1;
   return static_cast<GstClockTime> (rate_.time_of (tick));
@@ -171,8 +173,7 @@ CameraTrigger::handle_request (GstClockTime time, GstClockTime now)
     if (const auto it = std::ranges::find (requests_, time); it != requests_.end ())
       requests_.erase (it);
   }
-  const bool in_time = now + lead_ <= time + kMaxLateness + lead_ / 2;
-  last_requested_ = MAX (in_time ? time : now + lead_, last_requested_ + 1);
+  last_requested_ = MAX (now <= time + kMaxLateness ? time : now, last_requested_ + 1);
   trigger (last_requested_);
 }
 
@@ -203,29 +204,23 @@ CameraTrigger::trigger (GstClockTime time)
   const std::int64_t now_ns = monotonic_ns ();
   last_trigger_ns_ = now_ns;
   /* before it is sent: a camera may answer before another one acknowledges */
-  pairing_.add_trigger (time, now_ns + static_cast<std::int64_t> (lead_));
+  pairing_.add_trigger (time, now_ns);
   GST_LOG_OBJECT (element_, "trigger for %" GST_TIME_FORMAT, GST_TIME_ARGS (time));
-  if (settings_.trigger == TriggerMode::kSoftware) {
+  if (settings_.trigger == TriggerMode::kSoftware)
     trigger_software ();
-    return;
-  }
-  ActionCommand command;
-  command.device_key = settings_.action_device_key;
-  command.group_key = settings_.action_group_key;
-  command.group_mask = settings_.action_group_mask;
-  if (settings_.action_scheduled)
-    command.time_ns = time;
-  if (CameraStatus status = action_.send (command); !status.ok ())
-    failed_ (std::move (status));
+  else if (CameraStatus status = action_.send (action_key_); !status.ok ())
+    events_.fail (std::move (status));
 }
 
 /* All cameras at the same moment; returns when all have acknowledged. */
 void
 CameraTrigger::trigger_software ()
 {
+  busy_ = true;
   std::unique_lock guard (lock_);
   calls_pending_ = cameras_.size ();
   for (const auto &camera : cameras_)
     g_thread_pool_push (pool_, camera.get (), nullptr);
   changed_.wait (guard, [this] { return calls_pending_ == 0; });
+  busy_ = false;
 }

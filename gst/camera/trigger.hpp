@@ -7,13 +7,12 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
-#include <functional>
 #include <mutex>
 #include <rangecast/sync/ticks.hpp>
-#include <thread>
 
 #include "cameras.hpp"
 #include "common/clockwait.hpp"
+#include "events.hpp"
 #include "pairing.hpp"
 #include "settings.hpp"
 
@@ -25,12 +24,10 @@
  *  threads from a pool of the process. */
 class CameraTrigger {
 public:
-  /** Called from trigger threads. */
-  using Failed = std::function<void (CameraStatus)>;
-
-  /** @param settings, pairing  outlive this */
-  CameraTrigger (GstElement *element, const StereoCamSettings &settings, FramePairing &pairing)
-      : element_ (element), settings_ (settings), pairing_ (pairing)
+  /** @param settings, pairing, events  outlive this */
+  CameraTrigger (GstElement *element, const StereoCamSettings &settings, FramePairing &pairing,
+      CameraEvents &events)
+      : element_ (element), settings_ (settings), pairing_ (pairing), events_ (events)
   {
   }
   ~CameraTrigger () { stop (); }
@@ -38,8 +35,9 @@ public:
   CameraTrigger &operator= (const CameraTrigger &) = delete;
 
   /** @param rate  not valid: only requested triggers
-   *  @return kFailed: no socket for action commands */
-  CameraStatus start (Cameras cameras, rangecast::TickRate rate, Failed failed);
+   *  @param action_key  ActionDeviceKey of the cameras
+   *  @return kFailed: no socket for action commands, no thread */
+  CameraStatus start (Cameras cameras, std::uint32_t action_key, rangecast::TickRate rate);
   /** Returns when no trigger is in progress. */
   void stop ();
 
@@ -51,12 +49,15 @@ public:
   bool request (GstClockTime time);
   /** Time of the last trigger by g_get_monotonic_time, ns; 0: none yet. */
   [[nodiscard]] std::int64_t last_trigger_ns () const { return last_trigger_ns_; }
+  /** Whether a trigger is in progress. */
+  [[nodiscard]] bool busy () const { return busy_; }
   /** Ticks without a trigger while the element played, since the first one. */
   [[nodiscard]] guint64 missed () const { return missed_; }
 
 private:
   static constexpr std::size_t kMaxRequests = 64;
 
+  bool start_callers (std::size_t count);
   void run ();
   GstClockTime next_request (GstClockTime now);
   [[nodiscard]] GstClockTime next_tick (GstClockTime now, GstClockTime base) const;
@@ -68,16 +69,17 @@ private:
   GstElement *element_;
   const StereoCamSettings &settings_;
   FramePairing &pairing_;
+  CameraEvents &events_;
   std::atomic<guint64> missed_ = 0;
   std::atomic<std::int64_t> last_trigger_ns_ = 0;
+  std::atomic<bool> busy_ = false;
 
   /* Constant while the thread runs. */
   bool on_request_ = false; ///< single shots
   Cameras cameras_;
-  Failed failed_;
   rangecast::TickRate rate_;
-  GstClockTime lead_ = 0; ///< how long before their time action commands are sent
   ActionSender action_;
+  std::uint32_t action_key_ = 0;
 
   /* The thread's. */
   std::int64_t last_tick_ = -1;
@@ -90,5 +92,5 @@ private:
   bool running_ = false, playing_ = false, paused_since_tick_ = true;
   std::deque<GstClockTime> requests_;
   std::size_t calls_pending_ = 0;
-  std::thread thread_;
+  GThread *thread_ = nullptr;
 };

@@ -6,6 +6,7 @@
 #include <gstrange/gstrange.h>
 
 using rangecast::EncoderSettings;
+using rangecast::PacketReport;
 using rangecast::Profile;
 
 namespace {
@@ -26,6 +27,31 @@ usual_bits_per_point (Profile profile, int colour_threshold)
   }
 }
 
+guint64
+now_ns ()
+{
+  return guint64 (g_get_monotonic_time ()) * 1000;
+}
+
+/* One RTPTWCCPacket of rtpsession. @return false if a field that is needed is missing */
+bool
+read_packet (const GstStructure *structure, PacketReport &packet)
+{
+  guint sequence = 0, size = 0;
+  guint64 sent = GST_CLOCK_TIME_NONE, arrival = GST_CLOCK_TIME_NONE;
+  gboolean lost = FALSE;
+  if (!gst_structure_get (structure, "seqnum", G_TYPE_UINT, &sequence, "local-ts", G_TYPE_UINT64,
+          &sent, "lost", G_TYPE_BOOLEAN, &lost, nullptr) ||
+      !GST_CLOCK_TIME_IS_VALID (sent))
+    return false;
+  gst_structure_get (structure, "size", G_TYPE_UINT, &size, nullptr);
+  gst_structure_get (structure, "remote-ts", G_TYPE_UINT64, &arrival, nullptr);
+  if (!lost && !GST_CLOCK_TIME_IS_VALID (arrival))
+    return false;
+  packet = {guint16 (sequence), sent, lost ? 0 : arrival, size, lost != FALSE};
+  return true;
+}
+
 } // namespace
 
 void
@@ -34,12 +60,11 @@ NeighbourCodeRate::reset ()
   control_.reset ();
   meter_.reset ();
   thinning_.reset ();
-  receivers.reset ();
   is_on_ = false;
   time_ = interval_ = 0;
-  reported_bits_per_s_ = -1;
-  reported_one_of_ = 1;
-  below_limits_ = GST_CLOCK_TIME_NONE;
+  std::lock_guard guard (lock_);
+  network_.reset ();
+  reports_ = 0;
 }
 
 bool
@@ -55,8 +80,13 @@ NeighbourCodeRate::begin (
     thinning_.reset ();
     return true;
   }
-  const double bits_per_s = receivers.update (
-      {double (rate.min_bitrate), double (rate.target_bitrate)}, meter_.bits_per_s (interval));
+  double bits_per_s = 0; /* 0: no limit is known */
+  {
+    std::lock_guard guard (lock_);
+    network_.configure ({double (rate.min_bitrate), double (rate.target_bitrate)});
+    network_.tick (meter_.bits_per_s (interval), now_ns ());
+    bits_per_s = network_.bits_per_s ();
+  }
   rate_.target_bitrate = guint (std::min (bits_per_s, double (G_MAXUINT)));
   return thinning_.keep ({time_, interval, bits_per_s, is_on_ ? control_.min_bits () : 0,
       double (rate.min_fps_n) / rate.min_fps_d});
@@ -69,7 +99,6 @@ NeighbourCodeRate::settings_for (const EncoderSettings &configured, guint64 pixe
     if (is_on_)
       control_.reset ();
     is_on_ = false;
-    below_limits_ = GST_CLOCK_TIME_NONE;
     return configured;
   }
   is_on_ = true;
@@ -80,10 +109,6 @@ NeighbourCodeRate::settings_for (const EncoderSettings &configured, guint64 pixe
           double (interval_) / GST_SECOND});
   EncoderSettings settings = configured;
   const rangecast::Thresholds thresholds = control_.next (time_, pixels);
-  const bool is_new = !GST_CLOCK_TIME_IS_VALID (below_limits_) || time_ < below_limits_;
-  if (is_new || thresholds.depth < rate_.max_depth_threshold ||
-      thresholds.colour < rate_.max_colour_threshold)
-    below_limits_ = time_;
   settings.depth_threshold = thresholds.depth;
   settings.colour_threshold = thresholds.colour;
   return settings;
@@ -97,28 +122,46 @@ NeighbourCodeRate::record (const rangecast::CodedFrame &frame)
     control_.coded (frame);
 }
 
-bool
-NeighbourCodeRate::misses_target () const
+void
+NeighbourCodeRate::handle_packets (const GstStructure *structure)
 {
-  constexpr double kTolerance = 1.25;
-  return is_on_ && !rate_.adaptive && time_ >= below_limits_ + 2 * GST_SECOND &&
-         bits_per_s () > kTolerance * rate_.target_bitrate;
+  const GType array_type = g_type_from_name ("GValueArray");
+  const GValue *packets = gst_structure_get_value (structure, "packets");
+  if (!packets || array_type == 0 || !G_VALUE_HOLDS (packets, array_type))
+    return;
+  G_GNUC_BEGIN_IGNORE_DEPRECATIONS /* what rtpsession sends */
+      const auto array = static_cast<const GValueArray *> (g_value_get_boxed (packets));
+  std::lock_guard guard (lock_);
+  packets_.clear ();
+  for (guint i = 0; array && i < array->n_values; i++) {
+    const GValue *value = &array->values[i];
+    PacketReport packet;
+    if (GST_VALUE_HOLDS_STRUCTURE (value) && read_packet (gst_value_get_structure (value), packet))
+      packets_.push_back (packet);
+  }
+  G_GNUC_END_IGNORE_DEPRECATIONS
+  reports_++;
+  network_.packets (packets_, now_ns ());
 }
 
-GstMessage *
-NeighbourCodeRate::make_message (GstObject *source)
+bool
+NeighbourCodeRate::handle_event (GstEvent *event)
 {
-  constexpr double kMinChange = 0.1;
-  const double now = rate_.adaptive ? receivers.bits_per_s () : 0;
-  if (reported_bits_per_s_ < 0)
-    reported_bits_per_s_ = now;
-  if (std::abs (now - reported_bits_per_s_) <= kMinChange * reported_bits_per_s_ &&
-      thinning_.one_of () == reported_one_of_)
-    return nullptr;
-  reported_bits_per_s_ = now;
-  reported_one_of_ = thinning_.one_of ();
-  GstStructure *structure = gst_structure_new (
-      "neighbourcodeenc-adaptive-bitrate", "one-of", G_TYPE_INT, reported_one_of_, nullptr);
-  receivers.add_stats (structure);
-  return gst_message_new_element (source, structure);
+  if (GST_EVENT_TYPE (event) != GST_EVENT_CUSTOM_UPSTREAM)
+    return false;
+  const GstStructure *structure = gst_event_get_structure (event);
+  if (!structure || !gst_structure_has_name (structure, "RTPTWCCPackets"))
+    return false;
+  handle_packets (structure);
+  return true;
+}
+
+void
+NeighbourCodeRate::add_stats (GstStructure *structure) const
+{
+  std::lock_guard guard (lock_);
+  gst_structure_set (structure, "estimated-bitrate", G_TYPE_UINT64,
+      guint64 (network_.bits_per_s () + 0.5), "receiver-reports", G_TYPE_UINT64, reports_,
+      "receiver-loss", G_TYPE_DOUBLE, network_.lost (), "receiver-queue", G_TYPE_UINT64,
+      guint64 (std::max (network_.queue_s (), 0.0) * 1e9), nullptr);
 }

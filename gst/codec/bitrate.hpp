@@ -3,11 +3,12 @@
 
 #include <gst/gst.h>
 
+#include <mutex>
 #include <rangecast/neighbourcode/encoder.hpp>
+#include <rangecast/neighbourcode/rate/congestion_control.hpp>
 #include <rangecast/neighbourcode/rate/frame_thinning.hpp>
 #include <rangecast/neighbourcode/rate/rate_control.hpp>
-
-#include "adaptiverate.hpp"
+#include <vector>
 
 /** Settings of neighbourcodeenc's bit rate. Any thread, under the element's lock. */
 struct NeighbourCodeRateSettings {
@@ -18,8 +19,9 @@ struct NeighbourCodeRateSettings {
   int min_fps_n = 5, min_fps_d = 1; ///< frame sets/s; if adaptive
 };
 
-/** Rate control: chooses the thresholds of each frame set and leaves frame sets out where that is
- *  not enough. Streaming thread only, except `receivers`. */
+/** Rate control: chooses the thresholds of each frame set and drops frame sets where that is not
+ *  enough. The rate that the network allows follows from transport-wide feedback: RTPTWCCPackets,
+ *  an upstream event of rtpsession. Streaming thread, but handle_event() and add_stats(): any. */
 class NeighbourCodeRate {
 public:
   void reset ();
@@ -27,7 +29,7 @@ public:
   /** Begins a frame set.
    *  @param input  its time is the capture time, or else the PTS
    *  @param interval  frame period, ns; used for frame sets without a time
-   *  @return false if the frame set is to be left out; settings_for() and record() are not called
+   *  @return false if the frame set is to be dropped; settings_for() and record() are not called
    *  for it then */
   bool begin (const NeighbourCodeRateSettings &rate, GstBuffer *input, GstClockTime interval);
 
@@ -40,25 +42,24 @@ public:
 
   /** Bits/s over the last 2 s. */
   [[nodiscard]] double bits_per_s () const { return meter_.bits_per_s (interval_); }
-  /** @return the element message neighbourcodeenc-adaptive-bitrate, for the caller to post, if the
-   *  estimated bit rate has changed by more than a tenth, or the frame rate, since the last one;
-   *  else nullptr */
-  GstMessage *make_message (GstObject *source);
-  /** Whether the thresholds have been at their upper limits for 2 s and the bit rate is yet a
-   *  quarter above a constant target. */
-  [[nodiscard]] bool misses_target () const;
 
-  AdaptiveRate receivers; ///< any thread
+  /** Handles feedback, whatever it holds. @return false if it is another event */
+  bool handle_event (GstEvent *event);
+  /** Adds estimated-bitrate, receiver-reports, receiver-loss and receiver-queue. */
+  void add_stats (GstStructure *structure) const;
 
 private:
+  void handle_packets (const GstStructure *structure);
+
   NeighbourCodeRateSettings rate_; /* of the current frame set, with its target */
   rangecast::RateControl control_;
   rangecast::RateMeter meter_;
   rangecast::FrameThinning thinning_;
   bool is_on_ = false;                   /* there is a target */
   GstClockTime time_ = 0, interval_ = 0; /* of the current frame set */
-  double reported_bits_per_s_ = -1;      /* by the last message */
-  int reported_one_of_ = 1;              /* one of so many frame sets is coded */
-  /* Time of the latest frame set with a threshold below its limit. */
-  GstClockTime below_limits_ = GST_CLOCK_TIME_NONE;
+
+  mutable std::mutex lock_; /* guards what follows */
+  rangecast::CongestionControl network_;
+  guint64 reports_ = 0;
+  std::vector<rangecast::PacketReport> packets_; /* of the current event; kept for its memory */
 };

@@ -13,29 +13,21 @@ class Concealment {
 public:
   ~Concealment () { reset (); }
 
-  void reset ();
-  /** Keeps the last frame set if the views of the new rig have the same size and depth unit. */
-  void set_rig (const rangecast::Rig &before, const rangecast::Rig &now);
+  void reset () { gst_clear_buffer (&last_); }
 
   /** Begins a frame set with the times and flags of `input`. @return the frame set to take pixels
    *  from, or nullptr */
   GstBuffer *begin (GstBuffer *input);
-  /** Adds the views of a frame set to `buffer`: those that the decoder has planned (where most of
-   *  the ROI is missing with the ROI of the older image included), then those of `older` that did
-   *  not come at all. */
+  /** Adds the views of a frame set to `buffer`: those that the decoder has planned, then those of
+   *  `older` that did not come. */
   rangecast::Status add_views (const rangecast::AccessUnitDecoder &decoder,
       std::span<const rangecast::RangeImage> older, GstBuffer *buffer);
-  /** Fills what add_views() added from `older`, and decodes into it. */
-  static rangecast::Status decode (rangecast::AccessUnitDecoder &decoder,
-      std::span<const rangecast::RangeImage> images, std::span<const rangecast::RangeImage> older,
-      int threads, rangecast::DecoderResult &result);
   /** The output of this frame set. */
-  void keep (GstBuffer *output);
+  void keep (GstBuffer *output) { gst_buffer_replace (&last_, output); }
 
 private:
+  /* A reference makes the buffer unwritable: downstream copies it before it writes. */
   GstBuffer *last_ = nullptr;
-  bool skips_ = false;                      /* the current frame set: its time jumps */
-  GstClockTime now_ = GST_CLOCK_TIME_NONE;  /* of the current frame set */
-  GstClockTime jump_ = GST_CLOCK_TIME_NONE; /* of the one before, if its time jumped */
+  GstClockTime now_ = GST_CLOCK_TIME_NONE;                     /* of the current frame set */
   std::array<GstClockTime, rangecast::kMaxViews> last_seen_{}; /* by view-id */
 };

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "encsettings.hpp"
 
-using rangecast::DepthScale;
 using rangecast::NeighbourChoice;
 using rangecast::Profile;
 
@@ -33,19 +32,6 @@ gst_neighbour_code_choice_get_type (void)
   return type;
 }
 
-static GType
-gst_neighbour_code_depth_scale_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {{int (DepthScale::kLinear), "Linear in depth", "linear"},
-        {int (DepthScale::kInverse), "Linear in 1/depth, as the errors of stereo cameras",
-            "inverse"},
-        {}};
-    return g_enum_register_static ("GstNeighbourCodeDepthScale", values);
-  }();
-  return type;
-}
-
 /* Profile, bits and references are not controllable: a change of them rebuilds tables, which a
  * controller might cause with every frame set. */
 PropertyTable<NeighbourCodeEncSettings> &
@@ -66,8 +52,6 @@ encoder_properties ()
       P::number<&S::coding, &Coding::depth_bits> ("depth-bits", "Depth bits",
           "Bits of a quantised depth between the view's near and far limits", 6, 16,
           kMutablePlaying),
-      P::enumeration<&S::coding, &Coding::depth_scale> ("depth-scale", "Depth scale",
-          "Quantisation of depth", gst_neighbour_code_depth_scale_get_type (), kMutablePlaying),
       P::number<&S::coding, &Coding::colour_bits> (
           "colour-bits", "Colour bits", "Bits of each colour channel", 4, 8, kMutablePlaying),
       P::number<&S::coding, &Coding::depth_threshold> ("depth-threshold", "Depth threshold",
@@ -84,26 +68,20 @@ encoder_properties ()
       P::boolean<&S::coding, &Coding::temporal> ("temporal", "Temporal",
           "Predict pixels from the previous frame set (false = frame sets decode independently)",
           kMutablePlaying),
-      P::custom (
-          g_param_spec_uint ("refresh-period", "Refresh period",
-              "Period in milliseconds within which every pixel is coded without temporal "
-              "prediction (0 = only in key frame sets)",
-              0, kMaxPeriod_ms, guint (Coding{}.refresh_period_ns / GST_MSECOND), kControllable),
+      P::Row{g_param_spec_uint ("refresh-period", "Refresh period",
+                 "Period in milliseconds within which every pixel is coded without temporal "
+                 "prediction (0 = only in key frame sets)",
+                 0, kMaxPeriod_ms, guint (Coding{}.refresh_period_ns / GST_MSECOND), kControllable),
           [] (S &s, const GValue *value) {
             s.coding.refresh_period_ns = g_value_get_uint (value) * GST_MSECOND;
           },
           [] (const S &s, GValue *value) {
             g_value_set_uint (value, guint (s.coding.refresh_period_ns / GST_MSECOND));
-          }),
+          }},
       P::number<&S::key_interval_ms> ("key-interval", "Key interval",
           "Maximum interval between key frame sets in milliseconds with temporal=true (0 = only "
           "the first frame set and on request)",
           0, kMaxPeriod_ms, kControllable),
-      P::number<&S::min_forced_key_interval> ("min-force-key-unit-interval",
-          "Minimum interval of forced key units",
-          "Minimum interval between key frame sets on request (GstForceKeyUnit) in nanoseconds "
-          "with temporal=true (0 or G_MAXUINT64 = no minimum)",
-          0, G_MAXUINT64, kControllable),
       P::number<&S::n_threads> ("n-threads", "Threads",
           "Number of threads that encode tiles; the output does not depend on it (0 = one per CPU "
           "core)",
@@ -130,7 +108,7 @@ encoder_properties ()
           "Lower limit of the bit rate with adaptive-bitrate, in bits per second (at most "
           "target-bitrate)",
           1000, G_MAXUINT, kControllable),
-      P::custom (
+      P::Row{
           gst_param_spec_fraction ("min-framerate", "Minimum frame rate",
               "Minimum number of frame sets per second to keep when adaptive-bitrate drops frame "
               "sets",
@@ -141,7 +119,7 @@ encoder_properties ()
           },
           [] (const S &s, GValue *value) {
             gst_value_set_fraction (value, s.rate.min_fps_n, s.rate.min_fps_d);
-          }),
+          }},
   };
   return table;
 }

@@ -10,9 +10,8 @@
 struct NeighbourCodeEncSettings {
   rangecast::EncoderSettings coding; ///< frame_interval_ns is set for each frame set
   NeighbourCodeRateSettings rate;
-  int n_threads = 0;                        ///< 0: one per core
-  guint key_interval_ms = 0;                ///< maximum time between key frame sets; 0: none
-  GstClockTime min_forced_key_interval = 0; ///< minimum time before one on request
+  int n_threads = 0;         ///< 0: one per core
+  guint key_interval_ms = 0; ///< maximum time between key frame sets; 0: none
 };
 
 PropertyTable<NeighbourCodeEncSettings> &encoder_properties ();

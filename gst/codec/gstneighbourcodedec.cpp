@@ -16,13 +16,13 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 avatartestsrc num-buffers=30 ! neighbourcodeenc ! neighbourcodedec ! plyenc !
- * multifilesink location=cloud-%05d.ply
+ * gst-launch-1.0 avatartestsrc num-buffers=30 ! neighbourcodeenc ! neighbourcodedec ! plyenc ! \
+ *   multifilesink location=cloud-%05d.ply
  * ]|
  *
  * Since: 0.1
  */
-#include "gstneighbourcodedec.h"
+#include <gst/base/gstbasetransform.h>
 
 #include <gst/base/base.h>
 #include <gst/video/video.h>
@@ -35,7 +35,6 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
 #include <optional>
-#include <rangecast/base/guarded.hpp>
 #include <rangecast/neighbourcode/access_unit.hpp>
 #include <span>
 #include <vector>
@@ -49,7 +48,6 @@
 
 using rangecast::DecoderResult;
 using rangecast::Status;
-using rangecast::StatusCode;
 
 GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_dec_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_dec_debug
@@ -94,6 +92,9 @@ struct GstNeighbourCodeDecPrivate {
   bool complete = false;      /* its last slice has come */
 };
 
+G_DECLARE_FINAL_TYPE (
+    GstNeighbourCodeDec, gst_neighbour_code_dec, GST, NEIGHBOUR_CODE_DEC, GstBaseTransform)
+
 struct _GstNeighbourCodeDec {
   GstBaseTransform parent;
   GstNeighbourCodeDecPrivate *priv;
@@ -106,7 +107,7 @@ static GstStaticPadTemplate src_template =
 
 G_DEFINE_TYPE (GstNeighbourCodeDec, gst_neighbour_code_dec, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
-    neighbourcodedec, "neighbourcodedec", GST_RANK_PRIMARY, GST_TYPE_NEIGHBOUR_CODE_DEC)
+    neighbourcodedec, "neighbourcodedec", GST_RANK_PRIMARY, gst_neighbour_code_dec_get_type ())
 
 #define GST_TYPE_NEIGHBOUR_CODE_CONCEAL (gst_neighbour_code_conceal_get_type ())
 static GType
@@ -139,18 +140,12 @@ reset_slices (GstNeighbourCodeDecPrivate *priv)
 }
 
 static void
-reset_references (GstNeighbourCodeDecPrivate *priv)
-{
-  priv->decoder.reset_references ();
-  priv->is_temporal = false;
-  priv->last_request = GST_CLOCK_TIME_NONE;
-}
-
-static void
 reset_stream (GstNeighbourCodeDecPrivate *priv)
 {
   reset_slices (priv);
-  reset_references (priv);
+  priv->decoder.reset_references ();
+  priv->is_temporal = false;
+  priv->last_request = GST_CLOCK_TIME_NONE;
   priv->concealment.reset ();
 }
 
@@ -160,18 +155,14 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   auto self = GST_NEIGHBOUR_CODE_DEC (base);
   GstNeighbourCodeDecPrivate *priv = self->priv;
   gstrange::RangeInfo info;
-  Status status = rangecast::guarded ("caps", [&] {
-    if (Status s = gstrange::parse_caps (in, info); !s.ok ())
-      return s;
-    priv->concealment.set_rig (priv->decoder.rig (), info.rig);
-    return priv->decoder.set_rig (info.rig);
-  });
+  Status status = gstrange::parse_caps (in, info);
+  if (status.ok ())
+    status = priv->decoder.set_rig (info.rig);
   priv->reporter.set_views (info.rig);
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
   GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
-  reset_slices (priv);
-  reset_references (priv);
+  reset_stream (priv);
   const GstStructure *structure = gst_caps_get_structure (in, 0);
   priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
   drop_pool (priv->pool);
@@ -179,39 +170,10 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
-/* An encoder writes byte streams where downstream takes anything, such as a payloader of GDP. They
- * are accepted so that take_caps() can say what is missing. */
-static bool
-is_byte_stream (const GstCaps *caps)
-{
-  const GstStructure *structure = gst_caps_get_structure (caps, 0);
-  return gst_structure_has_name (structure, GST_NEIGHBOUR_CODE_MEDIA_TYPE) &&
-         g_strcmp0 (gst_structure_get_string (structure, "alignment"), "byte-stream") == 0;
-}
-
-static gboolean
-gst_neighbour_code_dec_accept_caps (
-    GstBaseTransform *base, GstPadDirection direction, GstCaps *caps)
-{
-  if (direction == GST_PAD_SINK && gst_caps_get_size (caps) == 1 && is_byte_stream (caps))
-    return TRUE;
-  return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)
-      ->accept_caps (base, direction, caps);
-}
-
 /* Takes ownership of the CAPS event. */
 static gboolean
 take_caps (GstBaseTransform *base, GstEvent *event)
 {
-  GstCaps *caps = nullptr;
-  gst_event_parse_caps (event, &caps);
-  if (is_byte_stream (caps)) {
-    gst_event_unref (event);
-    gst_range_flow_return (GST_ELEMENT (base),
-        {StatusCode::kUnsupported,
-            "pad sink: alignment=byte-stream; add neighbourcodeparse before this element"});
-    return FALSE;
-  }
   if (GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)->sink_event (base, event))
     return TRUE;
   require_downstream (GST_ELEMENT (base), GST_BASE_TRANSFORM_SRC_PAD (base));
@@ -247,7 +209,12 @@ decode_into (GstNeighbourCodeDecPrivate *priv, std::span<const Bytes> units, Gst
   gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
   if (!frame.status ().ok ())
     return frame.status ();
-  return Concealment::decode (priv->decoder, frame.views (), older_views, n_threads, result);
+  const auto images = frame.views ();
+  const std::size_t planned = priv->decoder.views ().size ();
+  for (const rangecast::RangeImage &image : images.subspan (planned))
+    rangecast::fill_from (
+        *std::ranges::find (older_views, image.view_id, &rangecast::RangeImage::view_id), image);
+  return priv->decoder.decode (images.first (planned), n_threads, result, older_views);
 }
 
 /* Damage persists where frame sets refer to earlier ones, so a key frame set is requested. */
@@ -333,8 +300,7 @@ decode_frame_set (
       flow != GST_FLOW_OK)
     return flow;
   DecoderResult result;
-  const Status status = rangecast::guarded ("decoder",
-      [&] { return decode_into (priv, units, buffer, older, settings.n_threads, result); });
+  const Status status = decode_into (priv, units, buffer, older, settings.n_threads, result);
   if (!status.ok ()) {
     gst_buffer_unref (buffer);
     return gst_range_flow_return (GST_ELEMENT (self), status);
@@ -388,7 +354,7 @@ is_same_frame_set (GstBuffer *a, GstBuffer *b)
   return GST_BUFFER_PTS (a) == GST_BUFFER_PTS (b);
 }
 
-static Status
+static void
 append_slice (GstNeighbourCodeDec *self, GstBuffer *input, std::span<const Bytes> units)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
@@ -400,7 +366,6 @@ append_slice (GstNeighbourCodeDec *self, GstBuffer *input, std::span<const Bytes
     else
       GST_DEBUG_OBJECT (self, "dropping a slice: the access unit is too long");
   priv->complete = GST_BUFFER_FLAG_IS_SET (input, GST_BUFFER_FLAG_MARKER);
-  return {};
 }
 
 static GstFlowReturn
@@ -417,9 +382,8 @@ handle_input (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **output)
   GstFlowReturn flow = GST_FLOW_OK;
   if (priv->first && !is_same_frame_set (priv->first, input))
     flow = decode_slices (self, output);
-  const Status status =
-      rangecast::guarded ("decoder", [&] { return append_slice (self, input, map.pieces ()); });
-  return status.ok () ? flow : gst_range_flow_return (GST_ELEMENT (self), status);
+  append_slice (self, input, map.pieces ());
+  return flow;
 }
 
 /* The base class calls this until there is no output: one slice may end two frame sets, the one
@@ -596,7 +560,6 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
   transform_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_stop);
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_transform_caps);
-  transform_class->accept_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_accept_caps);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_set_caps);
   transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_sink_event);
   transform_class->generate_output = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_generate_output);

@@ -12,21 +12,21 @@
  * flag. Damage from losses ends after refresh-period at the latest.
  *
  * A buffer is a frame set, or a slice if downstream requires alignment=slice; the last slice of a
- * frame set has the MARKER flag. Where downstream takes anything, as filesink and tcpserversink do,
- * it is a frame set of the byte stream (alignment=byte-stream), which plays without caps.
+ * frame set has the MARKER flag. Frame sets describe themselves, and key frame sets hold the rig:
+ * from one of these on, buffers that are written one after another are a recording.
  *
  * ## Example launch lines
  * |[
  * gst-launch-1.0 avatartestsrc num-buffers=60 ! neighbourcodeenc ! filesink location=head.rcnc
  * ]|
  * |[
- * gst-launch-1.0 filesrc location=head.rcnc ! neighbourcodeparse ! neighbourcodedec !
- * rangealign ! striprender ! glimagesink
+ * gst-launch-1.0 filesrc location=head.rcnc ! neighbourcodeparse ! neighbourcodedec ! \
+ *   rangealign ! striprender ! glimagesink
  * ]|
  *
  * Since: 0.1
  */
-#include "gstneighbourcodeenc.h"
+#include <gst/base/gstbasetransform.h>
 
 #include <gst/base/base.h>
 
@@ -35,18 +35,16 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <mutex>
-#include <rangecast/base/guarded.hpp>
 #include <rangecast/neighbourcode/access_unit.hpp>
 #include <span>
 
 #include "bitrate.hpp"
+#include "common/accessunitwriter.hpp"
 #include "common/controlledvalues.hpp"
-#include "common/recycledmemories.hpp"
-#include "common/statsreporter.hpp"
+#include "common/elementproperties.hpp"
 #include "common/streamlock.hpp"
 #include "encsettings.hpp"
 #include "keyunitrequests.hpp"
-#include "streamprefixes.hpp"
 
 using rangecast::EncoderResult;
 using rangecast::EncoderSettings;
@@ -55,19 +53,11 @@ using rangecast::Status;
 GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_enc_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_enc_debug
 
-enum : guint {
-  PROP_MAX_DEPTH_ERROR = 1,
-  PROP_ESTIMATED_BITRATE,
-  PROP_STATS,
-  PROP_STATS_INTERVAL,
-  PROP_SETTINGS
-};
-
 struct GstNeighbourCodeEncPrivate {
   std::mutex lock; /* guards what follows; never held across a push or message */
   NeighbourCodeEncSettings settings;
   double max_depth_error_m = 0;
-  guint64 frames = 0, coded_bytes = 0, left_out = 0;
+  guint64 frames = 0, coded_bytes = 0, skipped = 0;
   EncoderResult totals;
   EncoderSettings latest; /* of the latest frame set */
   double bits_per_s = 0;
@@ -77,23 +67,24 @@ struct GstNeighbourCodeEncPrivate {
   StatsReporter reporter;
 
   /* streaming thread only */
-  bool warned_target = false;
   gstrange::RangeInfo info;
-  NeighbourCodeRate rate; /* but for its member `receivers`: any thread */
+  NeighbourCodeRate rate; /* but for feedback of receivers: any thread */
   rangecast::AccessUnitEncoder encoder;
   EncoderSettings configured; /* of encoder */
   bool is_configured = false;
   std::uint32_t frame_number = 0;
   bool is_key = true;                          /* the frame set in encoder */
   GstClockTime last_key = GST_CLOCK_TIME_NONE; /* running time */
-  RecycledMemories memories;
-  bool by_slices = false, writes_stream = false; /* alignment of the output */
-  StreamPrefixes prefixes;                       /* writes_stream */
+  AccessUnitWriter writer;
+  bool by_slices = false;          /* alignment of the output */
   GstBuffer *input = nullptr;      /* the frame set in encoder, until all of it is pushed */
   std::size_t part = 0;            /* by_slices: the next of encoder's parts */
   rangecast::UnitReader units{{}}; /* by_slices: rest of the previous part */
   std::span<const guint8> slice;   /* by_slices: the next slice; empty before the first */
 };
+
+G_DECLARE_FINAL_TYPE (
+    GstNeighbourCodeEnc, gst_neighbour_code_enc, GST, NEIGHBOUR_CODE_ENC, GstBaseTransform)
 
 struct _GstNeighbourCodeEnc {
   GstBaseTransform parent;
@@ -102,15 +93,12 @@ struct _GstNeighbourCodeEnc {
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
-static GstStaticPadTemplate src_template =
-    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
-        GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-            ", version = (int) 3, alignment = (string) { access-unit, slice, byte-stream "
-            "}, " GST_RANGE_SIZE_CAPS_));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
 
 G_DEFINE_TYPE (GstNeighbourCodeEnc, gst_neighbour_code_enc, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
-    neighbourcodeenc, "neighbourcodeenc", GST_RANK_PRIMARY, GST_TYPE_NEIGHBOUR_CODE_ENC)
+    neighbourcodeenc, "neighbourcodeenc", GST_RANK_PRIMARY, gst_neighbour_code_enc_get_type ())
 
 /* ---- caps ---- */
 
@@ -118,36 +106,7 @@ static GstCaps *
 gst_neighbour_code_enc_transform_caps (
     GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *filter)
 {
-  if (direction == GST_PAD_SRC)
-    return gstrange::recode_caps (caps, false, filter);
-  GstCaps *coded = gstrange::recode_caps (caps, true, nullptr);
-  GstCaps *stream = gst_caps_copy (coded);
-  gst_caps_set_simple (stream, "alignment", G_TYPE_STRING, "byte-stream", nullptr);
-  gst_caps_append (coded, stream);
-  if (filter) {
-    GstCaps *filtered = gst_caps_intersect_full (filter, coded, GST_CAPS_INTERSECT_FIRST);
-    gst_caps_unref (coded);
-    coded = filtered;
-  }
-  return coded;
-}
-
-static GstCaps *
-gst_neighbour_code_enc_fixate_caps (
-    GstBaseTransform *base, GstPadDirection direction, GstCaps *caps, GstCaps *other)
-{
-  if (direction == GST_PAD_SINK) {
-    GstCaps *wanted =
-        gst_caps_new_simple (GST_NEIGHBOUR_CODE_MEDIA_TYPE, "alignment", G_TYPE_STRING,
-            preferred_alignment (GST_BASE_TRANSFORM_SRC_PAD (base), "byte-stream"), nullptr);
-    GstCaps *preferred = gst_caps_intersect (other, wanted);
-    if (!gst_caps_is_empty (preferred))
-      gst_caps_replace (&other, preferred);
-    gst_caps_unref (preferred);
-    gst_caps_unref (wanted);
-  }
-  return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_enc_parent_class)
-      ->fixate_caps (base, direction, caps, other);
+  return gstrange::recode_caps (caps, direction == GST_PAD_SINK, filter);
 }
 
 static gboolean
@@ -155,16 +114,13 @@ gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
   const GstStructure *structure = gst_caps_get_structure (out, 0);
-  const Status status =
-      rangecast::guarded ("caps", [&] { return gstrange::parse_caps (in, priv->info); });
+  const Status status = gstrange::parse_caps (in, priv->info);
   priv->is_configured = false;
   priv->reporter.set_views (priv->info.rig);
   priv->encoder.request_key (); /* decoders reset their references at new caps */
   const gchar *alignment = gst_structure_get_string (structure, "alignment");
   priv->by_slices = g_strcmp0 (alignment, "slice") == 0;
-  priv->writes_stream = g_strcmp0 (alignment, "byte-stream") == 0;
-  if (status.ok ())
-    priv->prefixes.set_rig (priv->info);
+  priv->writer.set_rig (priv->info);
   gst_clear_buffer (&priv->input);
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
   return gst_range_flow_return (GST_ELEMENT (base), status) == GST_FLOW_OK;
@@ -179,14 +135,14 @@ input_running_time (GstNeighbourCodeEnc *self, GstBuffer *input)
       &GST_BASE_TRANSFORM (self)->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (input));
 }
 
-/* A GAP tells downstream that this frame set is left out. */
+/* A GAP tells downstream that this frame set is skipped. */
 static void
-leave_out (GstNeighbourCodeEnc *self, GstBuffer *input)
+skip_frame_set (GstNeighbourCodeEnc *self, GstBuffer *input)
 {
-  GST_DEBUG_OBJECT (self, "leaving out a frame set for the bit rate: %" GST_PTR_FORMAT, input);
+  GST_DEBUG_OBJECT (self, "skipping a frame set for the bit rate: %" GST_PTR_FORMAT, input);
   {
     std::lock_guard guard (self->priv->lock);
-    self->priv->left_out++;
+    self->priv->skipped++;
   }
   if (GST_BUFFER_PTS_IS_VALID (input))
     gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self),
@@ -194,21 +150,18 @@ leave_out (GstNeighbourCodeEnc *self, GstBuffer *input)
 }
 
 /* Requests a key frame set from the encoder if one is due: key-interval would pass before the next
- * frame set, or someone has asked. Requests too soon after a key frame set wait, as with
- * GstVideoEncoder. */
+ * frame set, or someone has asked. */
 static void
 request_key_if_due (
     GstNeighbourCodeEnc *self, GstBuffer *input, const NeighbourCodeEncSettings &settings)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
   const GstClockTime now = input_running_time (self, input), last = priv->last_key;
-  const bool has_times = GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (last);
   const GstClockTime next = now + settings.coding.frame_interval_ns;
-  const bool interval_passed = settings.key_interval_ms > 0 && has_times &&
+  const bool interval_passed = settings.key_interval_ms > 0 && GST_CLOCK_TIME_IS_VALID (now) &&
+                               GST_CLOCK_TIME_IS_VALID (last) &&
                                (now < last || next - last > settings.key_interval_ms * GST_MSECOND);
-  const bool too_soon = has_times && GST_CLOCK_TIME_IS_VALID (settings.min_forced_key_interval) &&
-                        now >= last && now - last < settings.min_forced_key_interval;
-  if (!interval_passed && (too_soon || !priv->key_requests.is_due (now)))
+  if (!interval_passed && !priv->key_requests.is_due (now))
     return;
   GST_DEBUG_OBJECT (
       self, "key frame set: %s", interval_passed ? "key-interval has passed" : "requested");
@@ -276,22 +229,6 @@ answer_key_requests (GstNeighbourCodeEnc *self, GstBuffer *input)
     gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), answer);
 }
 
-static void
-warn_missed_target (GstNeighbourCodeEnc *self, const NeighbourCodeRateSettings &rate)
-{
-  GstNeighbourCodeEncPrivate *priv = self->priv;
-  if (priv->warned_target || !priv->rate.misses_target ())
-    return;
-  priv->warned_target = true;
-  GST_ELEMENT_WARNING (self, STREAM, ENCODE,
-      ("target-bitrate=%u cannot be met: with max-depth-threshold=%d and max-colour-threshold=%d "
-       "the stream has %.0f bits per second; expected a larger target, larger limits, or smaller "
-       "or fewer pictures",
-          rate.target_bitrate, rate.max_depth_threshold, rate.max_colour_threshold,
-          priv->rate.bits_per_s ()),
-      (nullptr));
-}
-
 /* Encodes the frame set in priv->input, or clears that if the rate leaves it out. */
 static GstFlowReturn
 encode_input (GstNeighbourCodeEnc *self)
@@ -307,22 +244,16 @@ encode_input (GstNeighbourCodeEnc *self)
   settings.coding.frame_interval_ns =
       priv->info.fps_n > 0 ? priv->info.frame_duration () : GST_SECOND / 30;
   const bool keeps = priv->rate.begin (settings.rate, input, settings.coding.frame_interval_ns);
-  if (GstMessage *message = priv->rate.make_message (GST_OBJECT (self))) {
-    gst_element_post_message (GST_ELEMENT (self), message);
-    g_object_notify (G_OBJECT (self), "estimated-bitrate");
-  }
   if (!keeps) {
-    leave_out (self, input);
+    skip_frame_set (self, input);
     gst_clear_buffer (&priv->input);
     return GST_FLOW_OK;
   }
   request_key_if_due (self, input, settings);
   EncoderResult result;
-  const Status status =
-      rangecast::guarded ("encoder", [&] { return encode_frame (self, input, settings, result); });
+  const Status status = encode_frame (self, input, settings, result);
   if (!status.ok ())
     return gst_range_flow_return (GST_ELEMENT (self), status);
-  warn_missed_target (self, settings.rate);
   priv->is_key = result.delta_slices == 0;
   if (priv->is_key)
     answer_key_requests (self, input);
@@ -342,56 +273,31 @@ encode_input (GstNeighbourCodeEnc *self)
 
 /* ---- output: an access unit, or slice by slice ---- */
 
-/* A buffer of these bytes with the times and flags of the input; nullptr after an error. */
+/* A buffer of these slices with the times and flags of the input, which begins the access unit or
+ * continues it; nullptr after an error. */
 static GstBuffer *
-make_output (GstNeighbourCodeEnc *self, std::span<const std::span<const guint8>> parts)
+make_output (GstNeighbourCodeEnc *self, std::span<const std::span<const guint8>> parts, bool begins)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
   gsize size = 0;
   for (const auto part : parts)
     size += part.size ();
-  GstMemory *memory = priv->memories.acquire (size);
-  GstMapInfo map;
-  if (!memory || !gst_memory_map (memory, &map, GST_MAP_WRITE)) {
-    g_clear_pointer (&memory, gst_memory_unref);
-    gst_range_flow_return (GST_ELEMENT (self),
-        {rangecast::StatusCode::kNoSpace, "out of memory for a coded frame set"});
+  const Status status = begins
+                            ? priv->writer.begin (priv->is_key, size, priv->encoder.size () - size)
+                            : priv->writer.begin_rest (size);
+  if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return nullptr;
-  }
-  guint8 *end = map.data;
   for (const auto part : parts)
-    end = std::copy (part.begin (), part.end (), end);
-  gst_memory_unmap (memory, &map);
-  GstBuffer *buffer = gst_buffer_new ();
-  gst_buffer_append_memory (buffer, memory);
+    priv->writer.add (part);
+  GstBuffer *buffer = priv->writer.finish (
+      byte_stream_time (GST_BASE_TRANSFORM (self)->segment, GST_BUFFER_PTS (priv->input)));
   GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (
       GST_BASE_TRANSFORM (self), priv->input, buffer);
   const GstClockTime capture = gst_range_buffer_get_capture_time (priv->input);
   if (GST_CLOCK_TIME_IS_VALID (capture))
     gst_range_buffer_set_capture_time (buffer, capture);
-  if (priv->is_key)
-    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
-  else
-    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  set_key (buffer, priv->is_key);
   return buffer;
-}
-
-static void
-prepend_prefix (GstNeighbourCodeEnc *self, GstBuffer *access_unit)
-{
-  GstNeighbourCodeEncPrivate *priv = self->priv;
-  rangecast::AccessUnitHeader header;
-  rangecast::SliceHeader slice;
-  rangecast::UnitHeader unit;
-  const auto &parts = priv->encoder.parts ();
-  const auto first = parts.empty () ? std::nullopt : rangecast::UnitReader (parts[0]).next (unit);
-  if (first && rangecast::read_slice_header (*first, slice).ok ())
-    header.capture_time_ns = slice.capture_time_ns;
-  header.key = priv->is_key;
-  const GstClockTime time =
-      byte_stream_time (GST_BASE_TRANSFORM (self)->segment, GST_BUFFER_PTS (access_unit));
-  gst_buffer_prepend_memory (
-      access_unit, priv->prefixes.make (header, time, gst_buffer_get_size (access_unit)));
 }
 
 /* The encoder's next slice; empty after the last one. */
@@ -415,7 +321,7 @@ make_slice (GstNeighbourCodeEnc *self)
   const bool is_first = priv->slice.empty ();
   if (is_first)
     priv->slice = next_slice (priv);
-  GstBuffer *buffer = make_output (self, std::span (&priv->slice, 1));
+  GstBuffer *buffer = make_output (self, std::span (&priv->slice, 1), is_first);
   if (!buffer)
     return nullptr;
   if (!is_first)
@@ -454,15 +360,7 @@ gst_neighbour_code_enc_generate_output (GstBaseTransform *base, GstBuffer **outp
   if (priv->by_slices) {
     *output = make_slice (self);
   } else {
-    if (priv->writes_stream && priv->encoder.size () > priv->prefixes.max_access_unit ())
-      GST_ELEMENT_ERROR (self, STREAM, ENCODE,
-          ("A frame set of %zu bytes: expected at most 32 MiB with its rig in a byte stream",
-              priv->encoder.size ()),
-          (nullptr));
-    else
-      *output = make_output (self, priv->encoder.parts ());
-    if (*output && priv->writes_stream)
-      prepend_prefix (self, *output);
+    *output = make_output (self, priv->encoder.parts (), true);
     gst_clear_buffer (&priv->input);
   }
   return *output ? GST_FLOW_OK : GST_FLOW_ERROR;
@@ -494,7 +392,6 @@ gst_neighbour_code_enc_sink_event (GstBaseTransform *base, GstEvent *event)
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP) {
     priv->encoder.request_key ();
     priv->key_requests.reset ();
-    priv->prefixes.repeat_rig ();
   } else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS) {
     priv->reporter.finish ();
   }
@@ -505,7 +402,7 @@ static gboolean
 gst_neighbour_code_enc_src_event (GstBaseTransform *base, GstEvent *event)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
-  if (priv->key_requests.handle_event (event) || priv->rate.receivers.handle_event (event)) {
+  if (priv->key_requests.handle_event (event) || priv->rate.handle_event (event)) {
     gst_event_unref (event);
     return TRUE;
   }
@@ -528,7 +425,6 @@ gst_neighbour_code_enc_start (GstBaseTransform *base)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
   priv->rate.reset ();
-  priv->warned_target = false;
   priv->last_key = GST_CLOCK_TIME_NONE;
   priv->encoder.request_key ();
   priv->key_requests.reset ();
@@ -536,7 +432,7 @@ gst_neighbour_code_enc_start (GstBaseTransform *base)
   std::lock_guard guard (priv->lock);
   priv->frame_number = 0;
   priv->bits_per_s = 0;
-  priv->frames = priv->coded_bytes = priv->left_out = 0;
+  priv->frames = priv->coded_bytes = priv->skipped = 0;
   priv->totals = {};
   return TRUE;
 }
@@ -549,67 +445,24 @@ gst_neighbour_code_enc_stop (GstBaseTransform *base)
   const StreamLock lock (base);
   priv->is_configured = false;
   gst_clear_buffer (&priv->input);
-  priv->memories.drop ();
+  priv->writer.drop ();
   return TRUE;
-}
-
-static void
-gst_neighbour_code_enc_set_property (
-    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
-  if (id == PROP_STATS_INTERVAL) /* without our lock: the reporter sets a timer */
-    return priv->reporter.set_interval (g_value_get_uint (value));
-  std::lock_guard guard (priv->lock);
-  if (!encoder_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 static GstStructure *
 make_stats (const GstNeighbourCodeEncPrivate *priv)
 {
   GstStructure *stats = gst_structure_new ("application/x-neighbourcodeenc-stats", "frames",
-      G_TYPE_UINT64, priv->frames, "left-out", G_TYPE_UINT64, priv->left_out, "points",
-      G_TYPE_UINT64, guint64{priv->totals.points}, "full-pixels", G_TYPE_UINT64,
-      guint64{priv->totals.full_pixels}, "slices", G_TYPE_UINT64, guint64{priv->totals.slices},
-      "delta-slices", G_TYPE_UINT64, guint64{priv->totals.delta_slices}, "raw-bytes", G_TYPE_UINT64,
+      G_TYPE_UINT64, priv->frames, "skipped", G_TYPE_UINT64, priv->skipped, "points", G_TYPE_UINT64,
+      guint64{priv->totals.points}, "full-pixels", G_TYPE_UINT64, guint64{priv->totals.full_pixels},
+      "slices", G_TYPE_UINT64, guint64{priv->totals.slices}, "delta-slices", G_TYPE_UINT64,
+      guint64{priv->totals.delta_slices}, "raw-bytes", G_TYPE_UINT64,
       guint64{priv->totals.raw_bits / 8}, "coded-bytes", G_TYPE_UINT64, priv->coded_bytes,
       "bitrate", G_TYPE_UINT64, guint64 (priv->bits_per_s + 0.5), "depth-threshold", G_TYPE_INT,
       priv->latest.depth_threshold, "colour-threshold", G_TYPE_INT, priv->latest.colour_threshold,
-      nullptr);
-  priv->rate.receivers.add_stats (stats);
+      "max-depth-error", G_TYPE_DOUBLE, priv->max_depth_error_m, nullptr);
+  priv->rate.add_stats (stats);
   return stats;
-}
-
-static void
-gst_neighbour_code_enc_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (object)->priv;
-  std::lock_guard guard (priv->lock);
-  switch (id) {
-    case PROP_MAX_DEPTH_ERROR:
-      g_value_set_double (value, priv->max_depth_error_m);
-      break;
-    case PROP_ESTIMATED_BITRATE:
-      g_value_set_uint64 (value, guint64 (priv->rate.receivers.bits_per_s () + 0.5));
-      break;
-    case PROP_STATS:
-      g_value_take_boxed (value, make_stats (priv));
-      break;
-    case PROP_STATS_INTERVAL:
-      g_value_set_uint (value, priv->reporter.interval ());
-      break;
-    default:
-      if (!encoder_properties ().get (priv->settings, id, value))
-        G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-  }
-}
-
-static void
-gst_neighbour_code_enc_finalize (GObject *object)
-{
-  delete GST_NEIGHBOUR_CODE_ENC (object)->priv;
-  G_OBJECT_CLASS (gst_neighbour_code_enc_parent_class)->finalize (object);
 }
 
 static void
@@ -625,25 +478,11 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
 
-  object_class->set_property = gst_neighbour_code_enc_set_property;
-  object_class->get_property = gst_neighbour_code_enc_get_property;
-  object_class->finalize = gst_neighbour_code_enc_finalize;
-  encoder_properties ().install (object_class, PROP_SETTINGS);
-  g_object_class_install_property (object_class, PROP_MAX_DEPTH_ERROR,
-      g_param_spec_double ("max-depth-error", "Maximum depth error",
-          "Maximum difference between a decoded depth and the input depth in metres, over all "
-          "views, with the settings of the latest frame set (0 = no frame set yet)",
-          0, G_MAXDOUBLE, 0, kReadOnly));
-  g_object_class_install_property (object_class, PROP_ESTIMATED_BITRATE,
-      g_param_spec_uint64 ("estimated-bitrate", "Estimated bit rate",
-          "Bit rate in bits per second that the network allows with adaptive-bitrate (before the "
-          "first feedback: target-bitrate; 0 = no limit known)",
-          0, G_MAXUINT64, 0, kReadOnly));
-  install_stats (object_class, PROP_STATS,
-      "Counters since the element was started (frames, left-out, points, full-pixels, slices, "
-      "delta-slices, raw-bytes, coded-bytes), the bitrate of the last 2 s, the thresholds of "
-      "the latest frame set and the state of adaptive-bitrate");
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+  object_class->finalize = delete_private<GstNeighbourCodeEnc>;
+  install_properties<GstNeighbourCodeEnc, encoder_properties, make_stats> (object_class,
+      "Counters since the element was started (frames, skipped, points, full-pixels, slices, "
+      "delta-slices, raw-bytes, coded-bytes), the bitrate of the last 2 s, the thresholds and "
+      "max-depth-error of the latest frame set and the state of adaptive-bitrate");
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
@@ -656,7 +495,6 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
   transform_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_start);
   transform_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_stop);
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform_caps);
-  transform_class->fixate_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_fixate_caps);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_set_caps);
   transform_class->generate_output = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_generate_output);
   transform_class->transform = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform);

@@ -14,8 +14,8 @@ public:
   ClockWait (const ClockWait &) = delete;
   ClockWait &operator= (const ClockWait &) = delete;
 
-  /** Waits until `time` on `clock`; a time that has passed ends the wait at once. Keeps a reference
-   *  to the clock until reset(), so that waiting for it again allocates nothing.
+  /** Waits until `time` on `clock`; a time that has passed ends the wait immediately. Keeps a
+   *  reference to the clock until reset(), so that waiting for it again allocates nothing.
    *  @param guard  locked; check the condition for waiting under this lock
    *  @return false if the time has not come: interrupt() ended the wait, or the clock cannot be
    *  waited for, which takes 10 ms, so that callers may try again */

@@ -10,6 +10,15 @@
 /* set_property, get_property and the installation of properties for elements that have the usual
  * three kinds: settings in a table, `stats` and `stats-interval`. */
 
+/** finalize() of an element whose `priv` was made by new and is all that it owns. */
+template <typename Element>
+void
+delete_private (GObject *object)
+{
+  delete reinterpret_cast<Element *> (object)->priv;
+  G_OBJECT_CLASS (g_type_class_peek_parent (G_OBJECT_GET_CLASS (object)))->finalize (object);
+}
+
 namespace properties {
 
 enum : guint { kStatsId = 1, kStatsIntervalId, kFirstSettingId };
@@ -22,9 +31,12 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
   if constexpr (requires { priv->reporter.interval (); })
     if (id == kStatsIntervalId)
       return priv->reporter.set_interval (g_value_get_uint (value));
-  std::lock_guard guard (priv->lock);
-  if (!kTable ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  if constexpr (!std::is_null_pointer_v<decltype (kTable)>) {
+    std::lock_guard guard (priv->lock);
+    if (kTable ().set (priv->settings, id, value))
+      return;
+  }
+  G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 template <typename Element, auto kTable, auto kMakeStats>
@@ -39,30 +51,38 @@ get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
   if constexpr (!std::is_null_pointer_v<decltype (kMakeStats)>)
     if (id == kStatsId)
       return g_value_take_boxed (value, kMakeStats (priv));
-  if (!kTable ().get (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
+  if constexpr (!std::is_null_pointer_v<decltype (kTable)>)
+    if (kTable ().get (priv->settings, id, value))
+      return;
+  G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
 } // namespace properties
 
-/** Sets set_property and get_property of an element's class and installs its properties; for
- *  class_init. `Element` has a pointer `priv` to a struct with
+/** Sets set_property and get_property of an element's class and installs its
+ * properties; for class_init. `Element` has a pointer `priv` to a struct with
  *  - `std::mutex lock`, which guards `settings` and what `kMakeStats` reads,
- *  - `settings`,
- *  - optionally `StatsReporter reporter`: then there is a property `stats-interval`.
- *  @tparam kTable      function that returns the PropertyTable of `settings` by reference
- *  @tparam kMakeStats  function that returns the value of `stats` (transfer full) from `priv`;
- *                      called with `lock` held; nullptr: no property `stats`
- *  @param stats_blurb  names the fields of `stats` */
+ *  - `settings`, if there is a table,
+ *  - optionally `StatsReporter reporter`: then there is a property
+ * `stats-interval`.
+ *  @tparam kTable      function that returns the PropertyTable of `settings` by
+ * reference; nullptr: there are no settings
+ *  @tparam kMakeStats  function that returns the value of `stats` (transfer
+ * full) from `priv`; called with `lock` held; nullptr: no property `stats`
+ *  @param stats_blurb  names the fields of `stats`
+ *  @param stats_name   another name, where the base class has a property
+ * `stats` */
 template <typename Element, auto kTable, auto kMakeStats = nullptr>
 void
-install_properties (GObjectClass *klass, const char *stats_blurb = nullptr)
+install_properties (
+    GObjectClass *klass, const char *stats_blurb = nullptr, const char *stats_name = "stats")
 {
   klass->set_property = properties::set_property<Element, kTable>;
   klass->get_property = properties::get_property<Element, kTable, kMakeStats>;
   if constexpr (!std::is_null_pointer_v<decltype (kMakeStats)>)
-    install_stats (klass, properties::kStatsId, stats_blurb);
+    install_stats (klass, properties::kStatsId, stats_blurb, stats_name);
   if constexpr (requires (Element * element) { element->priv->reporter.interval (); })
     StatsReporter::install (klass, properties::kStatsIntervalId);
-  kTable ().install (klass, properties::kFirstSettingId);
+  if constexpr (!std::is_null_pointer_v<decltype (kTable)>)
+    kTable ().install (klass, properties::kFirstSettingId);
 }

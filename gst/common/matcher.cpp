@@ -175,6 +175,27 @@ FrameMatcher::drop_far_ahead ()
   }
 }
 
+/* Once for each time that a pad falls silent, and for images that never pair up. */
+void
+FrameMatcher::warn_unmatched (std::size_t index)
+{
+  const auto silent = std::ranges::find_if (
+      streams_, [] (const PadStream &s) { return s.required && s.head == Head::kMissing; });
+  unmatched_++;
+  if (unmatched_ == 1 && output_end_ > 0 && silent != streams_.end ())
+    GST_ELEMENT_WARNING (element_, STREAM, FAILED,
+        ("Pad %s has no images in time; those of pad %s are dropped until it has",
+            GST_PAD_NAME (silent->pad), names_[index]),
+        ("if they are only late, raise latency"));
+  else if (unmatched_ == kMaxUnmatched && !std::exchange (warned_unmatched_, true))
+    GST_ELEMENT_WARNING (element_, STREAM, FAILED,
+        ("Images of pads %s and %s do not pair up: their times must differ by at most half a "
+         "frame, or 5 ms if the caps have no framerate, and live ones must arrive within 0.5 s of "
+         "each other, or latency must be raised",
+            names_[0], names_[1]),
+        ("the last %d images found no partner", int (kMaxUnmatched)));
+}
+
 /* Drops the head of one pad. Where a GAP is the reason, its time becomes one without output. */
 void
 FrameMatcher::drop (std::size_t index, GstClockTime tolerance)
@@ -189,14 +210,7 @@ FrameMatcher::drop (std::size_t index, GstClockTime tolerance)
   gst_aggregator_pad_drop_buffer (stream.pad);
   if (stream.head == Head::kFrame) {
     dropped_[index]++;
-    if (++unmatched_ == kMaxUnmatched && !std::exchange (warned_unmatched_, true))
-      GST_ELEMENT_WARNING (element_, STREAM, FAILED,
-          ("Images of pads %s and %s do not pair up: their times must differ by at most half a "
-           "frame, or 5 ms if the caps have no framerate, and live ones must arrive within 0.5 s "
-           "of "
-           "each other, or latency must be raised",
-              names_[0], names_[1]),
-          ("the last %d images found no partner", int (kMaxUnmatched)));
+    warn_unmatched (index);
   }
   if (!covered || !stream.required || !GST_CLOCK_TIME_IS_VALID (stream.running))
     return;
@@ -269,7 +283,7 @@ check_links (GstClock *, GstClockTime, GstClockID, gpointer data)
     return TRUE;
   };
   gst_element_foreach_sink_pad (element, add, &names);
-  if (!names.empty ())
+  if (!names.empty () && GST_STATE_TARGET (element) >= GST_STATE_PAUSED) /* pads lose caps after */
     GST_ELEMENT_ERROR (element, CORE, PAD, ("Sink pad not linked: %s", names.c_str ()),
         ("another pad has had caps for a second; every sink pad of this element needs a stream"));
   return TRUE;

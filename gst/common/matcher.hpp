@@ -14,7 +14,7 @@
 struct MatchStream {
   enum class Head {
     kMissing, ///< may still come
-    kEnded,   ///< nothing will come, or what waits there is left out
+    kEnded,   ///< nothing will come, or what waits there is skipped
     kGap,     ///< nothing comes from `time` to `end`
     kFrame,
   };
@@ -54,8 +54,8 @@ struct PadStream : MatchStream {
  *  thread. An image waits for its partners until they have an image or a GAP of a later time. In a
  *  live pipeline it waits no longer than kPatience beyond the element's latency, so that a source
  *  that feeds several pads is never blocked for good, and images that are more than kMaxAhead ahead
- *  of the clock and of another pad are dropped. Times in which images were dropped because of a GAP are announced
- *  downstream by GAP events. */
+ *  of the clock and of another pad are dropped. Times in which images were dropped because of a GAP
+ *  are announced downstream by GAP events. */
 class FrameMatcher {
 public:
   static constexpr GstClockTime kPatience = GST_SECOND / 2, kMaxAhead = 10 * GST_SECOND;
@@ -95,6 +95,7 @@ private:
   void release_heads ();
   GstFlowReturn take_set (GstClockTime tolerance, bool timeout);
   void drop_far_ahead ();
+  void warn_unmatched (std::size_t index);
   void drop (std::size_t index, GstClockTime tolerance);
   void push_gap (GstClockTime begin, GstClockTime end);
 

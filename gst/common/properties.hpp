@@ -24,7 +24,7 @@ inline constexpr auto kMutablePlaying = GParamFlags (kReadWrite | GST_PARAM_MUTA
 inline constexpr auto kControllable = GParamFlags (kMutablePlaying | GST_PARAM_CONTROLLABLE);
 inline constexpr auto kReadOnly = GParamFlags (G_PARAM_READABLE | G_PARAM_STATIC_STRINGS);
 
-/** A property that is stored in a member of `Settings`, or by custom functions. */
+/** A property that is stored in a member of `Settings`, or by functions of the element. */
 template <typename Settings> struct PropertyRow {
   GParamSpec *spec; ///< floating until it is installed
   void (*set) (Settings &, const GValue *);
@@ -176,34 +176,18 @@ public:
         name, nick, blurb, default_value.empty () ? nullptr : default_value.c_str (), flags));
   }
 
-  /** An enumeration. @param type  GType with the values of the member's type; gets marked as plugin
-   *  API, so that documentation tools find it */
+  /** An enumeration or a set of flags. @param type  GType with the values of the member's type;
+   *  gets marked as plugin API, so that documentation tools find it */
   template <auto... kPath>
   static Row enumeration (
       const char *name, const char *nick, const char *blurb, GType type, GParamFlags flags)
   {
     const Settings defaults{};
+    const auto value = properties::member<kPath...> (defaults);
     gst_type_mark_as_plugin_api (type, GstPluginAPIFlags (0));
-    return properties::row<Settings, kPath...> (g_param_spec_enum (
-        name, nick, blurb, type, int (properties::member<kPath...> (defaults)), flags));
-  }
-
-  /** A set of flags. */
-  template <auto... kPath>
-  static Row flag_set (
-      const char *name, const char *nick, const char *blurb, GType type, GParamFlags flags)
-  {
-    const Settings defaults{};
-    gst_type_mark_as_plugin_api (type, GstPluginAPIFlags (0));
-    return properties::row<Settings, kPath...> (g_param_spec_flags (
-        name, nick, blurb, type, guint (properties::member<kPath...> (defaults)), flags));
-  }
-
-  /** A property that is not one member, with its own setter and getter. */
-  static Row custom (GParamSpec *spec, void (*set) (Settings &, const GValue *),
-      void (*get) (const Settings &, GValue *))
-  {
-    return {spec, set, get};
+    return properties::row<Settings, kPath...> (
+        G_TYPE_IS_FLAGS (type) ? g_param_spec_flags (name, nick, blurb, type, guint (value), flags)
+                               : g_param_spec_enum (name, nick, blurb, type, int (value), flags));
   }
 
   /** Installs the rows with the ids `first_id` and following. @return the next free id */
@@ -260,8 +244,8 @@ private:
 
 /** Installs the read-only property `stats`, a GstStructure. @param blurb  names its fields */
 inline void
-install_stats (GObjectClass *object_class, guint id, const char *blurb)
+install_stats (GObjectClass *object_class, guint id, const char *blurb, const char *name = "stats")
 {
   g_object_class_install_property (object_class, id,
-      g_param_spec_boxed ("stats", "Statistics", blurb, GST_TYPE_STRUCTURE, kReadOnly));
+      g_param_spec_boxed (name, "Statistics", blurb, GST_TYPE_STRUCTURE, kReadOnly));
 }

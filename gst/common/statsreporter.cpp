@@ -50,7 +50,6 @@ struct StatsReporter::State {
   ~State () { g_weak_ref_clear (&element); }
   void schedule (const std::shared_ptr<State> &self);
   void unschedule ();
-  void begin_interval (GstElement *e, Collect read);
   void report (bool at_end);
   void report_async ();
   std::vector<GstStructure *> make_messages (
@@ -169,19 +168,6 @@ StatsReporter::State::make_messages (
 }
 
 void
-StatsReporter::State::begin_interval (GstElement *e, Collect read)
-{
-  std::lock_guard guard (reporting);
-  previous.clear ();
-  if (read)
-    for (const StatsRow &row : read (e))
-      previous.push_back ({row.pad, row.counters});
-  since = gst_util_get_timestamp ();
-  std::lock_guard others (lock);
-  n_latencies = 0;
-}
-
-void
 StatsReporter::State::report (bool at_end)
 {
   auto e = static_cast<GstElement *> (g_weak_ref_get (&element));
@@ -199,22 +185,18 @@ StatsReporter::State::report (bool at_end)
   GST_OBJECT_LOCK (e);
   const bool plays = GST_STATE (e) == GST_STATE_PLAYING;
   GST_OBJECT_UNLOCK (e);
-  if (plays || at_end) {
-    std::vector<GstStructure *> messages;
-    {
-      std::lock_guard guard (reporting);
-      const GstClockTime now = gst_util_get_timestamp (), interval = now - since;
-      /* A timer that fires late fires again early: skip the short interval. */
-      if (at_end || interval >= ms * GST_MSECOND / 2) {
-        since = now;
-        messages = make_messages (e, read (e), interval);
-      }
+  std::vector<GstStructure *> messages;
+  {
+    std::lock_guard guard (reporting);
+    const GstClockTime now = gst_util_get_timestamp (), interval = now - since;
+    /* A timer that fires late fires again early: skip the short interval. */
+    if (at_end || (plays && interval >= ms * GST_MSECOND / 2)) {
+      since = now;
+      messages = make_messages (e, read (e), interval);
     }
-    for (GstStructure *message : messages)
-      gst_element_post_message (e, gst_message_new_element (GST_OBJECT (e), message));
-  } else {
-    begin_interval (e, read);
   }
+  for (GstStructure *message : messages)
+    gst_element_post_message (e, gst_message_new_element (GST_OBJECT (e), message));
   gst_object_unref (e);
 }
 
@@ -311,8 +293,13 @@ StatsReporter::start (GstElement *element, Collect collect)
 {
   stop ();
   g_weak_ref_set (&state_->element, element);
-  state_->begin_interval (element, nullptr);
+  {
+    std::lock_guard guard (state_->reporting);
+    state_->previous.clear ();
+    state_->since = gst_util_get_timestamp ();
+  }
   std::lock_guard guard (state_->lock);
+  state_->n_latencies = 0;
   state_->views = 0;
   state_->collect = collect;
   state_->schedule (state_);

@@ -3,8 +3,8 @@
  * SECTION:element-plyenc
  * @title: plyenc
  *
- * Encodes each frame set as a point cloud: one binary PLY or PCD file per buffer, in world
- * coordinates and metres, for multifilesink.
+ * Encodes each frame set as a point cloud: one binary PLY or PCD file per buffer, as downstream's
+ * caps name it, in world coordinates and metres, for multifilesink.
  *
  * ## Example launch line
  * |[
@@ -13,7 +13,7 @@
  *
  * Since: 0.1
  */
-#include "gstplyenc.h"
+#include <gst/base/gstbasetransform.h>
 
 #include "common/elementproperties.hpp"
 #include "common/streamlock.hpp"
@@ -21,10 +21,7 @@
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
-#include <memory>
 #include <mutex>
-#include <new>
-#include <rangecast/base/guarded.hpp>
 #include <rangecast/geometry/point_cloud.hpp>
 
 GST_DEBUG_CATEGORY_STATIC (gst_ply_enc_debug);
@@ -32,29 +29,16 @@ GST_DEBUG_CATEGORY_STATIC (gst_ply_enc_debug);
 
 using rangecast::PointCloudFormat;
 
-namespace {
-
-/* Output formats that may be negotiated. */
-enum class Choice { kAuto, kPly, kPcd };
-
-struct PlyEncSettings {
-  PointCloudFormat format; /* kind: not used */
-  Choice choice = Choice::kAuto;
-};
-
-} // namespace
-
 struct GstPlyEncPrivate {
-  std::mutex lock; /* guards settings, choice, started */
-  PlyEncSettings settings;
-  Choice choice = Choice::kAuto; /* of the stream: settings.choice at start */
-  bool started = false;
+  std::mutex lock;           /* guards settings */
+  PointCloudFormat settings; /* `kind` is that of the output caps */
 
   /* streaming thread */
-  PointCloudFormat::Kind kind = PointCloudFormat::kPly; /* of the output caps */
   gstrange::RangeInfo info;
   guint64 frames = 0; /* since start or flush */
 };
+
+G_DECLARE_FINAL_TYPE (GstPlyEnc, gst_ply_enc, GST, PLY_ENC, GstBaseTransform)
 
 struct _GstPlyEnc {
   GstBaseTransform parent;
@@ -67,38 +51,22 @@ static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
     "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS ("application/x-ply; application/x-pcd"));
 
 G_DEFINE_TYPE (GstPlyEnc, gst_ply_enc, GST_TYPE_BASE_TRANSFORM)
-GST_ELEMENT_REGISTER_DEFINE (plyenc, "plyenc", GST_RANK_NONE, GST_TYPE_PLY_ENC)
+GST_ELEMENT_REGISTER_DEFINE (plyenc, "plyenc", GST_RANK_NONE, gst_ply_enc_get_type ())
 
 static PointCloudFormat
 current_format (GstPlyEncPrivate *priv)
 {
   std::lock_guard guard (priv->lock);
-  PointCloudFormat format = priv->settings.format;
-  format.kind = priv->kind;
-  return format;
+  return priv->settings;
 }
 
-/* Of the output; PLY is the first where both are possible. */
-static GstCaps *
-possible_caps (GstPlyEncPrivate *priv)
-{
-  std::lock_guard guard (priv->lock);
-  switch (priv->started ? priv->choice : priv->settings.choice) {
-    case Choice::kPly:
-      return gst_caps_new_empty_simple ("application/x-ply");
-    case Choice::kPcd:
-      return gst_caps_new_empty_simple ("application/x-pcd");
-    default:
-      return gst_static_pad_template_get_caps (&src_template);
-  }
-}
-
+/* Of the output PLY is the first, where both are possible. */
 static GstCaps *
 gst_ply_enc_transform_caps (
-    GstBaseTransform *base, GstPadDirection direction, GstCaps *, GstCaps *filter)
+    GstBaseTransform *, GstPadDirection direction, GstCaps *, GstCaps *filter)
 {
-  GstCaps *other = direction == GST_PAD_SRC ? gst_static_pad_template_get_caps (&sink_template)
-                                            : possible_caps (GST_PLY_ENC (base)->priv);
+  GstCaps *other =
+      gst_static_pad_template_get_caps (direction == GST_PAD_SRC ? &sink_template : &src_template);
   if (!filter)
     return other;
   GstCaps *filtered = gst_caps_intersect_full (filter, other, GST_CAPS_INTERSECT_FIRST);
@@ -106,47 +74,19 @@ gst_ply_enc_transform_caps (
   return filtered;
 }
 
-/* `location` of the sink that is linked, as filesink and multifilesink have it; free with g_free().
- */
-static gchar *
-file_name_of_sink (GstBaseTransform *base)
-{
-  gchar *name = nullptr;
-  GstPad *peer = gst_pad_get_peer (base->srcpad);
-  GstElement *sink = peer ? gst_pad_get_parent_element (peer) : nullptr;
-  GParamSpec *spec =
-      sink ? g_object_class_find_property (G_OBJECT_GET_CLASS (sink), "location") : nullptr;
-  if (spec && spec->value_type == G_TYPE_STRING && (spec->flags & G_PARAM_READABLE))
-    g_object_get (sink, "location", &name, nullptr);
-  gst_clear_object (&sink);
-  gst_clear_object (&peer);
-  return name;
-}
-
-static void
-warn_of_other_name (GstPlyEnc *self)
-{
-  const bool pcd = self->priv->kind == PointCloudFormat::kPcd;
-  gchar *name = file_name_of_sink (GST_BASE_TRANSFORM (self));
-  if (name && g_str_has_suffix (name, pcd ? ".ply" : ".pcd"))
-    GST_ELEMENT_WARNING (self, STREAM, FORMAT,
-        ("%s is written as %s; expected format=%s, or another name", name, pcd ? "PCD" : "PLY",
-            pcd ? "ply" : "pcd"),
-        (nullptr));
-  g_free (name);
-}
-
 static gboolean
 gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
 {
   auto self = GST_PLY_ENC (base);
   GST_INFO_OBJECT (self, "caps %" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
-  self->priv->kind = gst_structure_has_name (gst_caps_get_structure (out, 0), "application/x-pcd")
-                         ? PointCloudFormat::kPcd
-                         : PointCloudFormat::kPly;
-  warn_of_other_name (self);
-  const rangecast::Status status =
-      rangecast::guarded ("plyenc", [&] { return gstrange::parse_caps (in, self->priv->info); });
+  {
+    std::lock_guard guard (self->priv->lock);
+    self->priv->settings.kind =
+        gst_structure_has_name (gst_caps_get_structure (out, 0), "application/x-pcd")
+            ? PointCloudFormat::kPcd
+            : PointCloudFormat::kPly;
+  }
+  const rangecast::Status status = gstrange::parse_caps (in, self->priv->info);
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
@@ -164,11 +104,11 @@ write_file (GstPlyEnc *self, GstBuffer *input, GstBuffer *&output)
   GST_LOG_OBJECT (self, "%zu points, %zu bytes", points, writer.size (points));
   output = gst_buffer_new_allocate (nullptr, writer.size (points), nullptr);
   GstMapInfo map;
-  if (!output || !gst_buffer_map (output, &map, GST_MAP_WRITE))
-    throw std::bad_alloc ();
-  const auto unmap = [&] (GstBuffer *buffer) { gst_buffer_unmap (buffer, &map); };
-  const std::unique_ptr<GstBuffer, decltype (unmap)> mapped (output, unmap);
-  return writer.write (frame.views (), self->priv->info.rig, {map.data, map.size});
+  gst_buffer_map (output, &map, GST_MAP_WRITE);
+  const rangecast::Status status =
+      writer.write (frame.views (), self->priv->info.rig, {map.data, map.size});
+  gst_buffer_unmap (output, &map);
+  return status;
 }
 
 /* Whether downstream, a filesink for example, puts all buffers into one file. */
@@ -197,14 +137,13 @@ gst_ply_enc_prepare_output_buffer (GstBaseTransform *base, GstBuffer *input, Gst
   GstPlyEncPrivate *priv = self->priv;
   if (priv->frames++ == 1 && is_one_file (base)) {
     GST_ELEMENT_ERROR (self, STREAM, WRONG_TYPE,
-        ("a second point cloud would go into the file of the first; expected multifilesink "
-         "location=cloud-%%05d.ply, or a stream of one frame set"),
+        ("a second point cloud would go into the file of the first; use multifilesink "
+         "location=cloud-%%05d.ply, or send one frame set"),
         (nullptr));
     return GST_FLOW_ERROR;
   }
   GstBuffer *buffer = nullptr;
-  const rangecast::Status status =
-      rangecast::guarded ("plyenc", [&] { return write_file (self, input, buffer); });
+  const rangecast::Status status = write_file (self, input, buffer);
   if (!status.ok ()) {
     gst_clear_buffer (&buffer);
     return gst_range_flow_return (GST_ELEMENT (self), status);
@@ -232,11 +171,7 @@ gst_ply_enc_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstB
 static gboolean
 gst_ply_enc_start (GstBaseTransform *base)
 {
-  GstPlyEncPrivate *priv = GST_PLY_ENC (base)->priv;
-  priv->frames = 0;
-  std::lock_guard guard (priv->lock);
-  priv->choice = priv->settings.choice;
-  priv->started = true;
+  GST_PLY_ENC (base)->priv->frames = 0;
   return TRUE;
 }
 
@@ -252,53 +187,24 @@ gst_ply_enc_sink_event (GstBaseTransform *base, GstEvent *event)
 static gboolean
 gst_ply_enc_stop (GstBaseTransform *base)
 {
-  GstPlyEncPrivate *priv = GST_PLY_ENC (base)->priv;
-  {
-    const StreamLock lock (base);
-    priv->info = {};
-  }
-  std::lock_guard guard (priv->lock);
-  priv->started = false;
+  const StreamLock lock (base);
+  GST_PLY_ENC (base)->priv->info = {};
   return TRUE;
 }
 
-#define GST_TYPE_PLY_ENC_FORMAT (gst_ply_enc_format_get_type ())
-static GType
-gst_ply_enc_format_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (Choice::kAuto), "As downstream's caps name it, else PLY", "auto"},
-        {int (Choice::kPly), "PLY, binary", "ply"},
-        {int (Choice::kPcd), "Binary PCD 0.7 (Point Cloud Library)", "pcd"}, {}};
-    return g_enum_register_static ("GstPlyEncFormat", values);
-  }();
-  return type;
-}
-
-static PropertyTable<PlyEncSettings> &
+static PropertyTable<PointCloudFormat> &
 ply_enc_properties ()
 {
-  using S = PlyEncSettings;
-  using F = PointCloudFormat;
+  using S = PointCloudFormat;
   using P = PropertyTable<S>;
   static P table = {
-      P::boolean<&S::format, &F::with_view_id> ("view-id", "View ID",
+      P::boolean<&S::with_view_id> ("view-id", "View ID",
           "Write the view-id of each point as property view_id", kMutablePlaying),
-      P::boolean<&S::format, &F::with_normals> ("normals", "Normals",
+      P::boolean<&S::with_normals> ("normals", "Normals",
           "Write a unit normal for each point, estimated from the neighbouring pixels",
           kMutablePlaying),
-      P::enumeration<&S::choice> (
-          "format", "Format", "Output file format", GST_TYPE_PLY_ENC_FORMAT, kMutableReady),
   };
   return table;
-}
-
-static void
-gst_ply_enc_finalize (GObject *object)
-{
-  delete GST_PLY_ENC (object)->priv;
-  G_OBJECT_CLASS (gst_ply_enc_parent_class)->finalize (object);
 }
 
 static void
@@ -316,7 +222,7 @@ gst_ply_enc_class_init (GstPlyEncClass *klass)
 
   GST_DEBUG_CATEGORY_INIT (gst_ply_enc_debug, "plyenc", 0, "PLY encoder");
 
-  object_class->finalize = gst_ply_enc_finalize;
+  object_class->finalize = delete_private<GstPlyEnc>;
   install_properties<GstPlyEnc, ply_enc_properties> (object_class);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);

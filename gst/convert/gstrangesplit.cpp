@@ -4,19 +4,19 @@
  * @title: rangesplit
  *
  * Converts single views to depth and colour video, at the full size of the view. Request pads:
- * `depth` and `colour` of the view #GstRangeSplit:view-id, `depth_%u` and `colour_%u` of the view
- * with that id. Depth is GRAY16_LE or GRAY16_BE, as downstream takes it, or a picture to look at
+ * `depth` and `colour` of the rig's first view, `depth_%u` and `colour_%u` of the view with that
+ * id. Depth is GRAY16_LE or GRAY16_BE, as downstream takes it, or a picture to look at
  * (#GstRangeSplit:depth-map).
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 avatartestsrc num-buffers=100 ! rangesplit name=s s.colour ! videoconvert !
- * autovideosink s.depth_1 ! queue ! videoconvert ! autovideosink
+ * gst-launch-1.0 avatartestsrc num-buffers=100 ! rangesplit name=s s.colour ! videoconvert ! \
+ *   autovideosink s.depth_1 ! queue ! videoconvert ! autovideosink
  * ]|
  *
  * Since: 0.1
  */
-#include "gstrangesplit.h"
+#include <gst/gst.h>
 
 #include "common/bufferpools.hpp"
 #include "common/elementproperties.hpp"
@@ -51,7 +51,6 @@ constexpr int kFirstView = -1;
 enum class DepthMap { kNone, kGrey, kTurbo };
 
 struct SplitSettings {
-  int view_id = kFirstView;
   bool mask = true;
   DepthMap depth_map = DepthMap::kNone;
 };
@@ -61,7 +60,7 @@ struct SplitSettings {
 struct SplitPad {
   GstPad *pad;
   bool depth;  /* else colour */
-  int view_id; /* kFirstView: that of the property */
+  int view_id; /* or kFirstView */
 
   bool needs_start = true, needs_caps = true, needs_segment = true;
   bool refused = false;  /* downstream's refusal of these caps has been posted */
@@ -98,6 +97,8 @@ struct GstRangeSplitPrivate {
   ~GstRangeSplitPrivate () { gst_flow_combiner_free (combiner); }
 };
 
+G_DECLARE_FINAL_TYPE (GstRangeSplit, gst_range_split, GST, RANGE_SPLIT, GstElement)
+
 struct _GstRangeSplit {
   GstElement parent;
   GstRangeSplitPrivate *priv;
@@ -118,7 +119,7 @@ static GstStaticPadTemplate colour_of_template = GST_STATIC_PAD_TEMPLATE (
     "colour_%u", GST_PAD_SRC, GST_PAD_REQUEST, GST_STATIC_CAPS (COLOUR_CAPS));
 
 G_DEFINE_TYPE (GstRangeSplit, gst_range_split, GST_TYPE_ELEMENT)
-GST_ELEMENT_REGISTER_DEFINE (rangesplit, "rangesplit", GST_RANK_NONE, GST_TYPE_RANGE_SPLIT)
+GST_ELEMENT_REGISTER_DEFINE (rangesplit, "rangesplit", GST_RANK_NONE, gst_range_split_get_type ())
 
 /* ---- negotiation of one pad ---- */
 
@@ -199,7 +200,7 @@ push_caps (GstRangeSplit *self, SplitPad &pad, const View &view, DepthMap map)
         ("pad %s: downstream does not accept %s%s", GST_PAD_NAME (pad.pad),
             gst_video_format_to_string (GST_VIDEO_INFO_FORMAT (&pad.video)),
             pad.depth && map == DepthMap::kNone
-                ? "; depth has 16 bits, property depth-map makes pictures of it"
+                ? "; depth has 16 bits; set depth-map for 8 bits"
                 : ""),
         (nullptr));
   pad.refused = refused;
@@ -215,13 +216,11 @@ static GstFlowReturn
 make_ready (GstRangeSplit *self, SplitPad &pad, const SplitSettings &settings)
 {
   const rangecast::Rig &rig = self->priv->info.rig;
-  const int id = pad.view_id == kFirstView ? settings.view_id : pad.view_id;
-  const View *view = id != kFirstView     ? rig.find (id)
-                     : rig.views.empty () ? nullptr
-                                          : &rig.views[0];
+  const View *view = pad.view_id == kFirstView ? &rig.views[0] : rig.find (pad.view_id);
   if (!view) {
     GST_ELEMENT_ERROR (self, LIBRARY, SETTINGS,
-        ("pad %s: the stream's rig has no view %d", GST_PAD_NAME (pad.pad), id), (nullptr));
+        ("pad %s: the stream's rig has no view %d", GST_PAD_NAME (pad.pad), pad.view_id),
+        (nullptr));
     return GST_FLOW_ERROR;
   }
   if (pad.needs_start) {
@@ -293,7 +292,7 @@ push_view (GstRangeSplit *self, SplitPad &pad, const SplitSettings &settings,
       pad.pad, "view %d, ROI %dx%d", pad.current_view, image.roi.width, image.roi.height);
 
   GstBuffer *out = nullptr;
-  flow = acquire_buffer (GST_ELEMENT (self), pad.pool, "an image", &out);
+  flow = gstrange::acquire (GST_ELEMENT (self), pad.pool, &out);
   if (flow != GST_FLOW_OK)
     return flow;
   GstVideoFrame video;
@@ -413,7 +412,7 @@ gst_range_split_request_new_pad (
     guint64 id = 0;
     if (digits && !g_ascii_string_to_unsigned (
                       digits + 1, 10, 0, guint64 (rangecast::kMaxViews - 1), &id, nullptr)) {
-      GST_ERROR_OBJECT (self, "pad %s: expected a view-id from 0 to 63", name);
+      GST_ERROR_OBJECT (self, "pad %s: needs a view-id of 0 to 63", name);
       return nullptr;
     }
     view_id = static_cast<int> (id);
@@ -490,22 +489,12 @@ split_properties ()
   using S = SplitSettings;
   using P = PropertyTable<S>;
   static P table = {
-      P::number<&S::view_id> ("view-id", "View ID",
-          "view-id shown by the pads depth and colour (-1 = first view of the rig)", kFirstView,
-          rangecast::kMaxViews - 1, kMutablePlaying),
       P::enumeration<&S::depth_map> ("depth-map", "Depth map", "What depth pads show",
           GST_TYPE_RANGE_SPLIT_DEPTH_MAP, kMutablePlaying),
       P::boolean<&S::mask> (
           "mask", "Mask colour", "Make colour black where depth is invalid", kMutablePlaying),
   };
   return table;
-}
-
-static void
-gst_range_split_finalize (GObject *object)
-{
-  delete GST_RANGE_SPLIT (object)->priv;
-  G_OBJECT_CLASS (gst_range_split_parent_class)->finalize (object);
 }
 
 static void
@@ -527,7 +516,7 @@ gst_range_split_class_init (GstRangeSplitClass *klass)
 
   GST_DEBUG_CATEGORY_INIT (gst_range_split_debug, "rangesplit", 0, "Range image splitter");
 
-  object_class->finalize = gst_range_split_finalize;
+  object_class->finalize = delete_private<GstRangeSplit>;
   install_properties<GstRangeSplit, split_properties> (object_class);
 
   for (GstStaticPadTemplate *pad_template :

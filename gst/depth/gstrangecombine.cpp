@@ -10,19 +10,18 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 rangecombine name=c focal-length=525 ! plyenc ! filesink location=cloud.ply
- * filesrc location=colour.jpg ! jpegdec ! videoconvert ! c.colour filesrc location=depth.png !
- * pngdec ! c.depth
+ * gst-launch-1.0 rangecombine name=c focal-length=525 ! plyenc ! filesink location=cloud.ply \
+ *   filesrc location=colour.jpg ! jpegdec ! videoconvert ! c.colour \
+ *   filesrc location=depth.png ! pngdec ! c.depth
  * ]|
  *
  * Since: 0.1
  */
-#include "gstrangecombine.h"
-
 #include "common/bufferpools.hpp"
 #include "common/capsadvice.hpp"
 #include "common/elementproperties.hpp"
 #include "common/matcher.hpp"
+#include "common/videoframereader.hpp"
 #include "viewsettings.hpp"
 
 #include <gst/video/video.h>
@@ -50,6 +49,9 @@ using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::View;
 
+#define GST_TYPE_RANGE_COMBINE (gst_range_combine_get_type ())
+G_DECLARE_FINAL_TYPE (GstRangeCombine, gst_range_combine, GST, RANGE_COMBINE, GstAggregator)
+
 GST_DEBUG_CATEGORY_STATIC (gst_range_combine_debug);
 #define GST_CAT_DEFAULT gst_range_combine_debug
 
@@ -65,8 +67,6 @@ constexpr double kDefaultDepthScale = 0.001;
  */
 constexpr double kDefaultFocalLength = 0.82;
 constexpr double kDefaultFar = 6;
-/* Frames whose depth is looked at: cameras may begin with empty ones. */
-constexpr int kCheckedFrames = 5;
 constexpr double kUsualShare = 0.01; /* of the pixels with depth lies between near and far */
 
 struct CombineSettings {
@@ -92,16 +92,13 @@ struct GstRangeCombinePrivate {
   View view;                                 /* of the output */
   bool registered = true;                    /* colour and depth are registered pixel to pixel */
   rangecast::Registration registration;      /* if not */
-  GstBuffer *unregistered = nullptr;         /* RGBx colour before registration */
   std::vector<guint16> swapped;              /* depth of GRAY16_BE */
-  int frames_to_check = kCheckedFrames;      /* 0: depth was found, or a warning was posted */
-  std::optional<rangecast::DepthRange> out_of_range; /* of the last frame that was checked */
+  bool range_checked = false;                /* a frame with depth has come */
   double depth_scale = kDefaultDepthScale;
   bool has_caps_scale = false;                       /* depth_scale is that of the caps */
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE; /* of the output */
   GstBufferPool *pool = nullptr;
-  GstVideoConverter *converter = nullptr;
-  GstVideoInfo rgbx; /* the converter's output */
+  VideoFrameReader reader; /* of colour */
 };
 
 struct _GstRangeCombine {
@@ -158,7 +155,7 @@ gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, 
 /* ---- negotiation ---- */
 
 /* Whether the calibration, the depth scale and the view-id are those of the caps: properties rig
- * and focal-length replace them; near, far and depth-unit may still change the output. */
+ * and focal-length replace them; near and far may still change the output. */
 static bool
 uses_caps_view (const GstRangeCombinePrivate *priv, const ViewSettings &settings)
 {
@@ -173,10 +170,9 @@ make_depth_view (const GstRangeCombinePrivate *priv, const ViewSettings &setting
   if (uses_caps_view (priv, settings)) {
     view = *priv->depth_view;
     if (view.width != width || view.height != height)
-      return {StatusCode::kBadData, "pad depth is " + size_text (width, height) +
-                                        " but the calibration in its caps is for " +
-                                        size_text (view.width, view.height) +
-                                        "; expected that size, or property rig or focal-length"};
+      return {StatusCode::kBadData,
+          "pad depth is " + size_text (width, height) + " but the calibration in its caps is for " +
+              size_text (view.width, view.height) + "; set property rig or focal-length"};
   } else if (settings.rig.empty ()) {
     const double focal_length =
         settings.focal_length > 0 ? settings.focal_length : kDefaultFocalLength * width;
@@ -200,7 +196,7 @@ make_colour_view (
 {
   if (settings.colour_view_id >= 0) {
     if (settings.view.rig.empty ())
-      return {StatusCode::kBadValue, "property colour-view-id: expected property rig, too: a file "
+      return {StatusCode::kBadValue, "property colour-view-id: set property rig, too, to a file "
                                      "with the poses of both cameras"};
     const Status status = load_view (
         settings.view.rig, settings.colour_view_id, "colour-view-id", width, height, view);
@@ -215,7 +211,7 @@ make_colour_view (
   return {scaled.code (),
       "pad depth is " + size_text (depth.width, depth.height) + " but pad colour is " +
           size_text (width, height) +
-          "; expected the same shape, or property colour-view-id for a colour camera of its own"};
+          "; use images of one shape, or property colour-view-id for a separate camera"};
 }
 
 /* Sets up the views of both cameras and of the output, and the registration between them. */
@@ -241,34 +237,6 @@ configure_views (GstRangeCombinePrivate *priv, const CombineSettings &settings)
   return status.ok () ? rangecast::validate ({{priv->view}}) : status;
 }
 
-static void
-drop_pool_and_converter (GstRangeCombinePrivate *priv)
-{
-  drop_pool (priv->pool);
-  gst_clear_buffer (&priv->unregistered);
-  if (priv->converter)
-    gst_video_converter_free (priv->converter);
-  priv->converter = nullptr;
-}
-
-static bool
-make_converter (GstRangeCombinePrivate *priv)
-{
-  GstVideoInfo &rgbx = priv->rgbx;
-  GstVideoInfo &colour = *priv->colour;
-  gst_video_info_set_format (
-      &rgbx, GST_VIDEO_FORMAT_RGBx, guint (colour.width), guint (colour.height));
-  rgbx.fps_n = colour.fps_n;
-  rgbx.fps_d = colour.fps_d;
-  rgbx.interlace_mode = colour.interlace_mode;
-  if (GST_VIDEO_INFO_FORMAT (&colour) == GST_VIDEO_FORMAT_RGBx)
-    rgbx.colorimetry = colour.colorimetry;
-  priv->converter = gst_video_converter_new (&colour, &rgbx, nullptr);
-  if (!priv->registered)
-    priv->unregistered = gst_buffer_new_allocate (nullptr, GST_VIDEO_INFO_SIZE (&rgbx), nullptr);
-  return priv->converter;
-}
-
 static GstFlowReturn
 negotiate (GstRangeCombine *self)
 {
@@ -286,6 +254,8 @@ negotiate (GstRangeCombine *self)
           gst_range_flow_return (GST_ELEMENT (self), configure_views (priv, settings));
       flow != GST_FLOW_OK)
     return flow;
+  check_field_of_view (GST_ELEMENT (self), settings.view, "the depth images", priv->depth->width,
+      priv->depth->height);
 
   /* There are as many pairs as the slower stream has frames. */
   const GstClockTime colour = frame_duration (priv->colour), depth = frame_duration (priv->depth);
@@ -299,14 +269,14 @@ negotiate (GstRangeCombine *self)
   GST_DEBUG_OBJECT (self, "view %d, %g to %g m, %s", priv->view.id, priv->view.near_m,
       priv->view.far_m,
       priv->registered ? "colour and depth are registered" : "registering colour and depth");
-  drop_pool_and_converter (priv);
+  drop_pool (priv->pool);
   const Status pooled = gstrange::make_pool (caps, priv->pool);
   if (pooled.ok ())
     gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
   gst_caps_unref (caps);
   if (!pooled.ok ())
     return gst_range_flow_return (GST_ELEMENT (self), pooled);
-  if (!make_converter (priv)) {
+  if (!priv->reader.set (*priv->colour)) {
     GST_ELEMENT_ERROR (self, CORE, NEGOTIATION,
         ("pad colour: cannot convert %s to RGBx",
             gst_video_format_to_string (GST_VIDEO_INFO_FORMAT (&*priv->colour))),
@@ -325,89 +295,43 @@ gst_range_combine_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
 
 /* ---- data ---- */
 
-static bool
-convert_colour (
-    GstRangeCombinePrivate *priv, GstBuffer *colour, rangecast::ImageView<rangecast::Rgbx> out)
-{
-  GstVideoFrame from, to = {};
-  if (!gst_video_frame_map (&from, &*priv->colour, colour, GST_MAP_READ))
-    return false;
-  to.info = priv->rgbx;
-  to.info.stride[0] = static_cast<gint> (out.stride);
-  to.data[0] = out.data;
-  gst_video_converter_frame (priv->converter, &from, &to);
-  gst_video_frame_unmap (&from);
-  return true;
-}
-
-/* Writes directly into the planes of the output. */
-static Status
-combine_registered (GstRangeCombinePrivate *priv, GstBuffer *colour,
-    rangecast::ImageView<const std::uint16_t> depth, const RangeImage &image)
-{
-  if (!convert_colour (priv, colour, image.colour))
-    return {StatusCode::kBadData, "pad colour: a buffer is smaller than its caps require"};
-  const double unit = priv->view.depth_unit_m;
-  return rangecast::rescale_depth (depth, priv->depth_scale / unit,
-      rangecast::depth_units (priv->view.near_m, unit),
-      rangecast::depth_units (priv->view.far_m, unit), image.depth);
-}
-
-static Status
-combine_cameras (GstRangeCombinePrivate *priv, GstBuffer *colour,
-    rangecast::ImageView<const std::uint16_t> depth, const RangeImage &image)
-{
-  GstMapInfo map;
-  if (!gst_buffer_map (priv->unregistered, &map, GST_MAP_READWRITE))
-    return {StatusCode::kNoSpace, "pad colour: out of memory"};
-  const rangecast::ImageView<rangecast::Rgbx> unregistered = {
-      reinterpret_cast<rangecast::Rgbx *> (map.data), GST_VIDEO_INFO_WIDTH (&priv->rgbx),
-      GST_VIDEO_INFO_HEIGHT (&priv->rgbx), GST_VIDEO_INFO_PLANE_STRIDE (&priv->rgbx, 0)};
-  Status status{StatusCode::kBadData, "pad colour: a buffer is smaller than its caps require"};
-  if (convert_colour (priv, colour, unregistered))
-    status = priv->registration.process (depth, priv->depth_scale, unregistered, image);
-  gst_buffer_unmap (priv->unregistered, &map);
-  return status;
-}
-
-/* Warns once if the first frames have depth, but hardly any between near and far: most likely
- * depth-scale is wrong, or the image has 8 bits. */
+/* Warns once if the first frame with depth has hardly any between near and far: most likely
+ * depth-scale is wrong, or the image has 8 bits.
+ * @param depth  of the input */
 static void
-warn_of_range (GstRangeCombine *self)
+check_range (
+    GstRangeCombine *self, rangecast::ImageView<const std::uint16_t> depth, const RangeImage &image)
 {
   GstRangeCombinePrivate *priv = self->priv;
-  if (!priv->out_of_range)
+  const rangecast::DepthRange range = rangecast::find_depth_range (depth);
+  if (range.count == 0)
     return;
-  const rangecast::DepthRange range = *std::exchange (priv->out_of_range, std::nullopt);
-  priv->frames_to_check = 0;
+  priv->range_checked = true;
+  if (rangecast::count_points (image) >= kUsualShare * range.count)
+    return;
   GST_ELEMENT_WARNING (self, STREAM, FORMAT,
       ("pad depth: hardly any pixel lies between near (%g m) and far (%g m); values are %d to %d, "
-       "with depth-scale=%g %g to %g m; expected another %snear or far",
+       "with depth-scale=%g %g to %g m; change %snear or far",
           priv->view.near_m, priv->view.far_m, range.min, range.max, priv->depth_scale,
           range.min * priv->depth_scale, range.max * priv->depth_scale,
           priv->has_caps_scale ? "" : "depth-scale, "),
       (nullptr));
 }
 
-/* @param depth  of the input */
-static void
-check_range (
-    GstRangeCombine *self, rangecast::ImageView<const std::uint16_t> depth, const RangeImage &image)
+/* The colour that the reader has open, and depth of either byte order made little-endian. */
+static Status
+combine_images (GstRangeCombinePrivate *priv, rangecast::ImageView<const std::uint16_t> depth,
+    const RangeImage &image)
 {
-  GstRangeCombinePrivate *priv = self->priv;
-  if (priv->frames_to_check == 0)
-    return;
-  const rangecast::DepthRange range = rangecast::find_depth_range (depth);
-  if (range.count == 0)
-    return;
-  if (rangecast::count_points (image) >= kUsualShare * range.count) {
-    priv->frames_to_check = 0;
-    priv->out_of_range.reset ();
-    return;
-  }
-  priv->out_of_range = range;
-  if (--priv->frames_to_check == 0)
-    warn_of_range (self);
+  const auto colour = priv->reader.view ();
+  if (!priv->registered)
+    return priv->registration.process (depth, priv->depth_scale, colour, image);
+  for (int y = 0; y < colour.height; y++)
+    std::copy_n (colour.row (y), colour.width, image.colour.row (y));
+  const double unit = priv->view.depth_unit_m;
+  return rangecast::rescale_depth (depth, priv->depth_scale / unit,
+      rangecast::depth_units (priv->view.near_m, unit),
+      rangecast::depth_units (priv->view.far_m, unit), image.depth);
 }
 
 static Status
@@ -431,9 +355,11 @@ combine (GstRangeCombine *self, GstBuffer *colour, GstBuffer *depth, GstBuffer *
     rangecast::swap_bytes (picture, little);
     picture = {little.data, little.width, little.height, little.stride};
   }
-  const auto work = priv->registered ? combine_registered : combine_cameras;
-  const Status status = work (priv, colour, picture, frame.views ()[0]);
-  if (status.ok ())
+  Status status{StatusCode::kBadData, "pad colour: a buffer is smaller than its caps require"};
+  if (priv->reader.open (colour))
+    status = combine_images (priv, picture, frame.views ()[0]);
+  priv->reader.close ();
+  if (status.ok () && !priv->range_checked)
     check_range (self, picture, frame.views ()[0]);
   gst_video_frame_unmap (&from);
   return status;
@@ -485,8 +411,6 @@ gst_range_combine_aggregate (GstAggregator *aggregator, gboolean timeout)
   const GstClockTime duration =
       std::min (frame_duration (priv->colour), frame_duration (priv->depth));
   GstFlowReturn flow = priv->matcher->next (gstrange::pairing_tolerance (duration), timeout);
-  if (flow == GST_FLOW_EOS) /* of fewer frames than are looked at */
-    warn_of_range (self);
   if (flow != GST_FLOW_OK)
     return flow;
   if (priv->negotiate)
@@ -513,8 +437,7 @@ gst_range_combine_start (GstAggregator *aggregator)
   priv->depth.reset ();
   priv->depth_view.reset ();
   priv->negotiate = true;
-  priv->frames_to_check = kCheckedFrames;
-  priv->out_of_range.reset ();
+  priv->range_checked = false;
   priv->matcher->start ();
   std::lock_guard guard (priv->lock);
   priv->frames = 0;
@@ -533,7 +456,8 @@ gst_range_combine_stop (GstAggregator *aggregator)
 {
   GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
   priv->matcher->stop ();
-  drop_pool_and_converter (priv);
+  priv->reader.reset ();
+  drop_pool (priv->pool);
   return TRUE;
 }
 
@@ -575,18 +499,11 @@ combine_properties ()
           "Output view if colour and depth come from different cameras",
           GST_TYPE_RANGE_COMBINE_INTO, kMutableReady),
       P::number<&S::view, &V::focal_length> ("focal-length", "Focal length",
-          "Focal length in pixels, without a rig (0 = 0.82 of the width)", 0, 1e6, kMutableReady),
-      P::number<&S::view, &V::principal_x> ("principal-x", "Principal point x",
-          "Horizontal principal point in pixels, without a rig (-1 = centre)", -1, 1e6,
-          kMutableReady),
-      P::number<&S::view, &V::principal_y> ("principal-y", "Principal point y",
-          "Vertical principal point in pixels, without a rig (-1 = centre)", -1, 1e6,
-          kMutableReady),
+          "Focal length in pixels of the depth images, without a rig (0 = 0.82 of their width)", 0,
+          1e6, kMutableReady),
       P::number<&S::depth_scale> ("depth-scale", "Depth scale",
           "Metres per unit of the input depth (ignored where the caps carry the calibration)", 1e-7,
           1, kMutableReady),
-      P::number<&S::view, &V::depth_unit> ("depth-unit", "Depth unit",
-          "Metres per depth unit of the output (0 = from the rig, or 0.0001)", 0, 1, kMutableReady),
       P::number<&S::view, &V::near> ("near", "Near",
           "Nearest valid depth in metres (0 = from the rig, or 0.3)", 0, 1e4, kMutableReady),
       P::number<&S::view, &V::far> ("far", "Far",
@@ -601,13 +518,6 @@ make_stats (const GstRangeCombinePrivate *priv)
   return gst_structure_new ("application/x-rangecombine-stats", "frames", G_TYPE_UINT64,
       priv->frames, "dropped-colour", G_TYPE_UINT64, priv->matcher->dropped (0), "dropped-depth",
       G_TYPE_UINT64, priv->matcher->dropped (1), nullptr);
-}
-
-static void
-gst_range_combine_finalize (GObject *object)
-{
-  delete GST_RANGE_COMBINE (object)->priv;
-  G_OBJECT_CLASS (gst_range_combine_parent_class)->finalize (object);
 }
 
 static void
@@ -628,7 +538,7 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
 
   GST_DEBUG_CATEGORY_INIT (gst_range_combine_debug, "rangecombine", 0, "Range image combiner");
 
-  object_class->finalize = gst_range_combine_finalize;
+  object_class->finalize = delete_private<GstRangeCombine>;
   install_properties<GstRangeCombine, combine_properties, make_stats> (object_class,
       "Counters since the element was started: frames, dropped-colour, dropped-depth");
 

@@ -13,18 +13,15 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 avatartestsrc empty-frames=30 num-buffers=100 ! roiextract background-frames=30 !
- * rangesplit name=s depth-map=turbo s.depth ! videoconvert ! autovideosink
+ * gst-launch-1.0 avatartestsrc empty-frames=30 num-buffers=100 ! roiextract \
+ *   background-frames=30 ! rangesplit name=s depth-map=turbo s.depth ! videoconvert ! autovideosink
  * ]|
  *
  * Since: 0.1
  */
-#include "gstroiextract.h"
-
 #include "common/controlledvalues.hpp"
 #include "common/elementproperties.hpp"
 #include "common/streamlock.hpp"
-#include "roisettings.hpp"
 
 #include <array>
 #include <atomic>
@@ -43,11 +40,15 @@
 #include <string>
 
 using rangecast::BackgroundModel;
+using rangecast::Cue;
 using rangecast::RangeImage;
 using rangecast::Roi;
 using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::View;
+
+#define GST_TYPE_ROI_EXTRACT (gst_roi_extract_get_type ())
+G_DECLARE_FINAL_TYPE (GstRoiExtract, gst_roi_extract, GST, ROI_EXTRACT, GstBaseTransform)
 
 GST_DEBUG_CATEGORY_STATIC (gst_roi_extract_debug);
 #define GST_CAT_DEFAULT gst_roi_extract_debug
@@ -68,12 +69,25 @@ namespace {
 constexpr double kMinAdaptInterval = 0.2;
 /* Margin of the region requested from upstream around the foreground's bounding box, pixels. */
 constexpr int kRequestMargin = 16;
-/* Number of frames since learning that are foreground on so much of the picture before that is
- * reported. Nobody fills as much of it from the first frame on. */
+/* Frames since learning that are nearly all foreground: nobody fills the picture from the start. */
 constexpr int kSuspectFrames = 60;
 /* Shares of the picture, and of its pixels with depth. Both must be exceeded: before a background
  * without texture, all pixels with depth may be those of the person. */
 constexpr double kSuspectShare = 0.65, kSuspectShareOfDepth = 0.9;
+/* Within a minute, people move the edges of the foreground, or its area. */
+constexpr guint64 kStillNs = 60 * GST_SECOND;
+constexpr double kStillPixels = 2, kStillShare = 0.02;
+
+/** roiextract's properties. Guarded by the element's lock. */
+struct RoiSettings {
+  int background_frames = 30; ///< frames of the empty scene to learn the background from
+  int settle_frames = 0;      ///< frames to skip before learning
+  std::string background_file, save_background; ///< empty: none
+  rangecast::SegmentationSettings segmentation;
+  int margin = 0;           ///< around the foreground, pixels
+  int n_threads = 0;        ///< 0 = one per core
+  double adapt_time_s = 30; ///< seconds; 0 = never
+};
 
 /* One view of the stream. */
 struct ViewState {
@@ -83,10 +97,14 @@ struct ViewState {
   int learning_target = 0; /* frames */
   int settled = 0;         /* frames skipped before learning */
   int reported = -1;       /* frames learnt when progress was last reported */
-  int suspect = 0;         /* frames since learning, all foreground; -1: there was another */
-  guint64 adapted_ns = 0;  /* capture time of the frame of the last adaptation */
-  int adapted_area = 0;    /* pixels of its ROI */
-  Roi requested;           /* from upstream; empty: everything */
+  int suspect = 0;         /* frames since learning, all foreground; < 0: there was another */
+  bool warned = false;     /* of foreground that may be the room */
+  Roi still;               /* the foreground's box at still_ns, about the same since */
+  guint64 still_ns = 0;
+  double still_points = 0;
+  guint64 adapted_ns = 0; /* capture time of the frame of the last adaptation */
+  int adapted_area = 0;   /* pixels of its ROI */
+  Roi requested;          /* from upstream; empty: everything */
 
   /* results of the current frame */
   guint64 points_in = 0, points_out = 0;
@@ -106,7 +124,6 @@ struct GstRoiExtractPrivate {
   std::atomic<bool> relearn{false}; /* set by capture-background */
 
   /* streaming thread */
-  std::string unsaved; /* file that could not be written; reported once */
   gstrange::RangeInfo info;
   std::array<std::unique_ptr<ViewState>, rangecast::kMaxViews> views;
 };
@@ -142,6 +159,7 @@ begin_learning (ViewState &state, const View &view, int frames)
   state.learnt = false;
   state.reported = -1;
   state.suspect = 0;
+  state.warned = false;
 }
 
 /* ---- caps ---- */
@@ -188,7 +206,7 @@ load_background_file (GstRoiExtractPrivate *priv, const std::string &path)
     if (model.width () != view.width || model.height () != view.height)
       return {StatusCode::kBadSize,
           path + ": the background of view " + std::to_string (view.id) + " is " +
-              rangecast::size_text (model.width (), model.height ()) + ", expected " +
+              rangecast::size_text (model.width (), model.height ()) + ", but the caps say " +
               rangecast::size_text (view.width, view.height)};
     ViewState &state = *priv->views[view.id];
     state.background = std::move (found->second);
@@ -349,7 +367,7 @@ check_save_path (const std::string &path)
 static void
 save_when_all_learnt (GstRoiExtract *self, const std::string &path)
 {
-  if (path.empty () || path == self->priv->unsaved || !all_learnt (self->priv))
+  if (path.empty () || !all_learnt (self->priv))
     return;
   std::vector<std::pair<int, const BackgroundModel *>> models;
   for (const View &view : self->priv->info.rig.views)
@@ -357,7 +375,6 @@ save_when_all_learnt (GstRoiExtract *self, const std::string &path)
   Status status = check_save_path (path);
   if (status.ok ())
     status = rangecast::save_backgrounds (path, models);
-  self->priv->unsaved = status.ok () ? "" : path;
   if (status.ok ())
     GST_DEBUG_OBJECT (self, "saved the background to %s", path.c_str ());
   gst_range_post_warning (GST_ELEMENT (self), status);
@@ -378,7 +395,7 @@ warn_if_not_learnt (GstRoiExtract *self, const RoiSettings &settings)
         {StatusCode::kNotFound, (file.empty () ? "" : file + ": not written: ") + "view " +
                                     std::to_string (view.id) + " ended after " +
                                     std::to_string (frames) +
-                                    " frames of the background; expected background-frames, " +
+                                    " frames of the background, but background-frames is " +
                                     std::to_string (settings.background_frames)});
     return;
   }
@@ -410,28 +427,33 @@ report_learning (GstRoiExtract *self, ViewState &state, int view_id)
               G_TYPE_INT, frames, "of", G_TYPE_INT, state.learning_target, nullptr)));
 }
 
-/* Warns once if nearly the whole picture has been foreground since the background became known. */
+/* Warns once of foreground that may be the room: nearly all since learning, or what never moves. */
 static void
-check_foreground (GstRoiExtract *self, ViewState &state, int view_id)
+check_foreground (GstRoiExtract *self, ViewState &state, int view_id, guint64 now_ns)
 {
-  if (state.suspect < 0)
-    return;
-  const double pixels = double (state.background.width ()) * double (state.background.height ());
-  const auto foreground = double (state.points_out);
-  if (foreground < kSuspectShare * pixels ||
-      foreground < kSuspectShareOfDepth * double (state.points_in)) {
-    state.suspect = -1;
-    return;
+  const Roi &box = state.box, &was = state.still;
+  const double pixels = double (state.background.width ()) * double (state.background.height ()),
+               points = double (state.points_out);
+  const int moved = std::abs (box.x - was.x) + std::abs (box.y - was.y) +
+                    std::abs (box.width - was.width) + std::abs (box.height - was.height);
+  if (box.empty () || now_ns < state.still_ns || moved > kStillPixels ||
+      std::abs (points - state.still_points) > kStillShare * points) {
+    state.still = box;
+    state.still_ns = now_ns;
+    state.still_points = points;
   }
-  if (++state.suspect < kSuspectFrames)
+  if (points < kSuspectShare * pixels || points < kSuspectShareOfDepth * double (state.points_in))
+    state.suspect = G_MININT;
+  state.suspect++;
+  if (state.warned || (state.suspect < kSuspectFrames && now_ns - state.still_ns < kStillNs))
     return;
-  state.suspect = -1;
+  state.warned = true;
   gst_range_post_warning (GST_ELEMENT (self),
-      {StatusCode::kBadData, "view " + std::to_string (view_id) +
-                                 ": nearly the whole picture differs from the background; expected "
-                                 "one that was learnt from "
-                                 "the empty scene by a camera that has not moved since "
-                                 "(capture-background learns it again)"});
+      {StatusCode::kBadData,
+          "view " + std::to_string (view_id) + ": " + rangecast::size_text (box.width, box.height) +
+              " pixels at " + std::to_string (box.x) + ", " + std::to_string (box.y) +
+              " are foreground all the time; if nobody is there, learn the background again with "
+              "capture-background"});
 }
 
 static void
@@ -449,7 +471,7 @@ after_frame (GstRoiExtract *self, const gstrange::RangeFrameMap &frame, const Ro
         image.view_id, state.points_out, state.points_in, state.box.width, state.box.height);
     if (state.learnt) {
       request_roi (self, state, image.view_id);
-      check_foreground (self, state, image.view_id);
+      check_foreground (self, state, image.view_id, image.capture_time_ns);
       continue;
     }
     report_learning (self, state, image.view_id);
@@ -519,7 +541,6 @@ gst_roi_extract_start (GstBaseTransform *base)
   const Status status = check_save_path (copy_settings (priv).save_background);
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
     return FALSE;
-  priv->unsaved.clear ();
   priv->reporter.start (GST_ELEMENT (base), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->frames = priv->points_in = priv->points_out = 0;
@@ -546,6 +567,83 @@ gst_roi_extract_capture_background (GstRoiExtract *self)
   self->priv->relearn = true;
 }
 
+/* ---- properties ---- */
+
+#define GST_TYPE_ROI_EXTRACT_CUE (gst_roi_extract_cue_get_type ())
+static GType
+gst_roi_extract_cue_get_type (void)
+{
+  static const GType type = [] {
+    static const GEnumValue values[] = {{int (Cue::kBoth), "Depth and colour", "both"},
+        {int (Cue::kColour), "Colour only", "colour"}, {int (Cue::kDepth), "Depth only", "depth"},
+        {}};
+    return g_enum_register_static ("GstRoiExtractCue", values);
+  }();
+  return type;
+}
+
+static PropertyTable<RoiSettings> &
+roi_properties ()
+{
+  using S = RoiSettings;
+  using Segmentation = rangecast::SegmentationSettings;
+  using P = PropertyTable<S>;
+  static P table = {
+      P::number<&S::segmentation, &Segmentation::depth_threshold_m> ("depth-threshold",
+          "Depth threshold",
+          "Minimum distance in front of the background in metres at which depth marks a pixel as "
+          "foreground",
+          0, 10, kControllable),
+      P::number<&S::segmentation, &Segmentation::colour_threshold> ("colour-threshold",
+          "Colour threshold",
+          "Minimum chromatic distortion in grey levels at which colour marks a pixel as foreground",
+          0, 255, kControllable),
+      P::number<&S::segmentation, &Segmentation::shadow> ("shadow", "Shadow limit",
+          "Ratio to the background's brightness down to which a pixel may be a shadow", 0, 1,
+          kControllable),
+      P::number<&S::segmentation, &Segmentation::highlight> ("highlight", "Highlight limit",
+          "Ratio to the background's brightness up to which a pixel may be a change of light", 1,
+          10, kControllable),
+      P::number<&S::adapt_time_s> ("adapt-time", "Adaptation time",
+          "Time constant in seconds with which the background follows slow changes (0 = never)", 0,
+          100000, kControllable),
+      P::number<&S::segmentation, &Segmentation::min_area> ("min-area", "Minimum area",
+          "Minimum area of a foreground region in pixels; smaller regions are cleared", 0, 1000000,
+          kControllable),
+      P::number<&S::segmentation, &Segmentation::max_hole> ("max-hole", "Maximum hole area",
+          "Maximum area of a hole in pixels that is closed", 0, 1000000, kControllable),
+      P::number<&S::segmentation, &Segmentation::max_people> ("max-people", "Maximum people",
+          "Number of largest foreground regions to keep (0 = all)", 0, 1000, kControllable),
+      P::number<&S::segmentation, &Segmentation::fill> ("fill", "Depth extrapolation",
+          "Distance in pixels to which depth is extrapolated into foreground without depth; up to "
+          "five times as far where the hue differs from the background (0 = off)",
+          0, 1000, kControllable),
+      P::number<&S::segmentation, &Segmentation::fringe> ("fringe", "Fringe width",
+          "Minimum width in pixels of a region that is nearer than the background but looks like "
+          "it (0 = trust depth at silhouettes, for cameras with exact depth edges)",
+          0, 99, kControllable),
+      P::number<&S::margin> ("margin", "Margin", "Margin added to each side of the ROI in pixels",
+          0, 1000, kControllable),
+      P::number<&S::n_threads> ("n-threads", "Threads",
+          "Number of threads that process views (0 = one per CPU core)", 0, 64, kControllable),
+      P::number<&S::background_frames> ("background-frames", "Background frames",
+          "Number of frames of the empty scene from which to learn the background", 1, 10000,
+          kMutablePlaying),
+      P::number<&S::settle_frames> ("settle-frames", "Settle frames",
+          "Number of frames to skip before learning, while automatic exposure settles", 0, 100000,
+          kMutableReady),
+      P::text<&S::background_file> ("background-file", "Background file",
+          "Background file to load instead of learning (unset = learn)", kMutableReady),
+      P::text<&S::save_background> ("save-background", "Save background",
+          "Background file to write after learning and at EOS (.yml or .yaml)", kMutablePlaying),
+      P::enumeration<&S::segmentation, &Segmentation::cue> ("cue", "Segmentation cue",
+          "What distinguishes foreground from background", GST_TYPE_ROI_EXTRACT_CUE, kControllable),
+      P::boolean<&S::segmentation, &Segmentation::follow_light> ("follow-light", "Follow light",
+          "Compensate brightness and white balance changes of the whole image", kControllable),
+  };
+  return table;
+}
+
 static GstStructure *
 make_stats (const GstRoiExtractPrivate *priv)
 {
@@ -554,13 +652,6 @@ make_stats (const GstRoiExtractPrivate *priv)
       "points-in", G_TYPE_UINT64, priv->points_in, "points-out", G_TYPE_UINT64, priv->points_out,
       "roi-x", G_TYPE_INT, roi.x, "roi-y", G_TYPE_INT, roi.y, "roi-width", G_TYPE_INT, roi.width,
       "roi-height", G_TYPE_INT, roi.height, nullptr);
-}
-
-static void
-gst_roi_extract_finalize (GObject *object)
-{
-  delete GST_ROI_EXTRACT (object)->priv;
-  G_OBJECT_CLASS (gst_roi_extract_parent_class)->finalize (object);
 }
 
 static void
@@ -579,7 +670,7 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
 
   GST_DEBUG_CATEGORY_INIT (gst_roi_extract_debug, "roiextract", 0, "Region of interest extractor");
 
-  object_class->finalize = gst_roi_extract_finalize;
+  object_class->finalize = delete_private<GstRoiExtract>;
   install_properties<GstRoiExtract, roi_properties, make_stats> (object_class,
       "Counters since the element was started: frames, points-in, points-out; and the last ROI "
       "of the first view");

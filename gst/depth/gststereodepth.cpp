@@ -19,15 +19,13 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 avatartestsrc name=c num-buffers=50 c.left ! queue ! d.left c.right ! queue !
- * d.right stereodepth name=d focal-length=320 baseline=0.1 near=0.45 far=1.3 ! rangesplit name=s
- * s.depth ! videoconvert ! autovideosink
+ * gst-launch-1.0 avatartestsrc name=c num-buffers=50 c.left ! queue ! d.left \
+ *   c.right ! queue ! d.right stereodepth name=d focal-length=320 baseline=0.1 near=0.45 far=1.3 \
+ *   ! rangesplit name=s s.depth ! videoconvert ! autovideosink
  * ]|
  *
  * Since: 0.1
  */
-#include "gststereodepth.h"
-
 #include "common/bufferpools.hpp"
 #include "common/capsadvice.hpp"
 #include "common/elementproperties.hpp"
@@ -35,12 +33,11 @@
 #include "common/videoframereader.hpp"
 #include "packedinput.hpp"
 #include "roischedule.hpp"
-#include "stereosettings.hpp"
+#include "viewsettings.hpp"
 
 #include <gst/video/video.h>
 
 #include <algorithm>
-#include <atomic>
 #include <gstrange/gstrange.h>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
@@ -60,6 +57,9 @@ using rangecast::size_text;
 using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::View;
+
+#define GST_TYPE_STEREO_DEPTH (gst_stereo_depth_get_type ())
+G_DECLARE_FINAL_TYPE (GstStereoDepth, gst_stereo_depth, GST, STEREO_DEPTH, GstAggregator)
 
 GST_DEBUG_CATEGORY_STATIC (gst_stereo_depth_debug);
 #define GST_CAT_DEFAULT gst_stereo_depth_debug
@@ -105,7 +105,6 @@ struct GstStereoDepthPrivate {
   /* thread-safe */
   StatsReporter reporter;
   RoiSchedule rois;
-  std::atomic<bool> third_released = false; /* cleared by the streaming thread */
 
   PackedInput packed; /* of pad left; its streaming thread, started and stopped in READY */
 
@@ -114,8 +113,7 @@ struct GstStereoDepthPrivate {
   std::optional<FrameMatcher> matcher;
   GstClockTime capture = 0; /* of the pair: that of the left image */
   Input inputs[3];
-  bool negotiate = true;        /* left or right have new caps */
-  bool negotiate_third = false; /* third has new caps: negotiate with its next image */
+  bool negotiate = true; /* a pad has new caps */
   rangecast::StereoDepth core;
   GstBufferPool *pool = nullptr;
   bool discont = false;                        /* images were dropped since the last pair */
@@ -148,15 +146,6 @@ is_live (GstStereoDepth *self)
 
 /* ---- sink caps ---- */
 
-static void
-apply_release_of_third (GstStereoDepthPrivate *priv)
-{
-  if (!priv->third_released.exchange (false))
-    return;
-  priv->inputs[kThird].info.reset ();
-  priv->negotiate_third = false;
-}
-
 static gboolean
 gst_stereo_depth_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
 {
@@ -169,9 +158,8 @@ gst_stereo_depth_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, G
       return FALSE;
     }
     priv->matcher->watch_links ();
-    apply_release_of_third (priv);
     priv->inputs[side].info = info;
-    (side == kThird ? priv->negotiate_third : priv->negotiate) = true;
+    priv->negotiate = true;
   }
   return GST_AGGREGATOR_CLASS (gst_stereo_depth_parent_class)->sink_event (aggregator, pad, event);
 }
@@ -215,11 +203,9 @@ drop_if_late (GstStereoDepth *self)
 
 /* ---- negotiation ---- */
 
-/* Configures matcher and readers for the caps of all inputs. The third camera may change its size
- * somewhat earlier or later than the others; until then pairs are matched without it.
- * @param has_third  the pair has a third image, whose size must match */
+/* Configures matcher and readers for the caps of all inputs. */
 static Status
-configure_core (GstStereoDepthPrivate *priv, bool has_third)
+configure_core (GstStereoDepthPrivate *priv, bool with_third)
 {
   Input *inputs = priv->inputs;
   const GstVideoInfo &left = *inputs[kLeft].info;
@@ -227,18 +213,13 @@ configure_core (GstStereoDepthPrivate *priv, bool has_third)
   if (!priv->packed.view_size (left, width, height))
     return {StatusCode::kBadSize, "pad left: images of " + size_text (left.width, left.height) +
                                       " do not divide into two views; use an even size"};
-  const auto differs = [&] (Side side) {
-    const auto &info = inputs[side].info;
-    return info && (info->width != (side == kThird ? width : left.width) ||
-                       info->height != (side == kThird ? height : left.height));
-  };
-  for (const Side side : {kRight, kThird})
-    if (differs (side) && (side == kRight || has_third)) {
-      const GstVideoInfo &other = *inputs[side].info;
+  for (int side = kRight; side <= (with_third ? kThird : kRight); side++)
+    if (const GstVideoInfo &other = *inputs[side].info;
+        other.width != (side == kThird ? width : left.width) ||
+        other.height != (side == kThird ? height : left.height))
       return {StatusCode::kBadSize,
           std::string ("pad ") + kPadNames[side] + " is " + size_text (other.width, other.height) +
               " but pad left is " + size_text (width, height) + "; use images of one size"};
-    }
   const View &before = priv->core.range_view ();
   if (before.width != width || before.height != height)
     priv->rois.reset (); /* downstream requests a region again only if the output caps change */
@@ -250,24 +231,26 @@ configure_core (GstStereoDepthPrivate *priv, bool has_third)
   View view;
   if (Status s = make_stereo_view (settings, width, height, view); !s.ok ())
     return s;
-  if (inputs[kThird].info && !view.third)
-    return {StatusCode::kNotFound, "pad third: no calibration of a third camera; expected property "
-                                   "rig with a file that has one in view " +
-                                       std::to_string (view.id)};
-  const bool with_third = inputs[kThird].info && !differs (kThird);
+  if (with_third && !view.third)
+    return {StatusCode::kNotFound, "pad third: set property rig to a file in which view " +
+                                       std::to_string (view.id) + " has a third camera"};
   if (Status s = priv->core.set (view, settings.n_threads, with_third); !s.ok ())
     return s;
   for (int side = kLeft; side <= (with_third ? kThird : kRight); side++)
     if (!inputs[side].reader.set (*inputs[side].info))
       return {StatusCode::kUnsupported, "cannot convert the images to RGBx"};
-  priv->negotiate_third = inputs[kThird].info && !with_third;
   return {};
 }
 
 static GstFlowReturn
-negotiate (GstStereoDepth *self, bool has_third)
+negotiate (GstStereoDepth *self)
 {
   GstStereoDepthPrivate *priv = self->priv;
+  GstPad *third = gst_element_get_static_pad (GST_ELEMENT (self), kPadNames[kThird]);
+  if (!third)
+    priv->inputs[kThird].info.reset (); /* released */
+  gst_clear_object (&third);
+  const bool with_third = priv->inputs[kThird].info.has_value ();
   for (const Side side : {kLeft, kRight})
     if (!priv->inputs[side].info) {
       GST_WARNING_OBJECT (self, "pad %s: frames without caps", kPadNames[side]);
@@ -275,7 +258,7 @@ negotiate (GstStereoDepth *self, bool has_third)
     }
   gstrange::RangeInfo info;
   const Status configured = rangecast::guarded ("stereo", [&] {
-    const Status status = configure_core (priv, has_third);
+    const Status status = configure_core (priv, with_third);
     const GstVideoInfo &left = *priv->inputs[kLeft].info;
     if (status.ok ())
       info = gstrange::make_info ({{priv->core.range_view ()}}, left.fps_n, left.fps_d);
@@ -287,8 +270,13 @@ negotiate (GstStereoDepth *self, bool has_third)
   GST_INFO_OBJECT (self, "output caps %" GST_PTR_FORMAT, caps);
   const View &view = info.rig.views.front ();
   GST_DEBUG_OBJECT (self, "view %d, %g to %g m, focal length %g pixels, %s third camera", view.id,
-      view.near_m, view.far_m, view.intrinsics.fx,
-      priv->inputs[kThird].info && !priv->negotiate_third ? "with" : "without");
+      view.near_m, view.far_m, view.intrinsics.fx, with_third ? "with" : "without");
+  ViewSettings settings;
+  {
+    std::lock_guard guard (priv->lock);
+    settings = priv->settings.view;
+  }
+  check_field_of_view (GST_ELEMENT (self), settings, "the images", view.width, view.height);
   drop_pool (priv->pool);
   const Status status = gstrange::make_pool (caps, priv->pool);
   if (status.ok ())
@@ -388,8 +376,7 @@ push_pair (GstStereoDepth *self, GstBuffer *third)
   if (flow != GST_FLOW_OK)
     return flow;
   reset_after_break (priv);
-  flow = gst_range_flow_return (GST_ELEMENT (self),
-      rangecast::guarded ("stereo", [&] { return match_pair (self, third, output); }));
+  flow = gst_range_flow_return (GST_ELEMENT (self), match_pair (self, third, output));
   for (Input &input : priv->inputs)
     input.reader.close ();
   if (flow != GST_FLOW_OK) {
@@ -425,7 +412,6 @@ gst_stereo_depth_aggregate (GstAggregator *aggregator, gboolean timeout)
 {
   auto self = GST_STEREO_DEPTH (aggregator);
   GstStereoDepthPrivate *priv = self->priv;
-  apply_release_of_third (priv);
   GstFlowReturn flow = priv->matcher->next (
       gstrange::pairing_tolerance (frame_duration (priv->inputs[kLeft].info)), timeout);
   if (flow == GST_FLOW_EOS)
@@ -435,8 +421,8 @@ gst_stereo_depth_aggregate (GstAggregator *aggregator, gboolean timeout)
   priv->capture =
       gstrange::capture_time_of (priv->left, priv->matcher->buffer (kLeft), is_live (self));
   GstBuffer *third = priv->inputs[kThird].info ? priv->matcher->buffer (kThird) : nullptr;
-  if (priv->negotiate || (priv->negotiate_third && third))
-    flow = negotiate (self, third != nullptr);
+  if (priv->negotiate)
+    flow = negotiate (self);
   if (flow == GST_FLOW_OK)
     flow = push_pair (self, third);
   priv->matcher->release ();
@@ -508,13 +494,6 @@ gst_stereo_depth_create_new_pad (
       GST_PAD_SINK, "template", pad_template, nullptr));
 }
 
-static void
-gst_stereo_depth_release_pad (GstElement *element, GstPad *pad)
-{
-  GST_ELEMENT_CLASS (gst_stereo_depth_parent_class)->release_pad (element, pad);
-  GST_STEREO_DEPTH (element)->priv->third_released = true;
-}
-
 /* ---- lifecycle ---- */
 
 static std::vector<StatsRow>
@@ -535,7 +514,6 @@ gst_stereo_depth_start (GstAggregator *aggregator)
   for (Input &input : priv->inputs)
     input.info.reset ();
   priv->negotiate = true;
-  priv->negotiate_third = priv->third_released = false;
   priv->discont = false;
   priv->last_pts = GST_CLOCK_TIME_NONE;
   priv->processing_time = 0;
@@ -599,13 +577,6 @@ make_stats (const GstStereoDepthPrivate *priv)
 }
 
 static void
-gst_stereo_depth_finalize (GObject *object)
-{
-  delete GST_STEREO_DEPTH (object)->priv;
-  G_OBJECT_CLASS (gst_stereo_depth_parent_class)->finalize (object);
-}
-
-static void
 gst_stereo_depth_init (GstStereoDepth *self)
 {
   auto priv = self->priv = new GstStereoDepthPrivate;
@@ -624,7 +595,7 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
 
   GST_DEBUG_CATEGORY_INIT (gst_stereo_depth_debug, "stereodepth", 0, "Stereo depth");
 
-  object_class->finalize = gst_stereo_depth_finalize;
+  object_class->finalize = delete_private<GstStereoDepth>;
   install_properties<GstStereoDepth, stereo_properties, make_stats> (object_class,
       "Counters since the element was started: frames, restricted-frames, third-frames, "
       "dropped-left, dropped-right, dropped-third, dropped-late, match-time (ns)");
@@ -638,7 +609,6 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
       "gst-rangecast");
 
   element_class->change_state = GST_DEBUG_FUNCPTR (gst_stereo_depth_change_state);
-  element_class->release_pad = GST_DEBUG_FUNCPTR (gst_stereo_depth_release_pad);
   aggregator_class->start = GST_DEBUG_FUNCPTR (gst_stereo_depth_start);
   aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_stereo_depth_stop);
   aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_stereo_depth_flush);

@@ -3,19 +3,26 @@
 
 #include <gio/gio.h>
 
-#include <string>
-
 #include "common/realtimepriority.hpp"
 
-using rangecast::Status;
-using rangecast::StatusCode;
-
-namespace {
+/* Posts `error`, if there is one, and frees it. @return whether there is none */
+static bool
+report (GstElement *element, int port, GError *error)
+{
+  if (!error)
+    return true;
+  GST_ELEMENT_ERROR (element, RESOURCE, BUSY,
+      ("clock-port: cannot publish the clock on UDP port %d: %s", port, error->message), (nullptr));
+  g_error_free (error);
+  return false;
+}
 
 /* GstNetTimeProvider binds with SO_REUSEADDR: two on one port would split the requests. */
-Status
-check_free (int port)
+bool
+ClockPublisher::start (GstElement *element, int port)
 {
+  if (port == 0)
+    return true;
   GError *error = nullptr;
   GSocket *socket =
       g_socket_new (G_SOCKET_FAMILY_IPV4, G_SOCKET_TYPE_DATAGRAM, G_SOCKET_PROTOCOL_UDP, &error);
@@ -27,92 +34,44 @@ check_free (int port)
     g_object_unref (any);
     g_object_unref (socket);
   }
-  if (!error)
-    return {};
-  const std::string why = error->message;
-  g_error_free (error);
-  return {StatusCode::kBadValue,
-      "clock-port: expected a free UDP port, got " + std::to_string (port) + " (" + why + ")"};
-}
-
-} // namespace
-
-Status
-ClockPublisher::open (int port, GstClock *clock)
-{
-  if (port != kAnyPort)
-    if (Status s = check_free (port); !s.ok ())
-      return s;
-  /* A provider needs a clock: without one it is inactive, but has the port. */
-  GstClock *provided = clock ? GST_CLOCK (gst_object_ref (clock)) : gst_system_clock_obtain ();
-  GError *error = nullptr;
-  const ScopedRealtimePriority priority; /* its thread inherits it; delays are clock error */
-  provider_ = GST_NET_TIME_PROVIDER (g_initable_new (GST_TYPE_NET_TIME_PROVIDER, nullptr, &error,
-      "clock", provided, "port", port, "active", gboolean (clock != nullptr), nullptr));
-  gst_object_unref (provided);
-  if (!provider_) {
-    const std::string why = error ? error->message : "no socket";
-    g_clear_error (&error);
-    return {StatusCode::kBadValue,
-        "clock-port: cannot publish the clock on UDP port " + std::to_string (port) + ": " + why};
-  }
-  gint actual = 0;
-  g_object_get (provider_, "port", &actual, nullptr);
-  gst_object_replace (reinterpret_cast<GstObject **> (&clock_), GST_OBJECT_CAST (clock));
-  port_ = actual;
-  return {};
-}
-
-void
-ClockPublisher::close ()
-{
-  gst_clear_object (&provider_); /* ends its thread and closes the port */
-  gst_clear_object (&clock_);
-}
-
-static bool
-report (GstElement *element, const Status &status)
-{
-  if (!status.ok ())
-    GST_ELEMENT_ERROR (element, RESOURCE, BUSY, ("%s", status.message ().c_str ()), (nullptr));
-  return status.ok ();
-}
-
-bool
-ClockPublisher::start (GstElement *element, int port)
-{
-  if (port == kOff)
-    return true;
-  GstClock *clock = gst_element_get_clock (element);
-  Status status;
+  if (!report (element, port, error))
+    return false;
   {
     std::lock_guard guard (lock_);
-    status = open (port, clock);
-    started_ = status.ok ();
+    port_ = port;
   }
+  GstClock *clock = gst_element_get_clock (element);
+  set_clock (element, clock);
   gst_clear_object (&clock);
-  return report (element, status);
+  return true;
 }
 
 void
 ClockPublisher::set_clock (GstElement *element, GstClock *clock)
 {
-  Status status;
+  GError *error = nullptr;
+  int port = 0;
   {
     std::lock_guard guard (lock_);
-    if (!started_ || clock == clock_)
+    if (port_ == 0 || clock == clock_)
       return;
-    close (); /* a provider keeps the clock that it was made with; the port stays the same */
-    status = open (port_, clock);
+    gst_clear_object (&provider_); /* it keeps the clock that it was made with */
+    gst_object_replace (reinterpret_cast<GstObject **> (&clock_), GST_OBJECT_CAST (clock));
+    if (!clock)
+      return;
+    port = port_;
+    const ScopedRealtimePriority priority; /* its thread inherits it; delays are clock error */
+    provider_ = GST_NET_TIME_PROVIDER (g_initable_new (
+        GST_TYPE_NET_TIME_PROVIDER, nullptr, &error, "clock", clock, "port", port, nullptr));
   }
-  report (element, status);
+  report (element, port, error);
 }
 
 void
 ClockPublisher::stop ()
 {
   std::lock_guard guard (lock_);
-  close ();
-  started_ = false;
-  port_ = kOff;
+  gst_clear_object (&provider_); /* ends its thread and closes the port */
+  gst_clear_object (&clock_);
+  port_ = 0;
 }

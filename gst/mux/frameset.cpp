@@ -6,39 +6,33 @@
 #include <string>
 #include <utility>
 
+#include "common/codedunits.hpp"
+
 using rangecast::Status;
 using rangecast::StatusCode;
 
 void
-FrameSetJoiner::begin (guint memories, bool coded)
+FrameSetJoiner::begin (bool coded)
 {
   gst_clear_buffer (&frame_set_);
   frame_set_ = gst_buffer_new ();
   coded_ = coded;
-  const guint max = gst_buffer_get_max_memory ();
-  max_shared_ = memories <= max ? max : max - 1; /* the last one is for the copy */
-  size_ = rest_size_ = 0;
-  rest_.clear ();
+  is_key_ = true;
+  size_ = 0;
+  memories_ = 0;
+  parts_.clear ();
 }
 
 bool
 FrameSetJoiner::add (GstBuffer *buffer)
 {
-  if (!coded_ && !gstrange::append_metas (frame_set_, buffer, size_))
+  if (coded_ ? size_ + gst_buffer_get_size (buffer) > writer_.max_size ()
+             : !gstrange::append_metas (frame_set_, buffer, size_))
     return false;
-  if (coded_ && GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT))
-    GST_BUFFER_FLAG_SET (frame_set_, GST_BUFFER_FLAG_DELTA_UNIT);
-  const gsize size = gst_buffer_get_size (buffer);
-  size_ += size;
-  /* After the first one that is copied all are, to keep their order. */
-  if (rest_.empty () &&
-      gst_buffer_n_memory (frame_set_) + gst_buffer_n_memory (buffer) <= max_shared_) {
-    gst_buffer_copy_into (frame_set_, buffer, GST_BUFFER_COPY_MEMORY, 0, gsize (-1));
-    gst_buffer_add_parent_buffer_meta (frame_set_, buffer); /* keeps the memory in its pool */
-  } else {
-    rest_.push_back (buffer);
-    rest_size_ += size;
-  }
+  is_key_ = is_key_ && !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+  size_ += gst_buffer_get_size (buffer);
+  memories_ += gst_buffer_n_memory (buffer);
+  parts_.push_back (buffer);
   return true;
 }
 
@@ -58,33 +52,62 @@ copy_bytes (GstBuffer *buffer, guint8 *&end)
 }
 
 Status
-FrameSetJoiner::copy_rest ()
+FrameSetJoiner::copy_parts ()
 {
-  GstMemory *copy = copies_.acquire (rest_size_);
+  GstMemory *copy = copies_.acquire (size_);
   GstMapInfo map;
   if (!copy)
-    return {StatusCode::kNoSpace, "out of memory for " + std::to_string (rest_size_) +
-                                      " bytes of " + std::to_string (rest_.size ()) + " streams"};
+    return {StatusCode::kNoSpace, "out of memory for " + std::to_string (size_) + " bytes of " +
+                                      std::to_string (parts_.size ()) + " streams"};
   gst_buffer_append_memory (frame_set_, copy);
   bool all = gst_memory_map (copy, &map, GST_MAP_WRITE);
   if (all) {
     guint8 *end = map.data;
-    for (GstBuffer *buffer : rest_)
+    for (GstBuffer *buffer : parts_)
       all = all && copy_bytes (buffer, end);
     gst_memory_unmap (copy, &map);
   }
   return all ? Status{} : Status{StatusCode::kBadData, "cannot map an input buffer"};
 }
 
+/* The slices of all parts; each part's own access-unit unit and rig are left out. */
 Status
-FrameSetJoiner::finish (GstBuffer *&frame_set)
+FrameSetJoiner::write_access_unit (GstClockTime time)
+{
+  if (Status s = writer_.begin (is_key_, size_); !s.ok ())
+    return s;
+  const auto add_slice = [this] (gsize, std::span<const guint8> unit,
+                             const rangecast::UnitHeader &header) {
+    if (header.type == guint8 (rangecast::UnitType::kSlice))
+      writer_.add (unit);
+    return true;
+  };
+  bool all = true;
+  for (GstBuffer *buffer : parts_) {
+    Status damage; /* what follows it is skipped */
+    all = for_each_unit (buffer, add_slice, damage) && all;
+  }
+  gst_buffer_unref (std::exchange (frame_set_, writer_.finish (time)));
+  set_key (frame_set_, is_key_);
+  return all ? Status{} : Status{StatusCode::kBadData, "cannot map an input buffer"};
+}
+
+Status
+FrameSetJoiner::finish (GstClockTime time, GstBuffer *&frame_set)
 {
   Status status;
-  if (rest_size_ > 0)
-    status = copy_rest ();
+  if (coded_)
+    status = write_access_unit (time);
+  else if (memories_ > gst_buffer_get_max_memory ())
+    status = copy_parts ();
+  else
+    for (GstBuffer *buffer : parts_) {
+      gst_buffer_copy_into (frame_set_, buffer, GST_BUFFER_COPY_MEMORY, 0, gsize (-1));
+      gst_buffer_add_parent_buffer_meta (frame_set_, buffer); /* keeps the memory in its pool */
+    }
   if (!status.ok ())
     gst_clear_buffer (&frame_set_);
-  rest_.clear ();
+  parts_.clear ();
   frame_set = std::exchange (frame_set_, nullptr);
   return status;
 }

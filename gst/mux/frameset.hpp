@@ -6,14 +6,15 @@
 #include <rangecast/base/status.hpp>
 #include <vector>
 
+#include "common/accessunitwriter.hpp"
 #include "common/recycledmemories.hpp"
 
-/** Joins buffers of several streams into one, raw ones with their GstRangeMetas.
+/** Joins buffers of several streams into one: raw ones with their GstRangeMetas, coded ones into an
+ *  access unit of their slices, with the rig of all.
  *
- *  A GstBuffer holds gst_buffer_get_max_memory() memories. Up to that number they are shared and
- *  nothing is copied. For more, GStreamer would copy all of them into one memory, and again with
- *  each 16th one. Here all but one of the memories that fit are shared, and the others are copied
- *  once, into a recycled memory. Streaming thread. */
+ *  A GstBuffer holds gst_buffer_get_max_memory() memories. Up to that number raw ones are shared
+ *  and nothing is copied. Of more, GStreamer would copy all into one, and again with each 16th;
+ *  here all are copied once, into a recycled memory. Streaming thread. */
 class FrameSetJoiner {
 public:
   FrameSetJoiner () = default;
@@ -21,27 +22,35 @@ public:
   FrameSetJoiner (const FrameSetJoiner &) = delete;
   FrameSetJoiner &operator= (const FrameSetJoiner &) = delete;
 
-  /** @param memories  number of memories of all buffers of the frame set */
-  void begin (guint memories, bool coded);
+  void set_rig (const gstrange::RangeInfo &info) { writer_.set_rig (info); }
+  void begin (bool coded);
   /** Appends the views of a buffer.
    *  @param buffer  transfer none; must live until finish()
-   *  @return false, and nothing is added, if it is raw and has a view-id that was added before */
+   *  @return false, and nothing is added, if it is raw and has a view-id that was added before, or
+   *  if it would make a coded frame set too long */
   bool add (GstBuffer *buffer);
-  /** @param[out] frame_set  transfer full, without times; nullptr on error
+  /** @param time  in the byte stream of coded ones
+   *  @param[out] frame_set  transfer full, without times; nullptr on error
    *  @return kNoSpace if memory is short, kBadData if a buffer cannot be mapped */
-  rangecast::Status finish (GstBuffer *&frame_set);
+  rangecast::Status finish (GstClockTime time, GstBuffer *&frame_set);
 
   /** Frees the recycled memories. */
-  void drop () { copies_.drop (); }
+  void drop ()
+  {
+    copies_.drop ();
+    writer_.drop ();
+  }
 
 private:
-  rangecast::Status copy_rest ();
+  rangecast::Status copy_parts ();
+  rangecast::Status write_access_unit (GstClockTime time);
 
   GstBuffer *frame_set_ = nullptr;
   bool coded_ = false;
-  guint max_shared_ = 0;          /* memories */
-  gsize size_ = 0;                /* bytes of all buffers */
-  gsize rest_size_ = 0;           /* bytes of rest_ */
-  std::vector<GstBuffer *> rest_; /* to be copied; kept for its memory */
+  bool is_key_ = true;             /* coded */
+  gsize size_ = 0;                 /* bytes of all buffers */
+  guint memories_ = 0;             /* of all buffers */
+  std::vector<GstBuffer *> parts_; /* kept for its memory */
   RecycledMemories copies_;
+  AccessUnitWriter writer_;
 };

@@ -3,20 +3,20 @@
  * SECTION:element-capturesync
  * @title: capturesync
  *
- * Synchronises streams, such as speech and frame sets, by capture time (lip sync): each buffer's
+ * Synchronises streams, such as audio and frame sets, by capture time (lip sync): each buffer's
  * PTS becomes its capture time plus the lag of the slowest stream. What enters at sink_0 leaves at
  * src_0. The capture time is a GstReferenceTimestampMeta, `timestamp/x-range-capture` or
  * `timestamp/x-ntp`; all have to be of one clock.
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 capturesync name=s avatartestsrc is-live=true num-buffers=60 ! s.sink_0 s.src_0 !
- * queue ! rangealign ! striprender ! glimagesink
+ * gst-launch-1.0 capturesync name=s avatartestsrc is-live=true num-buffers=60 ! s.sink_0 \
+ *   s.src_0 ! queue ! rangealign ! striprender ! glimagesink
  * ]|
  *
  * Since: 0.1
  */
-#include "gstcapturesync.h"
+#include <gst/gst.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -47,18 +47,12 @@ constexpr GstClockTime kSilence = 5 * GST_SECOND;
 /* Shares of a difference by which a lag, and the common lag, follow it with each buffer. */
 constexpr gint64 kLagShare = 16, kCommonShare = 64;
 
-struct Settings {
-  GstClockTime max_delay = 2 * GST_SECOND;
-  std::string start_with; /* name of a sink pad; empty: streams begin when they come */
-};
+/* Where lags differ by more, clocks are assumed to differ; nobody waits so long for a live stream.
+ */
+constexpr gint64 kMaxDelay = 2 * GST_SECOND;
 
-/* When buffers of a stream are due. Its lag is the running time of a buffer less its capture time,
- * smoothed, so that it follows a clock that drifts. */
-struct Timing {
-  std::optional<gint64> lag; /* ns */
-  gint64 delay = 0;          /* ns from the last buffer's running time until it is due */
-  guint steps = 0;           /* of the element, when its last buffer came */
-  GstClockTime last = GST_CLOCK_TIME_NONE; /* running time of its last buffer */
+struct Settings {
+  std::string start_with; /* name of a sink pad; empty: streams begin when they come */
 };
 
 /* What enters at a sink pad and leaves at the source pad of the same number. */
@@ -68,12 +62,23 @@ struct Stream {
 
   /* streaming thread of the sink pad only */
   GstSegment segment{};
-  bool warned = false; /* of missing capture times */
-  /* with start-with */
-  bool started = false; /* its segment was sent */
-  bool dropped = false; /* something */
+  bool warned = false;    /* of missing capture times */
+  bool started = false;   /* a segment was sent */
+  GstClockTime start = 0; /* of that segment, where running time is 0 */
 
-  Timing timing{}; /* under the element's lock */
+  /* under the element's lock */
+  std::optional<gint64> lag{}; /* running time less capture time, smoothed, ns: follows drift */
+  gint64 delay = 0;            /* ns from the last buffer's running time until it is due */
+  bool stepped = false;        /* all streams were moved since its last buffer */
+  GstClockTime last = GST_CLOCK_TIME_NONE; /* running time of its last buffer */
+
+  /* Under the lock: it delays no other any more. */
+  void forget_times ()
+  {
+    lag.reset ();
+    delay = 0;
+    last = GST_CLOCK_TIME_NONE;
+  }
 };
 
 } // namespace
@@ -83,8 +88,7 @@ struct GstCaptureSyncPrivate {
   Settings settings;
   std::vector<std::unique_ptr<Stream>> streams;
   std::optional<gint64> common;             /* ns from capture to due, of all streams */
-  guint steps = 0;                          /* how often all streams were moved at once */
-  bool apart = false;                       /* and a warning was posted */
+  bool mismatched = false;                  /* and a warning was posted */
   GstClockTime start = GST_CLOCK_TIME_NONE; /* with start-with: capture time of running time 0 */
   gint64 start_lag = 0;                     /* running time less capture time there */
 
@@ -95,6 +99,8 @@ struct GstCaptureSyncPrivate {
     return found == streams.end () ? nullptr : found->get ();
   }
 };
+
+G_DECLARE_FINAL_TYPE (GstCaptureSync, gst_capture_sync, GST, CAPTURE_SYNC, GstElement)
 
 struct _GstCaptureSync {
   GstElement parent;
@@ -107,7 +113,8 @@ static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src_%u", GST_PAD_SRC, GST_PAD_SOMETIMES, GST_STATIC_CAPS_ANY);
 
 G_DEFINE_TYPE (GstCaptureSync, gst_capture_sync, GST_TYPE_ELEMENT)
-GST_ELEMENT_REGISTER_DEFINE (capturesync, "capturesync", GST_RANK_NONE, GST_TYPE_CAPTURE_SYNC)
+GST_ELEMENT_REGISTER_DEFINE (
+    capturesync, "capturesync", GST_RANK_NONE, gst_capture_sync_get_type ())
 
 static Stream *
 stream_of (GstPad *pad)
@@ -117,175 +124,153 @@ stream_of (GstPad *pad)
 
 /* ---- times ---- */
 
+/* Moves all streams at once. Under the lock. */
 static void
-warn_missing_capture_time (GstCaptureSync *self, Stream &stream, const char *consequence)
+step (GstCaptureSyncPrivate *priv)
 {
-  if (!std::exchange (stream.warned, true))
-    GST_ELEMENT_WARNING (self, STREAM, FORMAT,
-        ("%s: buffers without a capture time %s; expected a GstReferenceTimestampMeta "
-         "timestamp/x-range-capture (frame sets) or timestamp/x-ntp (RTP with the header extension "
-         "ntp-64)",
-            GST_PAD_NAME (stream.sink), consequence),
-        (nullptr));
+  for (const auto &stream : priv->streams)
+    stream->stepped = true;
 }
 
-/* Sets the delay of a stream for a buffer: its capture time plus the lag of the slowest stream is
- * when it is due. Under the lock.
- * @return ns between the quickest and the slowest stream, if they are further apart than max-delay:
- *         none is delayed then; else 0 */
-static gint64
-place (GstCaptureSyncPrivate *priv, Timing &timing, GstClockTime running, GstClockTime capture)
+/* A buffer is due at its capture time plus the lag of the slowest stream; one without a capture
+ * time is delayed as the one before. Under the lock.
+ * @param[out] mismatch  ns between the quickest and the slowest stream, if that is more than
+ * kMaxDelay: none is delayed then
+ * @return running time */
+static GstClockTime
+align (GstCaptureSyncPrivate *priv, Stream &stream, GstClockTime running, GstClockTime capture,
+    gint64 &mismatch)
 {
+  if (!GST_CLOCK_TIME_IS_VALID (running))
+    return running;
+  if (!GST_CLOCK_TIME_IS_VALID (capture))
+    return GstClockTime (std::max<gint64> (0, gint64 (running) + stream.delay));
   const gint64 lag = GST_CLOCK_DIFF (capture, running);
-  if (timing.lag && std::abs (lag - *timing.lag) <= kOtherClock)
-    *timing.lag += (lag - *timing.lag) / kLagShare;
+  if (stream.lag && std::abs (lag - *stream.lag) <= kOtherClock)
+    *stream.lag += (lag - *stream.lag) / kLagShare;
   else
-    timing.lag = lag;
-  timing.last = running;
-  gint64 quickest = *timing.lag, slowest = *timing.lag;
-  for (const auto &stream : priv->streams)
-    if (const Timing &other = stream->timing; other.lag && other.last + kSilence >= running) {
-      quickest = std::min (quickest, *other.lag);
-      slowest = std::max (slowest, *other.lag);
+    stream.lag = lag;
+  stream.last = running;
+  gint64 quickest = *stream.lag, slowest = *stream.lag;
+  for (const auto &other : priv->streams)
+    if (other->lag && other->last + kSilence >= running) {
+      quickest = std::min (quickest, *other->lag);
+      slowest = std::max (slowest, *other->lag);
     }
-  if (guint64 (slowest - quickest) > priv->settings.max_delay) {
+  if (slowest - quickest > kMaxDelay) {
+    mismatch = slowest - quickest;
     priv->common.reset ();
-    priv->steps += timing.delay != 0;
-    timing.delay = 0;
-    return slowest - quickest;
+    if (std::exchange (stream.delay, 0) != 0)
+      step (priv);
+    return running;
   }
   if (!priv->common || std::abs (slowest - *priv->common) > kStep) {
     priv->common = slowest;
-    priv->steps++;
+    step (priv);
   } else {
     *priv->common += (slowest - *priv->common) / kCommonShare;
   }
-  timing.delay = *priv->common - lag;
-  return 0;
+  stream.delay = *priv->common - lag;
+  return GstClockTime (std::max<gint64> (0, gint64 (running) + stream.delay));
 }
 
-/* Sets the buffer's time so that it is due with others of its capture time. */
-static GstBuffer *
-align (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
+/* With start-with: a buffer is due at its capture time less that of the first key frame set (or
+ * packet of audio) of the named pad. Under the lock.
+ * @param[out] mismatch  ns between its clock and that one's, if more than kMaxDelay
+ * @return running time; GST_CLOCK_TIME_NONE: it was captured before, or by another clock */
+static GstClockTime
+time_since_start (GstCaptureSyncPrivate *priv, Stream &stream, GstBuffer *buffer,
+    GstClockTime running, GstClockTime capture, gint64 &mismatch)
+{
+  if (!GST_CLOCK_TIME_IS_VALID (running) || !GST_CLOCK_TIME_IS_VALID (capture))
+    return GST_CLOCK_TIME_NONE;
+  const gint64 lag = GST_CLOCK_DIFF (capture, running);
+  if (!GST_CLOCK_TIME_IS_VALID (priv->start) &&
+      priv->settings.start_with == GST_PAD_NAME (stream.sink) &&
+      !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT)) {
+    priv->start = capture;
+    priv->start_lag = lag;
+  }
+  if (!GST_CLOCK_TIME_IS_VALID (priv->start))
+    return GST_CLOCK_TIME_NONE;
+  if (const gint64 other = std::abs (lag - priv->start_lag); other > kMaxDelay) {
+    mismatch = other;
+    return GST_CLOCK_TIME_NONE;
+  }
+  if (capture < priv->start)
+    return GST_CLOCK_TIME_NONE;
+  stream.delay = GST_CLOCK_DIFF (running, capture - priv->start);
+  return capture - priv->start;
+}
+
+/* When a buffer is due; posts what users are to know. @return running time; GST_CLOCK_TIME_NONE:
+ * the buffer is to be dropped */
+static GstClockTime
+due_time (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
 {
   GstCaptureSyncPrivate *priv = self->priv;
   const GstClockTime capture = capture_time_of (buffer);
   const GstClockTime running =
       gst_segment_to_running_time (&stream.segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
-  if (!GST_CLOCK_TIME_IS_VALID (capture))
-    warn_missing_capture_time (self, stream, "pass as they are");
-  GST_LOG_OBJECT (stream.sink, "captured %" GST_TIME_FORMAT ", running time %" GST_TIME_FORMAT,
-      GST_TIME_ARGS (capture), GST_TIME_ARGS (running));
-  bool stepped = false, newly_apart = false;
-  gint64 delay = 0, apart = 0;
-  {
-    std::lock_guard guard (priv->lock);
-    if (GST_CLOCK_TIME_IS_VALID (capture) && GST_CLOCK_TIME_IS_VALID (running)) {
-      apart = place (priv, stream.timing, running, capture);
-      newly_apart = apart > 0 && !priv->apart;
-      priv->apart = apart > 0;
-      stepped = std::exchange (stream.timing.steps, priv->steps) != priv->steps;
-    }
-    delay = stream.timing.delay;
-  }
-  if (newly_apart)
-    GST_ELEMENT_WARNING (self, STREAM, FAILED,
-        ("The streams are %.1f s apart and pass as they are; synchronise the hosts' clocks, or "
-         "raise max-delay",
-            double (apart) / GST_SECOND),
-        (nullptr));
-  if (stepped)
-    GST_DEBUG_OBJECT (stream.sink, "step: from now on %" GST_STIME_FORMAT " later than it comes",
-        GST_STIME_ARGS (delay));
-  buffer = gst_buffer_make_writable (buffer);
-  const auto shift = [delay] (GstClockTime time) {
-    if (!GST_CLOCK_TIME_IS_VALID (time))
-      return time;
-    return delay < 0 && GstClockTime (-delay) > time ? 0 : time + delay;
-  };
-  GST_BUFFER_PTS (buffer) = shift (GST_BUFFER_PTS (buffer));
-  GST_BUFFER_DTS (buffer) = shift (GST_BUFFER_DTS (buffer));
-  if (stepped)
-    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
-  return buffer;
-}
-
-/* ---- start-with ---- */
-
-/* Where running time 0 is, which the first key frame set (or packet of speech) of the named pad
- * decides. GST_CLOCK_TIME_NONE until then.
- * @param running  of the buffer on the pad, GST_CLOCK_TIME_NONE if unknown
- * @param[out] other_clock  whether the buffer was captured by another clock than the first one */
-static GstClockTime
-find_start (GstCaptureSyncPrivate *priv, const Stream &stream, GstBuffer *buffer,
-    GstClockTime capture, GstClockTime running, bool &other_clock)
-{
-  std::lock_guard guard (priv->lock);
-  if (!GST_CLOCK_TIME_IS_VALID (priv->start) &&
-      priv->settings.start_with == GST_PAD_NAME (stream.sink) &&
-      !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT) &&
-      GST_CLOCK_TIME_IS_VALID (running)) {
-    priv->start = capture;
-    priv->start_lag = GST_CLOCK_DIFF (capture, running);
-  }
-  other_clock = GST_CLOCK_TIME_IS_VALID (priv->start) && GST_CLOCK_TIME_IS_VALID (capture) &&
-                GST_CLOCK_TIME_IS_VALID (running) &&
-                guint64 (ABS (GST_CLOCK_DIFF (capture, running) - priv->start_lag)) >
-                    priv->settings.max_delay;
-  return priv->start;
-}
-
-/* Gives the buffer its time since the start. nullptr: it was captured before that, and is dropped.
- * @param buffer  transfer full */
-static GstBuffer *
-restart (GstCaptureSync *self, Stream &stream, GstBuffer *buffer)
-{
-  const GstClockTime capture = capture_time_of (buffer);
-  if (!GST_CLOCK_TIME_IS_VALID (capture))
-    warn_missing_capture_time (self, stream, "are dropped");
-  bool other_clock = false;
-  const GstClockTime start = find_start (self->priv, stream, buffer, capture,
-      gst_segment_to_running_time (&stream.segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer)),
-      other_clock);
-  if (other_clock || !GST_CLOCK_TIME_IS_VALID (capture) || !GST_CLOCK_TIME_IS_VALID (start) ||
-      capture < start) {
-    GST_DEBUG_OBJECT (stream.sink, "%s: dropping %" GST_PTR_FORMAT,
-        other_clock ? "another clock" : "before the start", buffer);
-    gst_buffer_unref (buffer);
-    stream.dropped = true;
-    return nullptr;
-  }
-  buffer = gst_buffer_make_writable (buffer);
-  GST_BUFFER_PTS (buffer) = capture - start;
-  GST_BUFFER_DTS (buffer) = GST_CLOCK_TIME_NONE;
-  if (!std::exchange (stream.started, true)) {
-    GstSegment segment;
-    gst_segment_init (&segment, GST_FORMAT_TIME);
-    gst_pad_push_event (stream.src, gst_event_new_segment (&segment));
-    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
-  }
-  return buffer;
-}
-
-static void
-warn_if_all_was_dropped (GstCaptureSync *self, const Stream &stream)
-{
-  if (stream.dropped && !stream.started)
-    GST_ELEMENT_WARNING (self, STREAM, FAILED,
-        ("%s: all buffers were dropped; expected buffers with capture times after the first key "
-         "frame set (or packet of speech) of the pad that start-with names",
+  if (!GST_CLOCK_TIME_IS_VALID (capture) && !std::exchange (stream.warned, true))
+    GST_ELEMENT_WARNING (self, STREAM, FORMAT,
+        ("%s: buffers without a capture time are not synchronised (dropped with start-with); they "
+         "need a GstReferenceTimestampMeta timestamp/x-range-capture (frame sets) or "
+         "timestamp/x-ntp (RTP with the header extension ntp-64)",
             GST_PAD_NAME (stream.sink)),
         (nullptr));
-}
-
-static bool
-has_start (GstCaptureSyncPrivate *priv)
-{
-  std::lock_guard guard (priv->lock);
-  return !priv->settings.start_with.empty ();
+  GstClockTime due = GST_CLOCK_TIME_NONE;
+  gint64 mismatch = 0;
+  bool newly_mismatched = false;
+  {
+    std::lock_guard guard (priv->lock);
+    due = priv->settings.start_with.empty ()
+              ? align (priv, stream, running, capture, mismatch)
+              : time_since_start (priv, stream, buffer, running, capture, mismatch);
+    newly_mismatched = mismatch > 0 && !priv->mismatched;
+    /* With start-with each stream is compared by itself: others do not end it. */
+    if (mismatch > 0 || (GST_CLOCK_TIME_IS_VALID (capture) && priv->settings.start_with.empty ()))
+      priv->mismatched = mismatch > 0;
+  }
+  if (newly_mismatched)
+    GST_ELEMENT_WARNING (self, STREAM, FAILED,
+        ("The streams are %.1f s apart and not synchronised; synchronise the hosts' clocks",
+            double (mismatch) / GST_SECOND),
+        (nullptr));
+  GST_LOG_OBJECT (stream.sink,
+      "captured %" GST_TIME_FORMAT ", running time %" GST_TIME_FORMAT ", due %" GST_TIME_FORMAT,
+      GST_TIME_ARGS (capture), GST_TIME_ARGS (running), GST_TIME_ARGS (due));
+  return due;
 }
 
 /* ---- data and events ---- */
+
+/* Before the first buffer or gap; without start-with it begins where the one from upstream does, so
+ * that what precedes that also precedes this. @return whether it was sent now */
+static bool
+send_segment (Stream &stream, bool is_aligned)
+{
+  if (std::exchange (stream.started, true))
+    return false;
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  stream.start = is_aligned ? stream.segment.start : 0;
+  segment.start = stream.start;
+  segment.time = is_aligned ? stream.segment.time : 0;
+  gst_pad_push_event (stream.src, gst_event_new_segment (&segment));
+  return true;
+}
+
+/* @return running time at which a time of the segment is due, delayed as the last buffer was;
+ * GST_CLOCK_TIME_NONE: it is outside the segment. Under the lock. */
+static GstClockTime
+delayed (const Stream &stream, GstClockTime time)
+{
+  const GstClockTime running = gst_segment_to_running_time (&stream.segment, GST_FORMAT_TIME, time);
+  return GST_CLOCK_TIME_IS_VALID (running)
+             ? GstClockTime (std::max<gint64> (0, gint64 (running) + stream.delay))
+             : GST_CLOCK_TIME_NONE;
+}
 
 static GstFlowReturn
 gst_capture_sync_chain (GstPad *pad, GstObject *parent, GstBuffer *buffer)
@@ -294,34 +279,62 @@ gst_capture_sync_chain (GstPad *pad, GstObject *parent, GstBuffer *buffer)
   Stream &stream = *stream_of (pad);
   if (stream.segment.format != GST_FORMAT_TIME) {
     GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-        ("%s: expected a segment of time, got %s", GST_PAD_NAME (pad),
+        ("%s: needs a segment of time, got %s", GST_PAD_NAME (pad),
             gst_format_get_name (stream.segment.format)),
         (nullptr));
     gst_buffer_unref (buffer);
     return GST_FLOW_ERROR;
   }
-  buffer = has_start (self->priv) ? restart (self, stream, buffer) : align (self, stream, buffer);
-  return buffer ? gst_pad_push (stream.src, buffer) : GST_FLOW_OK;
+  const GstClockTime due = due_time (self, stream, buffer);
+  bool is_aligned = false, is_discont = false;
+  GstClockTime dts = GST_CLOCK_TIME_NONE;
+  {
+    std::lock_guard guard (self->priv->lock);
+    is_aligned = self->priv->settings.start_with.empty ();
+    is_discont = std::exchange (stream.stepped, false);
+    if (is_aligned)
+      dts = delayed (stream, GST_BUFFER_DTS (buffer));
+  }
+  if (!GST_CLOCK_TIME_IS_VALID (due) && !is_aligned) {
+    GST_DEBUG_OBJECT (pad, "dropping %" GST_PTR_FORMAT, buffer);
+    gst_buffer_unref (buffer);
+    return GST_FLOW_OK;
+  }
+  is_discont |= send_segment (stream, is_aligned);
+  buffer = gst_buffer_make_writable (buffer);
+  if (GST_CLOCK_TIME_IS_VALID (due))
+    GST_BUFFER_PTS (buffer) = stream.start + due;
+  else if (GST_BUFFER_PTS_IS_VALID (buffer)) /* before the segment, after a seek: what follows needs
+                                                it; sinks clip it */
+    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DECODE_ONLY);
+  GST_BUFFER_DTS (buffer) = GST_CLOCK_TIME_IS_VALID (dts) ? stream.start + dts : dts;
+  if (is_discont)
+    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
+  return gst_pad_push (stream.src, buffer);
 }
 
-/* A gap is due as a buffer would be. */
+/* A gap is due as a buffer would be. @return transfer full; null: there is no time for it */
 static GstEvent *
 move_gap (GstCaptureSync *self, Stream &stream, GstEvent *event)
 {
   GstClockTime time, duration;
+  GstGapFlags flags;
   gst_event_parse_gap (event, &time, &duration);
-  gint64 delay = 0;
+  gst_event_parse_gap_flags (event, &flags);
+  GstClockTime due = GST_CLOCK_TIME_NONE;
+  bool is_aligned = false;
   {
     std::lock_guard guard (self->priv->lock);
-    delay = stream.timing.delay;
+    is_aligned = self->priv->settings.start_with.empty ();
+    if (stream.segment.format == GST_FORMAT_TIME && (stream.started || is_aligned))
+      due = delayed (stream, time);
   }
-  GstEvent *moved =
-      gst_event_new_gap (delay < 0 && GstClockTime (-delay) > time ? 0 : time + delay, duration);
-  GstGapFlags flags;
-  gst_event_parse_gap_flags (event, &flags);
+  if (!GST_CLOCK_TIME_IS_VALID (due))
+    return nullptr;
+  send_segment (stream, is_aligned);
+  GstEvent *moved = gst_event_new_gap (stream.start + due, duration);
   gst_event_set_gap_flags (moved, flags);
   gst_event_set_seqnum (moved, gst_event_get_seqnum (event));
-  gst_event_unref (event);
   return moved;
 }
 
@@ -336,31 +349,25 @@ gst_capture_sync_sink_event (GstPad *pad, GstObject *parent, GstEvent *event)
   Stream &stream = *stream_of (pad);
   switch (GST_EVENT_TYPE (event)) {
     case GST_EVENT_STREAM_START:
-    case GST_EVENT_EOS: { /* holds nobody up any more */
-      if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
-        warn_if_all_was_dropped (self, stream);
+    case GST_EVENT_EOS: {
       std::lock_guard guard (self->priv->lock);
-      stream.timing = {};
+      stream.forget_times ();
       break;
     }
-    case GST_EVENT_SEGMENT:
+    case GST_EVENT_SEGMENT: /* another one comes with the first buffer or gap */
       gst_event_copy_segment (event, &stream.segment);
-      if (!has_start (self->priv))
-        break;
-      gst_event_unref (event); /* another one comes with the first buffer */
+      gst_event_unref (event);
       return TRUE;
-    case GST_EVENT_GAP:
-      if (has_start (self->priv)) {
-        gst_event_unref (event);
-        return TRUE;
-      }
-      event = move_gap (self, stream, event);
-      break;
+    case GST_EVENT_GAP: {
+      GstEvent *moved = move_gap (self, stream, event);
+      gst_event_unref (event);
+      return moved ? gst_pad_push_event (stream.src, moved) : TRUE;
+    }
     case GST_EVENT_FLUSH_STOP: {
       gst_segment_init (&stream.segment, GST_FORMAT_UNDEFINED);
-      std::lock_guard guard (self->priv->lock);
-      stream.timing = {};
       stream.started = false;
+      std::lock_guard guard (self->priv->lock);
+      stream.forget_times ();
       break;
     }
     default:
@@ -469,13 +476,12 @@ gst_capture_sync_change_state (GstElement *element, GstStateChange transition)
   std::lock_guard guard (priv->lock);
   for (const auto &stream : priv->streams) {
     gst_segment_init (&stream->segment, GST_FORMAT_UNDEFINED);
-    stream->warned = stream->started = stream->dropped = false;
-    stream->timing = {};
+    stream->warned = stream->started = stream->stepped = false;
+    stream->forget_times ();
   }
   priv->common.reset ();
-  priv->steps = 0;
   priv->start = GST_CLOCK_TIME_NONE;
-  priv->apart = false;
+  priv->mismatched = false;
   return result;
 }
 
@@ -484,39 +490,12 @@ capture_sync_properties ()
 {
   using P = PropertyTable<Settings>;
   static P table = {
-      P::number<&Settings::max_delay> ("max-delay", "Maximum delay",
-          "Maximum difference in lag between streams in nanoseconds; beyond it their clocks are "
-          "assumed to differ, and timestamps are not changed",
-          0, G_MAXINT64, kMutablePlaying),
       P::text<&Settings::start_with> ("start-with", "Start with",
           "Name of the sink pad whose first key buffer is running time 0, for recordings; what was "
           "captured before is dropped (unset = keep running times)",
           kMutableReady),
   };
   return table;
-}
-
-static GstStructure *
-make_stats (const GstCaptureSyncPrivate *priv)
-{
-  GstStructure *stats = gst_structure_new (
-      "application/x-capturesync-stats", "steps", G_TYPE_UINT64, guint64 (priv->steps), nullptr);
-  for (const auto &stream : priv->streams) {
-    if (!stream->timing.lag)
-      continue;
-    GstStructure *one = gst_structure_new ("stream", "lag", G_TYPE_INT64, *stream->timing.lag,
-        "delay", G_TYPE_INT64, stream->timing.delay, nullptr);
-    gst_structure_set (stats, GST_PAD_NAME (stream->sink), GST_TYPE_STRUCTURE, one, nullptr);
-    gst_structure_free (one);
-  }
-  return stats;
-}
-
-static void
-gst_capture_sync_finalize (GObject *object)
-{
-  delete GST_CAPTURE_SYNC (object)->priv;
-  G_OBJECT_CLASS (gst_capture_sync_parent_class)->finalize (object);
 }
 
 static void
@@ -531,10 +510,8 @@ gst_capture_sync_class_init (GstCaptureSyncClass *klass)
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
 
-  object_class->finalize = gst_capture_sync_finalize;
-  install_properties<GstCaptureSync, capture_sync_properties, make_stats> (object_class,
-      "steps, and a structure for each sink pad: lag (running time less capture time) and delay "
-      "(added to the last buffer's PTS), both int64 in nanoseconds");
+  object_class->finalize = delete_private<GstCaptureSync>;
+  install_properties<GstCaptureSync, capture_sync_properties> (object_class);
 
   element_class->change_state = GST_DEBUG_FUNCPTR (gst_capture_sync_change_state);
   element_class->request_new_pad = GST_DEBUG_FUNCPTR (gst_capture_sync_request_pad);
@@ -542,7 +519,7 @@ gst_capture_sync_class_init (GstCaptureSyncClass *klass)
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Lip sync by capture time", "Generic",
-      "Synchronises streams, such as speech and frame sets, by capture time", "gst-rangecast");
+      "Synchronises streams, such as audio and frame sets, by capture time", "gst-rangecast");
 
   GST_DEBUG_CATEGORY_INIT (gst_capture_sync_debug, "capturesync", 0, "Lip sync by capture time");
 }

@@ -5,20 +5,19 @@
  *
  * Splits a stream of frame sets, raw or coded, into one stream per view; the inverse of rangemux.
  * Pad `src_3` has view 3. Pads are added with caps, whose rig names the views, and removed with a
- * rig that lacks them. Memories are shared, no pixel is copied. A view missing in a frame set is a
- * GAP on its pad.
+ * rig that lacks them. The memories of raw views are shared; coded ones are copied into access
+ * units with their own rig. A view missing in a frame set is a GAP on its pad.
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 avatartestsrc num-buffers=20 ! rangedemux name=d d.src_0 ! queue ! plyenc !
- * multifilesink location=front-%05d.ply d.src_1 ! queue ! fakesink
+ * gst-launch-1.0 avatartestsrc num-buffers=20 ! rangedemux name=d d.src_0 ! queue ! plyenc ! \
+ *   multifilesink location=front-%05d.ply d.src_1 ! queue ! fakesink
  * ]|
  *
  * Since: 0.1
  */
-/* Locking: pads belong to the streaming thread, and to state changes while it does not run.
- * Counters are atomic. */
-#include "gstrangedemux.h"
+/* Pads belong to the streaming thread, and to state changes while it does not run. */
+#include <gst/gst.h>
 
 #include <gst/base/gstflowcombiner.h>
 
@@ -28,42 +27,65 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
-#include <rangecast/geometry/range_image.hpp>
+#include <rangecast/neighbourcode/bitstream/key_check.hpp>
+#include <rangecast/neighbourcode/bitstream/unit.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "codedviews.hpp"
-#include "common/properties.hpp"
-#include "common/statsreporter.hpp"
+#include "common/accessunitwriter.hpp"
+#include "common/codedunits.hpp"
+#include "common/elementproperties.hpp"
 
 using gstrange::RangeInfo;
 using rangecast::kMaxViews;
 using rangecast::Status;
+using rangecast::StatusCode;
 using rangecast::View;
 
 GST_DEBUG_CATEGORY_STATIC (gst_range_demux_debug);
 #define GST_CAT_DEFAULT gst_range_demux_debug
-
-enum { PROP_0, PROP_STATS, PROP_STATS_INTERVAL };
 
 namespace {
 
 struct DemuxPad {
   GstPad *pad = nullptr; /* owned by the element; nullptr: the rig has no such view */
   GstCaps *caps = nullptr;
-  bool fresh = true; /* no buffer was pushed yet */
+  bool fresh = true;       /* no buffer was pushed yet */
+  AccessUnitWriter writer; /* coded */
 };
 
-/* Since start. */
-struct DemuxCounters {
-  std::atomic<guint64> frames, buffers, gaps, dropped;
+/* Finds the slices of each view in a coded frame set; keeps its memory from one to the next. */
+class CodedViews {
+public:
+  /* Reads the headers of all units.
+   * @return kBadData if the buffer cannot be mapped; damaged units are counted, see dropped() */
+  Status read (GstBuffer *frame_set);
+
+  /* Slices with a damaged header. */
+  [[nodiscard]] int dropped () const { return dropped_; }
+  /* Whether view `id`, 0 to 63, has slices in the frame set. */
+  [[nodiscard]] bool has (int id) const { return !views_[id].slices.empty (); }
+  [[nodiscard]] std::span<const guint8> slices (int id) const { return views_[id].slices; }
+  /* Of the view's first slice, ns. */
+  [[nodiscard]] GstClockTime capture_time (int id) const { return views_[id].capture_time; }
+  /* Whether a decoder can begin with the view's slices. */
+  [[nodiscard]] bool is_key (int id) { return views_[id].check.is_key (); }
+
+private:
+  struct OneView {
+    std::vector<guint8> slices;
+    GstClockTime capture_time = GST_CLOCK_TIME_NONE;
+    rangecast::KeyCheck check;
+  };
+
+  std::array<OneView, kMaxViews> views_; /* by view-id */
+  int dropped_ = 0;
 };
 
 } // namespace
 
 struct GstRangeDemuxPrivate {
-  DemuxCounters counters{};
-  StatsReporter reporter; /* has locks of its own */
   /* A bin sends a seek to each of its sinks, and all of them arrive here: one is forwarded. */
   std::atomic<guint32> last_seek = GST_SEQNUM_INVALID;
 
@@ -73,11 +95,14 @@ struct GstRangeDemuxPrivate {
   RangeInfo info;
   bool coded = false;
   bool had_pads = false; /* since start */
-  CodedViews units;      /* of the current frame set, if coded */
+  GstSegment segment{};
+  CodedViews units; /* of the current frame set, if coded */
   guint group_id = GST_GROUP_ID_INVALID;
 
   ~GstRangeDemuxPrivate () { gst_flow_combiner_free (combiner); }
 };
+
+G_DECLARE_FINAL_TYPE (GstRangeDemux, gst_range_demux, GST, RANGE_DEMUX, GstElement)
 
 struct _GstRangeDemux {
   GstElement parent;
@@ -85,8 +110,8 @@ struct _GstRangeDemux {
 };
 
 #define DEMUX_CAPS                                                                                 \
-  GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                \
-                 ", version = (int) 3, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_
+  GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_MEDIA_TYPE ", version = (int) 4, alignment = (string) "   \
+                 "access-unit, " GST_RANGE_SIZE_CAPS
 
 static GstStaticPadTemplate sink_template =
     GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (DEMUX_CAPS));
@@ -94,9 +119,40 @@ static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
     "src_%u", GST_PAD_SRC, GST_PAD_SOMETIMES, GST_STATIC_CAPS (DEMUX_CAPS));
 
 G_DEFINE_TYPE (GstRangeDemux, gst_range_demux, GST_TYPE_ELEMENT)
-GST_ELEMENT_REGISTER_DEFINE (rangedemux, "rangedemux", GST_RANK_NONE, GST_TYPE_RANGE_DEMUX)
+GST_ELEMENT_REGISTER_DEFINE (rangedemux, "rangedemux", GST_RANK_NONE, gst_range_demux_get_type ())
 
 /* ---- data ---- */
+
+Status
+CodedViews::read (GstBuffer *frame_set)
+{
+  for (OneView &view : views_) {
+    view.slices.clear ();
+    view.check.reset ();
+  }
+  dropped_ = 0;
+  Status end;
+  const auto handle = [this] (gsize, std::span<const guint8> unit,
+                          const rangecast::UnitHeader &header) {
+    rangecast::SliceHeader slice;
+    if (header.type != guint8 (rangecast::UnitType::kSlice))
+      return true;
+    if (!rangecast::read_slice_header (unit, slice).ok ()) {
+      dropped_++;
+      return true;
+    }
+    OneView &view = views_[slice.view_id];
+    if (view.slices.empty ())
+      view.capture_time = slice.capture_time_ns;
+    view.check.add (slice);
+    view.slices.insert (view.slices.end (), unit.begin (), unit.end ());
+    return true;
+  };
+  if (!for_each_unit (frame_set, handle, end))
+    return {StatusCode::kBadData, "cannot map a coded frame set"};
+  dropped_ += !end.ok ();
+  return {};
+}
 
 /* Times, flags and reference timestamps; the capture time is the view's own. */
 static void
@@ -115,31 +171,42 @@ copy_metadata (GstBuffer *view, GstBuffer *frame_set, GstClockTime capture)
     gst_range_buffer_set_capture_time (view, capture);
 }
 
+/* A view of a coded frame set, or nullptr if it is missing or memory is short. */
+static GstBuffer *
+make_coded_view (GstRangeDemuxPrivate *priv, GstBuffer *frame_set, int id)
+{
+  AccessUnitWriter &writer = priv->pads[id].writer;
+  if (!priv->units.has (id))
+    return nullptr;
+  const bool key =
+      priv->units.is_key (id) || !GST_BUFFER_FLAG_IS_SET (frame_set, GST_BUFFER_FLAG_DELTA_UNIT);
+  const auto slices = priv->units.slices (id);
+  if (!writer.begin (key, slices.size ()).ok ())
+    return nullptr;
+  writer.add (slices);
+  GstBuffer *view = writer.finish (byte_stream_time (priv->segment, GST_BUFFER_PTS (frame_set)));
+  copy_metadata (view, frame_set, priv->units.capture_time (id));
+  set_key (view, key);
+  return view;
+}
+
 /* One view of the frame set, or nullptr if it is missing. */
 static GstBuffer *
 make_view (GstRangeDemux *self, GstBuffer *frame_set, int id)
 {
   GstRangeDemuxPrivate *priv = self->priv;
+  if (priv->coded)
+    return make_coded_view (priv, frame_set, id);
   GstBuffer *view = nullptr;
   GstClockTime capture = GST_CLOCK_TIME_NONE;
-  if (priv->coded) {
-    if (priv->units.has (id)) {
-      view = priv->units.copy_view (frame_set, id);
-      capture = priv->units.capture_time (id);
-    }
-  } else if (const GstRangeMeta *meta = gst_buffer_get_range_meta (frame_set, guint (id))) {
+  if (const GstRangeMeta *meta = gst_buffer_get_range_meta (frame_set, guint (id))) {
     view = gst_range_buffer_copy_view (frame_set, meta);
     capture = meta->capture_time;
-    if (!view) {
+    if (!view)
       GST_DEBUG_OBJECT (self, "dropping view %d: its planes are not within the buffer", id);
-      priv->counters.dropped++;
-    }
   }
-  if (!view)
-    return nullptr;
-  copy_metadata (view, frame_set, capture);
-  if (priv->coded && priv->units.is_key (id))
-    GST_BUFFER_FLAG_UNSET (view, GST_BUFFER_FLAG_DELTA_UNIT);
+  if (view)
+    copy_metadata (view, frame_set, capture);
   return view;
 }
 
@@ -151,7 +218,6 @@ push_gap (GstRangeDemux *self, GstPad *pad, GstBuffer *frame_set)
   const GstClockTime duration = GST_BUFFER_DURATION_IS_VALID (frame_set)
                                     ? GST_BUFFER_DURATION (frame_set)
                                     : self->priv->info.frame_duration ();
-  self->priv->counters.gaps++;
   GST_LOG_OBJECT (
       pad, "the frame set of %" GST_TIME_FORMAT " lacks the view", GST_TIME_ARGS (time));
   if (GST_CLOCK_TIME_IS_VALID (time))
@@ -172,36 +238,14 @@ push_view (GstRangeDemux *self, GstBuffer *frame_set, int id)
   if (entry.fresh)
     GST_BUFFER_FLAG_SET (view, GST_BUFFER_FLAG_DISCONT);
   entry.fresh = false;
-  self->priv->counters.buffers++;
   GST_LOG_OBJECT (entry.pad, "%" GST_PTR_FORMAT, view);
   return gst_pad_push (entry.pad, view);
-}
-
-/* Views that are not in the rig; they are dropped. */
-static guint64
-count_views_without_pad (const GstRangeDemuxPrivate *priv, GstBuffer *frame_set)
-{
-  guint64 n = 0;
-  if (priv->coded) {
-    for (int id = 0; id < kMaxViews; id++)
-      n += !priv->pads[id].pad && priv->units.has (id);
-    return n;
-  }
-  gpointer state = nullptr;
-  while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (frame_set, &state))
-    n += meta->view_id >= guint (kMaxViews) || !priv->pads[meta->view_id].pad;
-  return n;
 }
 
 static GstFlowReturn
 push_views (GstRangeDemux *self, GstBuffer *frame_set)
 {
   GstRangeDemuxPrivate *priv = self->priv;
-  const guint64 without_pad = count_views_without_pad (priv, frame_set);
-  if (without_pad > 0)
-    GST_DEBUG_OBJECT (
-        self, "dropping %" G_GUINT64_FORMAT " views that are not in the rig", without_pad);
-  priv->counters.dropped += without_pad;
   GstFlowReturn flow = GST_FLOW_OK;
   for (int id = 0; id < kMaxViews; id++) {
     if (!priv->pads[id].pad)
@@ -223,15 +267,10 @@ gst_range_demux_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
   if (flow == GST_FLOW_OK && priv->coded) {
     flow = gst_range_flow_return (GST_ELEMENT (self), priv->units.read (buffer));
     if (priv->units.dropped () > 0)
-      GST_DEBUG_OBJECT (
-          self, "dropping %" G_GUINT64_FORMAT " damaged units", priv->units.dropped ());
-    priv->counters.dropped += priv->units.dropped ();
+      GST_DEBUG_OBJECT (self, "dropping %d damaged units", priv->units.dropped ());
   }
-  if (flow == GST_FLOW_OK) {
-    priv->counters.frames++;
-    priv->reporter.passed (GST_ELEMENT (self), buffer);
+  if (flow == GST_FLOW_OK)
     flow = push_views (self, buffer);
-  }
   gst_buffer_unref (buffer);
   return flow;
 }
@@ -260,6 +299,7 @@ push_caps (GstRangeDemux *self, DemuxPad &entry, const View &view)
   GstCaps *caps = self->priv->coded ? gstrange::make_neighbour_code_caps (info, "access-unit")
                                     : gstrange::make_range_caps (info);
   GST_INFO_OBJECT (entry.pad, "%" GST_PTR_FORMAT, caps);
+  entry.writer.set_rig (info);
   if (!entry.caps || !gst_caps_is_equal (caps, entry.caps))
     gst_pad_push_event (entry.pad, gst_event_new_caps (caps));
   gst_caps_replace (&entry.caps, caps);
@@ -315,6 +355,7 @@ remove_pad (GstRangeDemux *self, DemuxPad &entry)
   gst_element_remove_pad (GST_ELEMENT (self), entry.pad);
   entry.pad = nullptr;
   gst_caps_replace (&entry.caps, nullptr);
+  entry.writer.drop ();
 }
 
 /* New pads are added before old ones are removed, so that an application always has one to show. */
@@ -355,7 +396,6 @@ handle_caps (GstRangeDemux *self, GstPad *sink, GstEvent *event)
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
   priv->coded = coded;
-  priv->reporter.set_views (priv->info.rig);
   update_pads (self, sink);
   return TRUE;
 }
@@ -384,6 +424,9 @@ gst_range_demux_sink_event (GstPad *sink, GstObject *parent, GstEvent *event)
       return handle_caps (self, sink, event);
     case GST_EVENT_STREAM_START:
       return handle_stream_start (self, event);
+    case GST_EVENT_SEGMENT:
+      gst_event_copy_segment (event, &self->priv->segment);
+      break;
     case GST_EVENT_FLUSH_STOP:
       gst_flow_combiner_reset (self->priv->combiner);
       break;
@@ -391,7 +434,6 @@ gst_range_demux_sink_event (GstPad *sink, GstObject *parent, GstEvent *event)
       if (!self->priv->had_pads) /* sinks behind it would wait for EOS forever */
         GST_ELEMENT_ERROR (self, STREAM, DEMUX,
             ("The stream ended before caps with a rig, which names the views"), (nullptr));
-      self->priv->reporter.finish ();
       break;
     default:
       break;
@@ -401,73 +443,25 @@ gst_range_demux_sink_event (GstPad *sink, GstObject *parent, GstEvent *event)
 
 /* ---- life ---- */
 
-static std::vector<StatsRow>
-collect_stats (GstElement *element)
-{
-  const DemuxCounters &counters = GST_RANGE_DEMUX (element)->priv->counters;
-  return {{.counters = {.frames = counters.frames.load (), .lost = counters.gaps.load ()}}};
-}
-
 static GstStateChangeReturn
 gst_range_demux_change_state (GstElement *element, GstStateChange transition)
 {
   auto self = GST_RANGE_DEMUX (element);
   GstRangeDemuxPrivate *priv = self->priv;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED) {
-    for (auto *counter : {&priv->counters.frames, &priv->counters.buffers, &priv->counters.gaps,
-             &priv->counters.dropped})
-      *counter = 0;
-    priv->reporter.start (element, collect_stats);
-  }
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS (gst_range_demux_parent_class)->change_state (element, transition);
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) { /* no streaming thread runs any more */
-    priv->reporter.stop ();
     for (DemuxPad &entry : priv->pads)
       if (entry.pad)
         remove_pad (self, entry);
     gst_flow_combiner_reset (priv->combiner);
     priv->info = {};
+    priv->segment = {};
     priv->had_pads = false;
     priv->group_id = GST_GROUP_ID_INVALID;
     priv->last_seek = GST_SEQNUM_INVALID;
   }
   return result;
-}
-
-static void
-gst_range_demux_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  if (id == PROP_STATS_INTERVAL)
-    GST_RANGE_DEMUX (object)->priv->reporter.set_interval (g_value_get_uint (value));
-  else
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_range_demux_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  const DemuxCounters &counters = GST_RANGE_DEMUX (object)->priv->counters;
-  if (id == PROP_STATS)
-    g_value_take_boxed (
-        value, gst_structure_new ("application/x-rangedemux-stats", "frames", G_TYPE_UINT64,
-                   counters.frames.load (), "buffers", G_TYPE_UINT64, counters.buffers.load (),
-                   "gaps", G_TYPE_UINT64, counters.gaps.load (), "dropped", G_TYPE_UINT64,
-                   counters.dropped.load (), nullptr));
-  else if (id == PROP_STATS_INTERVAL)
-    g_value_set_uint (value, GST_RANGE_DEMUX (object)->priv->reporter.interval ());
-  else
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_range_demux_finalize (GObject *object)
-{
-  GstRangeDemuxPrivate *priv = GST_RANGE_DEMUX (object)->priv;
-  for (DemuxPad &entry : priv->pads)
-    gst_caps_replace (&entry.caps, nullptr);
-  delete priv;
-  G_OBJECT_CLASS (gst_range_demux_parent_class)->finalize (object);
 }
 
 static void
@@ -486,15 +480,7 @@ gst_range_demux_class_init (GstRangeDemuxClass *klass)
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
 
-  object_class->set_property = gst_range_demux_set_property;
-  object_class->get_property = gst_range_demux_get_property;
-  object_class->finalize = gst_range_demux_finalize;
-
-  install_stats (object_class, PROP_STATS,
-      "Counters since the element was started: frames, buffers, gaps, dropped");
-
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
-
+  object_class->finalize = delete_private<GstRangeDemux>;
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "Range demultiplexer", "Demuxer/Video",

@@ -5,8 +5,9 @@
  *
  * Combines the views of several streams, all raw or all coded, into frame sets by capture time. In
  * a live pipeline it waits for late streams up to #GstAggregator:latency, continues without streams
- * that are gone and includes them again when they return. Frame sets of up to 16 memories share
- * them without copying; of more, the first 15 are shared and the others copied once.
+ * that are gone and includes them again when they return. Raw frame sets of up to 16 memories share
+ * them without copying; of more, all are copied once. Coded ones are copied into an access unit
+ * with the rig of all views.
  *
  * Recordings are aligned by capture time, independently of their PTS.
  *
@@ -15,8 +16,9 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 rangemux name=m ! rangealign ! cylinderfilter ! plyenc ! multifilesink location=cloud-%05d.ply
- * avatartestsrc view-id=0 num-buffers=10 ! m. avatartestsrc view-id=1 num-buffers=10 ! m.
+ * gst-launch-1.0 rangemux name=m ! rangealign ! cylinderfilter ! plyenc ! \
+ *   multifilesink location=cloud-%05d.ply \
+ *   avatartestsrc view-id=0 num-buffers=10 ! m. avatartestsrc view-id=1 num-buffers=10 ! m.
  * ]|
  *
  * Since: 0.1
@@ -24,15 +26,15 @@
 /* What happens to a buffer, in the order of this file; all of it in aggregate(), in the streaming
  * thread:
  *  1. It waits at its pad: StreamTimes::peek().
- *  2. Its stream is chosen for frame sets, or left out: find_silent(), negotiate().
+ *  2. Its stream is chosen for frame sets, or skipped: find_silent(), negotiate().
  *  3. It is dropped if no frame set can contain it, because it is late, of another clock or of a
- *     stream that is left out: drop_unusable().
+ *     stream that is skipped: drop_unusable().
  *  4. It waits for buffers of the other streams, until the deadline; then it is joined with those
  *     within max-skew of the oldest one, and pushed: match_streams(), push_frame_set().
  *
  * Locking: the private lock guards what application threads read; it is never held across a push,
  * message or call into GstAggregator. The clock publisher and the statistics have their own. */
-#include "gstrangemux.h"
+#include <gst/base/gstaggregator.h>
 
 #include <algorithm>
 #include <atomic>
@@ -67,12 +69,12 @@ using Head = MatchStream::Head;
 constexpr GstClockTime kMinReportTime = GST_SECOND;
 /* Of the capture times in a frame set, if the frame rate is unknown. */
 constexpr GstClockTime kDefaultTolerance = 5 * GST_MSECOND;
-/* Recordings: a frame whose capture time goes back by no more was reordered. */
-constexpr GstClockTime kMaxReordered = GST_SECOND;
+/* Recordings: frames of a stream that are dropped as late before others go on. */
+constexpr int kMaxLate = 3;
 
 struct Settings {
   GstClockTime max_skew = 0; /* 0: half a frame period */
-  int clock_port = ClockPublisher::kOff;
+  int clock_port = 0;        /* UDP; 0: the clock is not published */
   std::string rig_file;
 };
 
@@ -94,8 +96,6 @@ struct GstRangeMuxPrivate {
   StatsReporter reporter;
   std::atomic<bool> caps_dirty = true; /* choose_streams() is to run again */
 
-  int configured_port = ClockPublisher::kOff; /* between start and stop */
-
   /* streaming thread only; vectors are kept for their memory */
   bool live = false;
   rangecast::Rig rig;               /* of settings.rig_file; empty: any */
@@ -106,6 +106,8 @@ struct GstRangeMuxPrivate {
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
 };
 
+G_DECLARE_FINAL_TYPE (GstRangeMux, gst_range_mux, GST, RANGE_MUX, GstAggregator)
+
 struct _GstRangeMux {
   GstAggregator parent;
   GstRangeMuxPrivate *priv;
@@ -113,7 +115,7 @@ struct _GstRangeMux {
 
 #define MUX_CAPS                                                                                   \
   GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                \
-                 ", version = (int) 3, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_
+                 ", version = (int) 4, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS
 
 static GstStaticPadTemplate sink_template =
     GST_STATIC_PAD_TEMPLATE ("sink_%u", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS (MUX_CAPS));
@@ -121,7 +123,7 @@ static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (MUX_CAPS));
 
 G_DEFINE_TYPE (GstRangeMux, gst_range_mux, GST_TYPE_AGGREGATOR)
-GST_ELEMENT_REGISTER_DEFINE (rangemux, "rangemux", GST_RANK_NONE, GST_TYPE_RANGE_MUX)
+GST_ELEMENT_REGISTER_DEFINE (rangemux, "rangemux", GST_RANK_NONE, gst_range_mux_get_type ())
 
 /* ---- 1. buffers at the pads ---- */
 
@@ -200,6 +202,7 @@ negotiate (GstRangeMux *self, const MuxStreams &streams)
   gst_aggregator_set_src_caps (GST_AGGREGATOR (self), caps);
   gst_caps_unref (caps);
   priv->frame_duration = info.frame_duration ();
+  priv->joiner.set_rig (info);
   priv->reporter.set_views (info.rig);
   return GST_FLOW_OK;
 }
@@ -240,44 +243,29 @@ drop_frame (GstRangeMux *self, MuxStream &stream, StreamState state)
     std::lock_guard guard (priv->lock);
     (state == StreamState::kLate           ? stream.dropped_late
         : state == StreamState::kOutOfSync ? stream.out_of_sync
-                                           : stream.left_out)++;
+                                           : stream.skipped)++;
   }
   set_state (self, stream, state, stream.running);
 }
 
-/* Drops late frames of recordings. @return whether any was dropped */
-static bool
-drop_late (GstRangeMux *self, const MuxStreams &streams)
-{
-  bool any = false;
-  for (const auto &stream : streams)
-    if (stream->late) {
-      drop_frame (self, *stream, StreamState::kLate);
-      any = true;
-    }
-  return any;
-}
-
-/* Here late views are dropped. One of a recording that goes back far is dropped with the next frame
- * set: if those of all others go back, too, the recordings have restarted.
+/* A recording that is late many times may be a loop shorter than others', which would wait for
+ * ever: they go on without it, and its frame is dropped with their frame set.
  * @return whether any was dropped */
 static bool
 drop_unusable (GstRangeMux *self, const MuxStreams &streams)
 {
-  GstRangeMuxPrivate *priv = self->priv;
   bool any = false;
   for (const auto &stream : streams) {
-    if (stream->head != Head::kFrame)
-      continue;
     const StreamState state = classify_frame (*stream);
-    if (state == StreamState::kLate && !priv->live &&
-        stream->time + kMaxReordered < priv->times.last_capture ()) {
-      stream->head = Head::kEnded; /* see drop_late() */
-    } else if (state != StreamState::kIn) {
-      stream->late = false;
-      drop_frame (self, *stream, state);
-      any = true;
+    if (stream->head != Head::kFrame || state == StreamState::kIn)
+      continue;
+    if (state == StreamState::kLate && !self->priv->live && stream->late_in_row++ >= kMaxLate) {
+      stream->head = Head::kEnded;
+      continue;
     }
+    stream->late = false;
+    drop_frame (self, *stream, state);
+    any = true;
   }
   return any;
 }
@@ -290,27 +278,23 @@ static std::size_t
 join_matching (GstRangeMux *self, const MuxStreams &streams, FrameTimes &times)
 {
   GstRangeMuxPrivate *priv = self->priv;
-  guint memories = 0;
   bool coded = false;
   std::size_t number = 0;
   for (const auto &stream : streams)
     if (stream->in_set) {
-      memories += gst_buffer_n_memory (stream->buffer);
       coded = stream->coded;
       number++;
       times.capture = std::min (times.capture, stream->time); /* NONE is the maximum */
     }
-  priv->joiner.begin (memories, coded);
+  priv->joiner.begin (coded);
   for (const auto &stream : streams) {
     if (!stream->in_set)
       continue;
-    if (stream->running < times.running) {
-      times.running = stream->running;
-      times.speed = speed_of (*stream);
-    }
+    times.running = std::min (times.running, stream->running);
     drop_buffer (priv, *stream);
     if (!priv->joiner.add (stream->buffer))
-      GST_WARNING_OBJECT (stream->pad, "dropping a buffer with the view-id of another pad");
+      GST_WARNING_OBJECT (stream->pad, "dropping a buffer: its view-id is that of another pad, or "
+                                       "the frame set is too long");
     set_state (self, *stream, StreamState::kIn, stream->running);
     std::lock_guard guard (priv->lock);
     stream->matched++;
@@ -325,14 +309,18 @@ push_frame_set (GstRangeMux *self, const MuxStreams &streams, GstClockTime toler
   GstRangeMuxPrivate *priv = self->priv;
   FrameTimes times;
   const std::size_t number = join_matching (self, streams, times);
+  for (const auto &stream : streams) {
+    stream->late_in_row = 0;
+    if (stream->late) /* see drop_unusable() */
+      drop_frame (self, *stream, StreamState::kLate);
+  }
+  const GstClockTime running = priv->times.add_frame_set (
+      times, GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration : 2 * tolerance);
   GstBuffer *frame_set = nullptr;
-  const Status status = priv->joiner.finish (frame_set);
+  const Status status = priv->joiner.finish (running, frame_set);
   if (const GstFlowReturn flow = gst_range_flow_return (GST_ELEMENT (self), status);
       flow != GST_FLOW_OK)
     return flow;
-  drop_late (self, streams);
-  const GstClockTime running = priv->times.add_frame_set (
-      times, GST_CLOCK_TIME_IS_VALID (priv->frame_duration) ? priv->frame_duration : 2 * tolerance);
   gstrange::stamp (GST_AGGREGATOR (self), frame_set, running, priv->frame_duration, times.capture);
   GST_LOG_OBJECT (self, "frame set of %zu of %zu streams: %" GST_PTR_FORMAT, number,
       streams.size (), frame_set);
@@ -381,8 +369,6 @@ make_frame_set (GstRangeMux *self, const MuxStreams &streams, bool timeout)
       drop_buffer (priv, *static_cast<MuxStream *> (dropped));
       return GST_AGGREGATOR_FLOW_NEED_DATA;
     case MatchStep::kEnd:
-      if (!priv->live && drop_late (self, streams))
-        return GST_AGGREGATOR_FLOW_NEED_DATA;
       priv->reporter.finish ();
       return GST_FLOW_EOS;
     case MatchStep::kSet:
@@ -522,17 +508,6 @@ gst_range_mux_release_pad (GstElement *element, GstPad *pad)
 
 /* ---- the clock for other hosts ---- */
 
-/* While it is published, the property reads the actual port. */
-static void
-set_port (GstRangeMux *self, int port)
-{
-  {
-    std::lock_guard guard (self->priv->lock);
-    self->priv->settings.clock_port = port;
-  }
-  g_object_notify (G_OBJECT (self), "clock-port");
-}
-
 /* The pipeline selects its clock on the way to PLAYING, and may select another one later. */
 static gboolean
 gst_range_mux_set_clock (GstElement *element, GstClock *clock)
@@ -547,16 +522,16 @@ static GstStructure *
 make_stats (const GstRangeMuxPrivate *priv)
 {
   const Counters &counters = priv->counters;
-  guint64 late = 0, out_of_sync = 0, left_out = 0;
+  guint64 late = 0, out_of_sync = 0, skipped = 0;
   for (const auto &stream : priv->streams) {
     late += stream->dropped_late;
-    left_out += stream->left_out;
+    skipped += stream->skipped;
     out_of_sync += stream->out_of_sync;
   }
   GstStructure *stats = gst_structure_new ("application/x-rangemux-stats", "frames", G_TYPE_UINT64,
       counters.frames, "complete", G_TYPE_UINT64, counters.complete, "incomplete", G_TYPE_UINT64,
       counters.frames - counters.complete, "dropped-late", G_TYPE_UINT64, late, "out-of-sync",
-      G_TYPE_UINT64, out_of_sync, "left-out", G_TYPE_UINT64, left_out, nullptr);
+      G_TYPE_UINT64, out_of_sync, "skipped", G_TYPE_UINT64, skipped, nullptr);
   for (const auto &stream : priv->streams) {
     GstStructure *of_pad = stream->stats ();
     gst_structure_set (stats, GST_PAD_NAME (stream->pad), GST_TYPE_STRUCTURE, of_pad, nullptr);
@@ -604,9 +579,6 @@ gst_range_mux_start (GstAggregator *aggregator)
       return FALSE;
   if (!priv->clock.start (GST_ELEMENT (self), settings.clock_port))
     return FALSE;
-  priv->configured_port = settings.clock_port;
-  if (settings.clock_port != ClockPublisher::kOff)
-    set_port (self, priv->clock.port ());
   priv->reporter.start (GST_ELEMENT (aggregator), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->counters = {};
@@ -621,8 +593,6 @@ gst_range_mux_stop (GstAggregator *aggregator)
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
   priv->reporter.stop ();
   priv->clock.stop ();
-  if (priv->configured_port != ClockPublisher::kOff)
-    set_port (GST_RANGE_MUX (aggregator), priv->configured_port);
   priv->joiner.drop ();
   return TRUE;
 }
@@ -637,22 +607,15 @@ mux_properties ()
           "frame period, or 5 ms if the frame rate is unknown)",
           0, G_MAXINT64, kMutablePlaying),
       P::number<&Settings::clock_port> ("clock-port", "Clock port",
-          "UDP port on which to publish the pipeline clock for GstNetClientClock (-1 = do not "
-          "publish, 0 = any free port, readable once published)",
-          -1, 65535, kMutableReady),
+          "UDP port on which to publish the pipeline clock for GstNetClientClock (0 = do not "
+          "publish)",
+          0, 65535, kMutableReady),
       P::text<&Settings::rig_file> ("rig", "Rig",
-          "Rig file that all streams must agree with; a stream with other cameras is left out when "
+          "Rig file that all streams must agree with; a stream with other cameras is ignored when "
           "live, else it is an error (unset = no check)",
           kMutableReady),
   };
   return table;
-}
-
-static void
-gst_range_mux_finalize (GObject *object)
-{
-  delete GST_RANGE_MUX (object)->priv;
-  G_OBJECT_CLASS (gst_range_mux_parent_class)->finalize (object);
 }
 
 static void
@@ -668,10 +631,10 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto aggregator_class = GST_AGGREGATOR_CLASS (klass);
 
-  object_class->finalize = gst_range_mux_finalize;
+  object_class->finalize = delete_private<GstRangeMux>;
   install_properties<GstRangeMux, mux_properties, make_stats> (object_class,
       "Counters since the element was started: frames, complete, incomplete, dropped-late, "
-      "out-of-sync, left-out, and a structure for each sink pad");
+      "out-of-sync, skipped, and a structure for each sink pad");
 
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &sink_template, GST_TYPE_AGGREGATOR_PAD);

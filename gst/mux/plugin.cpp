@@ -2,7 +2,7 @@
 /**
  * plugin-rangemux:
  *
- * Combines the streams of several range cameras into frame sets, splits them, and keeps speech in
+ * Combines the streams of several range cameras into frame sets, splits them, and keeps audio in
  * sync.
  */
 #include <gst/gst.h>
@@ -22,7 +22,7 @@ plugin_init (GstPlugin *plugin)
 }
 
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, rangemux,
-    "Combines the streams of several range cameras into frame sets, splits them, and keeps speech "
+    "Combines the streams of several range cameras into frame sets, splits them, and keeps audio "
     "in "
     "sync",
     plugin_init, PACKAGE_VERSION, "LGPL", "gst-rangecast", PACKAGE_ORIGIN)

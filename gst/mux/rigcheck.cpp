@@ -34,7 +34,7 @@ Status
 differs (const View &view, const std::string &what)
 {
   return {StatusCode::kBadValue, "view " + std::to_string (view.id) + " is not that of the rig: " +
-                                     what + "; expected the camera host to have the same rig"};
+                                     what + "; give the camera host the same rig file"};
 }
 
 Status
@@ -42,8 +42,9 @@ check_view (const View &view, View expected)
 {
   if (Status s = rangecast::scale_view (expected, view.width, view.height); !s.ok ())
     return differs (view, std::to_string (view.width) + "x" + std::to_string (view.height) +
-                              " pixels, expected the shape of " + std::to_string (expected.width) +
-                              "x" + std::to_string (expected.height));
+                              " pixels; the rig has the shape of " +
+                              std::to_string (expected.width) + "x" +
+                              std::to_string (expected.height));
   double max_scale = kMaxScale;
   if (expected.right) {
     rangecast::Pose left_from_rectified;
@@ -74,8 +75,9 @@ check_rig (const Rig &stream, const Rig &expected)
   for (const View &view : stream.views) {
     const View *known = expected.find (view.id);
     if (!known)
-      return {StatusCode::kBadValue,
-          "view " + std::to_string (view.id) + " is not in the rig; expected one of its views"};
+      return {
+          StatusCode::kBadValue, "view " + std::to_string (view.id) +
+                                     " is not in the rig; give the camera host the same rig file"};
     if (Status s = check_view (view, *known); !s.ok ())
       return s;
   }

@@ -18,8 +18,9 @@ MuxStream::reset ()
   other_rig = clash = {};
   seen = since = GST_CLOCK_TIME_NONE;
   reported = state = StreamState::kIn;
-  received = dropped_late = out_of_sync = left_out = matched = views = 0;
+  received = dropped_late = out_of_sync = skipped = matched = views = 0;
   skew = shift = 0;
+  late_in_row = 0;
   offset = 0;
 }
 
@@ -37,7 +38,7 @@ MuxStream::stats () const
 {
   return gst_structure_new ("pad", "received", G_TYPE_UINT64, received, "matched", G_TYPE_UINT64,
       matched, "late", G_TYPE_UINT64, dropped_late, "out-of-sync", G_TYPE_UINT64, out_of_sync,
-      "left-out", G_TYPE_UINT64, left_out, "skew", G_TYPE_INT64, gint64 (skew), "state",
+      "skipped", G_TYPE_UINT64, skipped, "skew", G_TYPE_INT64, gint64 (skew), "state",
       G_TYPE_STRING, name_of (state), "offset", G_TYPE_INT64, gint64 (offset.load ()), nullptr);
 }
 
@@ -62,7 +63,7 @@ clash_of (const MuxStream &stream, const std::vector<MuxStream *> &chosen)
       if (other->info.rig.find (view.id))
         return {StatusCode::kBadValue, "pads " + std::string (GST_PAD_NAME (other->pad)) + " and " +
                                            name + " both have view-id " + std::to_string (view.id) +
-                                           "; give each camera host a view-id of its own"};
+                                           "; give each camera host another view-id"};
     if (other->coded != stream.coded)
       return {StatusCode::kBadValue, "pads " + std::string (GST_PAD_NAME (other->pad)) + " and " +
                                          name + ": streams must be all raw or all coded"};

@@ -55,6 +55,7 @@ struct MuxStream : PadStream {
   bool alive = false;                       ///< not silent
   bool in_sync = true;                      ///< live: its capture times are of the right clock
   bool late = false;                        ///< the frame at its head is
+  int late_in_row = 0;                      ///< such frames since the last frame set
   bool shift_known = false;                 ///< `shift` is valid
   GstClockTimeDiff shift = 0;               ///< capture time - running time of its last buffer, ns
   GstClockTime seen = GST_CLOCK_TIME_NONE;  ///< running time of its last buffer
@@ -64,7 +65,7 @@ struct MuxStream : PadStream {
   /* the element's lock */
   StreamState state = StreamState::kIn;
   guint64 views = 0; ///< bits by view-id, for statistics
-  guint64 received = 0, dropped_late = 0, out_of_sync = 0, left_out = 0, matched = 0;
+  guint64 received = 0, dropped_late = 0, out_of_sync = 0, skipped = 0, matched = 0;
   GstClockTimeDiff skew = 0; ///< capture time - the oldest of its frame set, ns
 
   /* any thread */
@@ -77,7 +78,7 @@ using MuxStreams = std::vector<std::shared_ptr<MuxStream>>;
  *  with each view-id once and at most kMaxRigPixels. Streams that were chosen before and are alive
  *  have priority, so that two hosts with the same view-id do not alternate. Sets `chosen` and
  *  `clash` of each.
- *  @param strict  return an error for the first stream that has to be left out
+ *  @param strict  return an error for the first stream that has to be skipped
  *  @param[out] info, caps  of the frame sets; caps are transfer full, null if no stream is left */
 rangecast::Status choose_streams (
     const MuxStreams &streams, bool strict, gstrange::RangeInfo &info, GstCaps *&caps);

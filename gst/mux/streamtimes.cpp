@@ -2,7 +2,6 @@
 #include "streamtimes.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
@@ -145,19 +144,7 @@ StreamTimes::add_frame_set (const FrameTimes &times, GstClockTime period)
   const bool follows = GST_CLOCK_TIME_IS_VALID (before.capture) && times.capture > before.capture &&
                        times.capture - before.capture <= kMaxPause;
   const GstClockTime distance = follows ? times.capture - before.capture : period;
-  const GstClockTime next = before.running + GstClockTime (double (distance) / times.speed);
+  const GstClockTime next = before.running + distance;
   running = follows || !GST_CLOCK_TIME_IS_VALID (running) ? next : std::max (next, running);
   return running;
-}
-
-double
-speed_of (const MuxStream &stream)
-{
-  GST_OBJECT_LOCK (stream.pad);
-  const double rate = std::abs (stream.pad->segment.rate);
-  GST_OBJECT_UNLOCK (stream.pad);
-  /* A running time in place of the capture time is in playback time already. */
-  const bool has_capture_time =
-      rate == 1 || GST_CLOCK_TIME_IS_VALID (gst_range_buffer_get_capture_time (stream.buffer));
-  return has_capture_time ? rate : 1;
 }

@@ -7,7 +7,6 @@
 struct FrameTimes {
   GstClockTime capture = GST_CLOCK_TIME_NONE; ///< of its oldest buffer
   GstClockTime running = GST_CLOCK_TIME_NONE; ///< of its oldest buffer by that
-  double speed = 1; ///< of that buffer: how much faster than its capture times proceed it is played
 };
 
 /** Capture times of the streams of a rangemux, of their clocks, and of its output. Streaming
@@ -46,6 +45,3 @@ private:
   GstClockTime oldest_ = GST_CLOCK_TIME_NONE;
   GstClockTimeDiff clock_offset_ = 0; /* live: of streams in sync, ahead of the pipeline clock */
 };
-
-/** Of the buffer at the head of a stream, see FrameTimes. */
-double speed_of (const MuxStream &stream);

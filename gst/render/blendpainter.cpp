@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <rangecast/surface/painting.hpp>
 
-#include "backgroundpainter.hpp"
+#include "layerpainters.hpp"
 
 using rangecast::BlendVertex;
 using rangecast::Shader;
@@ -57,8 +57,7 @@ BlendPainter::start (GstGLContext *context, GError **error)
   } stages[] = {
       {cell_shader_, Shader::kBlendVertex, Shader::kBlendFragment},
       {fill_shader_, Shader::kCoveringVertex, Shader::kFillFragment},
-      {finish_shaders_[0], Shader::kCoveringVertex, Shader::kFinishFragment},
-      {finish_shaders_[1], Shader::kCoveringVertex, Shader::kFinishDepthFragment},
+      {finish_shader_, Shader::kCoveringVertex, Shader::kFinishFragment},
   };
   for (const auto &[shader, vertex, fragment] : stages)
     if (!(shader = make_shader (context, vertex, fragment, error)))
@@ -80,8 +79,7 @@ BlendPainter::stop ()
         gl->DeleteBuffers (1, &objects.vertices);
         gl->DeleteVertexArrays (1, &objects.array);
       }
-  for (GstGLShader **shader :
-      {&cell_shader_, &fill_shader_, &finish_shaders_[0], &finish_shaders_[1]})
+  for (GstGLShader **shader : {&cell_shader_, &fill_shader_, &finish_shader_})
     gst_clear_object (shader);
   for (LazyShader &shader : sum_shaders_)
     shader.stop ();
@@ -234,10 +232,9 @@ BlendPainter::finish (const RenderPicture &picture) const
   const GstGLFuncs *gl = context_->gl_vtable;
   const rangecast::Roi &covered = picture.covered;
   gl->Scissor (covered.x, covered.y, covered.width, covered.height);
-  cover_from_sums (finish_shaders_[picture.keeps_depth ? 1 : 0], picture);
+  cover_from_sums (finish_shader_, picture);
   gl->DepthMask (FALSE);
-  if (!picture.keeps_depth)
-    gl->DepthFunc (GL_LESS); /* spares all other pixels the shader */
+  gl->DepthFunc (GL_LESS); /* spares all other pixels the shader */
   cover_from_sums (fill_shader_, picture);
   gl->DepthMask (TRUE);
 }

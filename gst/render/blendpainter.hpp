@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "glhelpers.hpp"
-#include "picture.hpp"
 
 /** Draws frame sets in mode blend: decides which views a pixel shows, and how much of each.
  *
@@ -62,8 +61,7 @@ private:
 
   GstGLContext *context_ = nullptr;
   gint largest_ = 0; /* side of a texture, pixels */
-  GstGLShader *cell_shader_ = nullptr, *fill_shader_ = nullptr;
-  std::array<GstGLShader *, 2> finish_shaders_{};                 /* without depth, with it */
+  GstGLShader *cell_shader_ = nullptr, *fill_shader_ = nullptr, *finish_shader_ = nullptr;
   std::array<LazyShader, rangecast::kMaxBlendCells> sum_shaders_; /* by number of cells - 1 */
   guint array_ = 0;                                               /* of draw_covering() */
   /* In turns: OpenGL may still read those of one frame set while the next one is uploaded. */

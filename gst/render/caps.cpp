@@ -3,15 +3,13 @@
 
 #include <gst/video/video.h>
 
-#include "outputschedule.hpp"
-
 namespace {
 
 /* The frame rate of caps with one structure, else nullptr. */
 const GValue *
 frame_rate (const GstCaps *caps)
 {
-  return gst_caps_get_size (caps) == 1
+  return caps && gst_caps_get_size (caps) == 1
              ? gst_structure_get_value (gst_caps_get_structure (caps, 0), "framerate")
              : nullptr;
 }
@@ -36,15 +34,14 @@ strip_output_caps (const GstCaps *input, GstCaps *output_template, GstCaps *filt
 {
   GstCaps *output = gst_caps_copy (output_template);
   const GValue *rate = frame_rate (input);
-  const bool too_fast =
-      rate && GST_VALUE_HOLDS_FRACTION (rate) &&
-      gst_util_fraction_compare (gst_value_get_fraction_numerator (rate),
-          gst_value_get_fraction_denominator (rate), OutputSchedule::kMaxRate, 1) > 0;
+  const bool too_fast = rate && GST_VALUE_HOLDS_FRACTION (rate) &&
+                        gst_util_fraction_compare (gst_value_get_fraction_numerator (rate),
+                            gst_value_get_fraction_denominator (rate), kMaxFrameRate, 1) > 0;
   if (too_fast)
     gst_caps_set_value (output, "framerate", rate);
   else
     gst_caps_set_simple (
-        output, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, OutputSchedule::kMaxRate, 1, nullptr);
+        output, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, kMaxFrameRate, 1, nullptr);
   return filtered (output, filter);
 }
 

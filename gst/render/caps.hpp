@@ -3,9 +3,16 @@
 
 #include <gst/gst.h>
 
-#include "outputschedule.hpp"
+/** Pictures a second; above that a period is too short for times in ns. */
+inline constexpr int kMaxFrameRate = 1000;
 
-/** Output caps for an input: any size, and any frame rate up to OutputSchedule::kMaxRate, or the
+/** Frame rate of the output's caps. */
+struct FrameRate {
+  int n = 0, d = 1;       ///< pictures a second; 0/1: none
+  bool is_inputs = false; ///< the input's caps have the same
+};
+
+/** Output caps for an input: any size, and any frame rate up to kMaxFrameRate, or the
  *  input's if that is higher. Returns: (transfer full) */
 GstCaps *strip_output_caps (const GstCaps *input, GstCaps *output_template, GstCaps *filter);
 

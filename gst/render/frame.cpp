@@ -3,7 +3,7 @@
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangestatus.hpp>
 #include <rangecast/base/guarded.hpp>
-#include <utility>
+#include <string>
 
 #include "striprenderprivate.hpp"
 
@@ -11,6 +11,42 @@ using rangecast::RangeImage;
 using rangecast::Status;
 
 namespace {
+
+/* Views have to be in the rig, and their ROIs in the view's image and no larger than kMaxStripSide.
+ */
+Status
+check_images (const rangecast::Rig &rig, std::span<const RangeImage> images)
+{
+  for (const RangeImage &image : images) {
+    const std::string name = "range buffer: view " + std::to_string (image.view_id);
+    const rangecast::View *view = rig.find (image.view_id);
+    const rangecast::Roi &roi = image.roi;
+    if (!view)
+      return {rangecast::StatusCode::kNotFound, name + " is not in the rig of the caps"};
+    if (roi.x + roi.width > view->width || roi.y + roi.height > view->height)
+      return {rangecast::StatusCode::kBadSize, name + ": its ROI does not lie in the view's image"};
+    if (std::max (roi.width, roi.height) > rangecast::kMaxStripSide)
+      return {rangecast::StatusCode::kBadSize,
+          name + " has an ROI of " + std::to_string (roi.width) + "x" +
+              std::to_string (roi.height) + " pixels; striprender draws at most " +
+              std::to_string (rangecast::kMaxStripSide) + " each way"};
+  }
+  return {};
+}
+
+/* Sets the counters of the last frame set. */
+void
+count_into (const rangecast::SurfaceScene &scene, RenderStats &stats)
+{
+  stats.points = stats.strips = stats.isolated = stats.triangles = stats.vertices = 0;
+  for (std::size_t i = 0; i < scene.layers ().size (); i++) {
+    stats.points += scene.result (i).points;
+    stats.strips += scene.result (i).strips;
+    stats.isolated += scene.result (i).isolated;
+    stats.triangles += scene.result (i).triangles;
+    stats.vertices += scene.vertices (i);
+  }
+}
 
 /* Controlled properties take their values of the picture's time. The first frame set after a seek
  * to between two of them has none: values stay. */
@@ -66,16 +102,17 @@ update_panel (GstStripRender *self, GstClockTime frame_set_pts)
 {
   GstStripRenderPrivate *priv = self->priv;
   GstClockTime latency = GST_CLOCK_TIME_NONE;
-  const GstClockTime now = strip_running_now (self),
+  const GstClockTime now = gst_element_get_current_running_time (GST_ELEMENT (self)),
                      captured = strip_running_time (self, frame_set_pts);
-  if (priv->live && GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (captured))
+  const bool live = gst_aggregator_get_latency (GST_AGGREGATOR (self)) != GST_CLOCK_TIME_NONE;
+  if (live && GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (captured))
     latency = now > captured ? now - captured : 0;
   RenderStats stats;
   {
     std::lock_guard guard (priv->lock);
     stats = priv->stats;
   }
-  priv->scene.count_into (stats);
+  count_into (priv->scene, stats);
   if (!priv->stats_text.update (
           stats, priv->scene.layers ().size (), latency, g_get_monotonic_time ()))
     return false;
@@ -86,14 +123,14 @@ update_panel (GstStripRender *self, GstClockTime frame_set_pts)
 /* Makes a scene of the frame set and draws it. May throw.
  * @param repeated  the last picture showed the same frame set */
 Status
-draw (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool keep, bool repeated,
+draw (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool repeated,
     Renderer::Result &result)
 {
   GstStripRenderPrivate *priv = self->priv;
   const gstrange::RangeFrameMap frame (frame_set, GST_MAP_READ);
   if (Status status = frame.status (); !status.ok ())
     return status;
-  if (Status status = priv->scene.check (frame.views ()); !status.ok ())
+  if (Status status = check_images (priv->info.rig, frame.views ()); !status.ok ())
     return status;
   StripRenderSettings settings;
   {
@@ -102,16 +139,15 @@ draw (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool keep, boo
   }
   const GstClockTime running = strip_running_time (self, GST_BUFFER_PTS (out));
   const auto orbit = settings.camera.at (orbit_time (priv, running));
-  priv->scene.build (
-      visible_images (self, frame.views (), settings.view_mask), settings, orbit, repeated);
-  gst_buffer_replace (&priv->drawn, keep ? frame_set : nullptr);
+  priv->scene.build (visible_images (self, frame.views (), settings.view_mask),
+      {settings.strips, settings.tint_views, settings.strips_serial}, orbit, repeated);
   const auto &home = home_frame (priv, settings, orbit, GST_BUFFER_PTS (frame_set));
   RenderJob job = {&priv->scene, &settings, &home, orbit};
   if (settings.show_stats) {
     job.panel_changed = update_panel (self, GST_BUFFER_PTS (frame_set));
     job.panel = priv->stats_panel.picture ();
   }
-  result = priv->renderer.draw (GST_GL_BASE_FILTER (self)->context, job, out);
+  result = priv->renderer.draw (priv->context, job, out);
   if (result.drawn) {
     std::lock_guard guard (priv->lock);
     priv->settings.camera.set_shown (result.matrices, home, result.width, result.height);
@@ -122,22 +158,13 @@ draw (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool keep, boo
 } // namespace
 
 GstFlowReturn
-strip_draw_frame (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool keep)
+strip_draw_frame (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool repeated)
 {
   GstStripRenderPrivate *priv = self->priv;
-  bool discont;
-  {
-    std::lock_guard guard (priv->lock);
-    discont = std::exchange (priv->discont, false);
-  }
-  if (discont)
-    GST_BUFFER_FLAG_SET (out, GST_BUFFER_FLAG_DISCONT);
   sync_values (self, GST_BUFFER_PTS (out));
-
-  const bool repeated = frame_set == priv->drawn;
   Renderer::Result result;
   const Status status = rangecast::guarded (
-      "striprender", [&] { return draw (self, frame_set, out, keep, repeated, result); });
+      "striprender", [&] { return draw (self, frame_set, out, repeated, result); });
   if (!status.ok ())
     return gst_range_flow_return (GST_ELEMENT (self), status);
   if (!result.drawn) {
@@ -152,7 +179,7 @@ strip_draw_frame (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bo
   {
     std::lock_guard guard (priv->lock);
     RenderStats &stats = priv->stats;
-    priv->scene.count_into (stats);
+    count_into (priv->scene, stats);
     stats.uploaded_bytes = result.uploaded;
     stats.uploaded_total += result.uploaded;
     stats.points_total += stats.points;
@@ -161,7 +188,7 @@ strip_draw_frame (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bo
     points = stats.points;
   }
   GST_LOG_OBJECT (self,
-      "picture of %" GST_TIME_FORMAT " shows frame set of %" GST_TIME_FORMAT
+      "frame of %" GST_TIME_FORMAT " shows frame set of %" GST_TIME_FORMAT
       "%s: %u views, %" G_GUINT64_FORMAT " points, %" G_GUINT64_FORMAT " bytes uploaded",
       GST_TIME_ARGS (GST_BUFFER_PTS (out)), GST_TIME_ARGS (GST_BUFFER_PTS (frame_set)),
       repeated ? " again" : "", guint (priv->scene.layers ().size ()), points, result.uploaded);

@@ -64,15 +64,6 @@ set_position_uniforms (GstGLShader *shader, const rangecast::LayerPlace &place)
 }
 
 bool
-LazyShader::make (GstGLContext *context, const char *fragment, const char *purpose)
-{
-  if (shader_ || failed_)
-    return !failed_;
-  const std::string vertex = rangecast::shader_source (rangecast::Shader::kCoveringVertex);
-  return make (context, vertex.c_str (), fragment, purpose);
-}
-
-bool
 LazyShader::make (GstGLContext *context, rangecast::Shader fragment, const char *purpose)
 {
   if (shader_ || failed_)
@@ -81,14 +72,14 @@ LazyShader::make (GstGLContext *context, rangecast::Shader fragment, const char 
 }
 
 bool
-LazyShader::make (
-    GstGLContext *context, const char *vertex, const char *fragment, const char *purpose)
+LazyShader::make (GstGLContext *context, const char *fragment, const char *purpose)
 {
   if (shader_ || failed_)
     return !failed_;
   GError *error = nullptr;
   context_ = context;
-  shader_ = make_shader (context, vertex, fragment, &error);
+  const std::string vertex = rangecast::shader_source (rangecast::Shader::kCoveringVertex);
+  shader_ = make_shader (context, vertex.c_str (), fragment, &error);
   failed_ = !shader_;
   if (failed_)
     GST_WARNING_OBJECT (context, "no %s: %s", purpose, error ? error->message : "no shader");

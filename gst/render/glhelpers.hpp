@@ -6,6 +6,8 @@
 #include <gst/gl/gl.h>
 #include <gst/gl/gstglfuncs.h>
 
+#include <rangecast/geometry/rig.hpp>
+#include <rangecast/surface/orbit.hpp>
 #include <rangecast/surface/painting.hpp>
 #include <rangecast/surface/shaders.hpp>
 
@@ -63,10 +65,8 @@ void set_position_uniforms (GstGLShader *shader, const rangecast::LayerPlace &pl
  */
 class LazyShader {
 public:
-  /** Compiles unless that has been done, with a vertex array. @return false after a failure, which
-   *  is logged once */
-  bool make (GstGLContext *context, const char *vertex, const char *fragment, const char *purpose);
-  /** The same with Shader::kCoveringVertex. */
+  /** Compiles it with Shader::kCoveringVertex unless that has been done, with a vertex array.
+   *  @return false after a failure, which is logged once */
   bool make (GstGLContext *context, const char *fragment, const char *purpose);
   bool make (GstGLContext *context, rangecast::Shader fragment, const char *purpose);
   /** After make(). */
@@ -82,3 +82,24 @@ private:
   bool failed_ = false;
 };
 /** @} */
+
+/** What StripPainter and BlendPainter draw: one picture of a frame set. */
+struct RenderPicture {
+  rangecast::Mat4 clip_from_world;
+  float background[4];        ///< R, G, B, A
+  float background_shade = 0; ///< see set_background_uniforms()
+  float point_size;           ///< in footprints of a pixel
+  float pixels_per_unit;      ///< pixels that a length of 1 at a distance of 1 covers
+  rangecast::StripMode mode;
+  double depth_step;
+  bool back_faces = false;     ///< mode strips: draws both sides; mode blend always does
+  rangecast::Roi covered = {}; ///< mode blend: all pixels that may show something, and a margin of
+                               ///< one pixel
+
+  /** Mode blend: metres behind the nearest surface within which views are blended. */
+  double blend_range_m = rangecast::kBlendRange_m;
+  int width, height;   ///< of the framebuffer, pixels
+  rangecast::Roi part; ///< of it that the picture fills
+};
+
+using RenderLayer = rangecast::SurfaceLayer;

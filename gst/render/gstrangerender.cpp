@@ -19,13 +19,15 @@
  *
  * Since: 0.1
  */
-#include "gstrangerender.h"
+#include <gst/gst.h>
 
 #include <gst/video/video.h>
 #include <gstrange/gstrangecaps.h>
 
 GST_DEBUG_CATEGORY_STATIC (gst_range_render_debug);
 #define GST_CAT_DEFAULT gst_range_render_debug
+
+G_DECLARE_FINAL_TYPE (GstRangeRender, gst_range_render, GST, RANGE_RENDER, GstBin)
 
 struct _GstRangeRender {
   GstBin parent;
@@ -44,7 +46,7 @@ static GstStaticPadTemplate src_template =
 G_DEFINE_TYPE (GstRangeRender, gst_range_render, GST_TYPE_BIN)
 /* Above neighbourcodedec: decodebin3 plugs a single decoder, and video sinks want pictures. */
 GST_ELEMENT_REGISTER_DEFINE (
-    rangerender, "rangerender", GST_RANK_PRIMARY + 1, GST_TYPE_RANGE_RENDER)
+    rangerender, "rangerender", GST_RANK_PRIMARY + 1, gst_range_render_get_type ())
 
 namespace {
 

@@ -14,8 +14,8 @@
  * ## Example launch line
  * |[
  * gst-launch-1.0 avatartestsrc ! rangealign ! striprender auto-orbit=30 ! glimagesink
- * gst-launch-1.0 avatartestsrc range-person-only=true ! striprender fit=true background-shade=0.5 !
- * glimagesink
+ * gst-launch-1.0 avatartestsrc range-person-only=true ! striprender fit=true \
+ *   background-shade=0.5 ! glimagesink
  * ]|
  *
  * Without a display: `GST_GL_PLATFORM=egl GST_GL_WINDOW=egl-device`, and gldownload behind it.
@@ -23,15 +23,13 @@
  * Since: 0.1
  */
 
-#include "gststriprender.h"
-
 #include <algorithm>
 #include <exception>
 #include <gstrange/gstrangestatus.hpp>
-#include <rangecast/base/guarded.hpp>
 #include <utility>
 
-#include "caps.hpp"
+#include "common/elementproperties.hpp"
+#include "common/matcher.hpp"
 #include "striprenderprivate.hpp"
 
 using rangecast::Status;
@@ -44,48 +42,50 @@ static GstStaticPadTemplate src_template =
             "RGBA") ", texture-target = (string) 2D, multiview-mode = "
                     "(string) " STRIP_MULTIVIEW_MODES));
 
-G_DEFINE_TYPE (GstStripRender, gst_strip_render, GST_TYPE_GL_BASE_FILTER)
-GST_ELEMENT_REGISTER_DEFINE (striprender, "striprender", GST_RANK_NONE, GST_TYPE_STRIP_RENDER)
+G_DEFINE_TYPE (GstStripRender, gst_strip_render, GST_TYPE_AGGREGATOR)
+GST_ELEMENT_REGISTER_DEFINE (
+    striprender, "striprender", GST_RANK_NONE, gst_strip_render_get_type ())
 
 enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_CAMERA };
 
-/* ---- input caps and output pool ---- */
+/* ---- OpenGL ---- */
 
 namespace {
 
-/* Whether both rigs have the same cameras, in other poses perhaps. */
-bool
-has_same_cameras (const rangecast::Rig &a, const rangecast::Rig &b)
+void
+stop_renderer (GstStripRenderPrivate *priv)
 {
-  return std::ranges::equal (
-      a.views, b.views, [] (const rangecast::View &v, const rangecast::View &w) {
-        return v.id == w.id && v.width == w.width && v.height == w.height;
-      });
+  if (priv->context)
+    on_gl_thread (priv->context, [priv] { priv->renderer.stop (); });
+  gst_clear_object (&priv->context);
 }
 
-/* Downstream may renegotiate, or rangealign correct poses, at any time: a fit outlasts both. */
+/* Makes the renderer ready for pictures of the output's size. */
 bool
-handle_input_caps (GstStripRender *self, GstCaps *caps)
+start_renderer (GstStripRender *self, GError **error)
 {
   GstStripRenderPrivate *priv = self->priv;
-  if (priv->input && gst_caps_is_equal (caps, priv->input)) {
-    return true;
-  }
-  const Status status = rangecast::guarded ("striprender", [&] {
-    gstrange::RangeInfo info;
-    Status parsed = gstrange::parse_caps (caps, info);
-    if (!parsed.ok ())
-      return parsed;
-    if (!has_same_cameras (info.rig, priv->info.rig))
-      priv->fit.reset ();
-    gst_clear_caps (&priv->input); /* what follows may throw */
-    priv->info = std::move (info);
-    priv->scene.set_rig (priv->info.rig);
-    priv->reporter.set_views (priv->info.rig);
-    gst_caps_replace (&priv->input, caps);
-    return parsed;
+  GstGLContext *context = priv->gl.get (GST_ELEMENT (self), error);
+  if (!context)
+    return false;
+  const bool is_new = context != priv->context;
+  if (is_new)
+    stop_renderer (priv);
+  gst_clear_object (&priv->context);
+  priv->context = context;
+  bool ready = false;
+  on_gl_thread (context, [&] {
+    try {
+      ready = (!is_new || priv->renderer.start (context, error)) &&
+              priv->renderer.set_output (context, priv->out, error);
+    } catch (const std::exception &failure) { /* must not pass through C */
+      g_set_error_literal (
+          error, GST_GL_CONTEXT_ERROR, GST_GL_CONTEXT_ERROR_FAILED, failure.what ());
+    }
   });
-  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+  if (!ready)
+    stop_renderer (priv);
+  return ready;
 }
 
 struct PoolSizes {
@@ -122,7 +122,7 @@ configure_pool (GstBufferPool *pool, GstQuery *query, PoolSizes &sizes)
 bool
 choose_pool (GstStripRender *self, GstQuery *query)
 {
-  GstGLContext *context = GST_GL_BASE_FILTER (self)->context;
+  GstGLContext *context = self->priv->context;
   const guint min_size = guint (GST_VIDEO_INFO_SIZE (&self->priv->out));
   GstBufferPool *pool = nullptr;
   PoolSizes offer;
@@ -155,133 +155,190 @@ choose_pool (GstStripRender *self, GstQuery *query)
 
 } // namespace
 
-/* ---- caps ---- */
-
-static GstCaps *
-gst_strip_render_transform_caps (
-    GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *filter)
-{
-  const bool forward = direction == GST_PAD_SINK;
-  GstCaps *other = gst_static_pad_template_get_caps (forward ? &src_template : &sink_template);
-  GstCaps *transformed =
-      forward ? strip_output_caps (caps, other, filter) : strip_input_caps (caps, other, filter);
-  gst_caps_unref (other);
-  return transformed;
-}
-
-static GstCaps *
-gst_strip_render_fixate_caps (
-    GstBaseTransform *, GstPadDirection direction, GstCaps *caps, GstCaps *other)
-{
-  return direction == GST_PAD_SINK ? strip_fixate_output (other, caps) : gst_caps_fixate (other);
-}
-
-static gboolean
-gst_strip_render_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
-{
-  auto self = GST_STRIP_RENDER (base);
-  GstStripRenderPrivate *priv = self->priv;
-  GST_INFO_OBJECT (self, "from %" GST_PTR_FORMAT " to %" GST_PTR_FORMAT, in, out);
-  if (strip_has_flags_as_text (out)) {
-    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
-        ("The caps' multiview-flags are a string, expected (GstVideoMultiviewFlagsSet)"),
-        (nullptr));
-    return FALSE;
-  }
-  if (!handle_input_caps (self, in) || !gst_video_info_from_caps (&priv->out, out))
-    return FALSE;
-  {
-    std::lock_guard guard (priv->lock);
-    priv->rate = strip_output_rate (in, out);
-  }
-  strip_select_mode (self);
-  return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->set_caps (base, in, out);
-}
-
-static gboolean
-gst_strip_render_get_unit_size (GstBaseTransform *, GstCaps *, gsize *size)
-{
-  *size = 1; /* both sides have buffers of their own; sizes do not follow from one another */
-  return TRUE;
-}
-
-/* ---- allocation ---- */
-
 /* Frame sets are read on the CPU: upstream has no use for a pool of OpenGL memory. */
 static gboolean
-gst_strip_render_propose_allocation (GstBaseTransform *, GstQuery *, GstQuery *)
+gst_strip_render_propose_allocation (GstAggregator *, GstAggregatorPad *, GstQuery *, GstQuery *)
 {
   return TRUE;
 }
 
 static gboolean
-gst_strip_render_decide_allocation (GstBaseTransform *base, GstQuery *query)
+gst_strip_render_decide_allocation (GstAggregator *aggregator, GstQuery *query)
 {
-  auto self = GST_STRIP_RENDER (base);
-  GstStripRenderPrivate *priv = self->priv;
-  if (!priv->no_context) /* else the base class has posted why */
-    priv->no_context = !gst_gl_base_filter_find_gl_context (GST_GL_BASE_FILTER (base));
-  if (priv->no_context)
-    GST_DEBUG_OBJECT (self, "no OpenGL context");
-  if (priv->no_context || !choose_pool (self, query) ||
-      !GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->decide_allocation (base, query))
-    return FALSE;
-  const GError *error = priv->gl_error ? priv->gl_error : priv->output_error;
-  if (error && !priv->gl_error_posted)
+  auto self = GST_STRIP_RENDER (aggregator);
+  for (guint i = 0;
+       GstEvent *tags = gst_pad_get_sticky_event (GST_PAD (self->priv->sink), GST_EVENT_TAG, i);
+       i++)
+    gst_pad_push_event (aggregator->srcpad, tags); /* sends none twice */
+  GError *error = nullptr;
+  const bool ready = start_renderer (self, &error) && choose_pool (self, query);
+  if (error)
     GST_ELEMENT_ERROR (
         self, RESOURCE, NOT_FOUND, ("OpenGL cannot be used: %s", error->message), (nullptr));
-  priv->gl_error_posted = error != nullptr;
-  return error == nullptr;
-}
-
-/* ---- OpenGL, on its thread ---- */
-
-/* TRUE even after a failure: the base class would post an error that does not say why;
- * decide_allocation() posts one that does. */
-static gboolean
-gst_strip_render_gl_start (GstGLBaseFilter *filter)
-{
-  GstStripRenderPrivate *priv = GST_STRIP_RENDER (filter)->priv;
-  g_clear_error (&priv->gl_error);
-  try {
-    priv->renderer.start (filter->context, &priv->gl_error);
-  } catch (const std::exception &error) {
-    g_set_error_literal (
-        &priv->gl_error, GST_GL_CONTEXT_ERROR, GST_GL_CONTEXT_ERROR_FAILED, error.what ());
-  }
-  return TRUE;
+  g_clear_error (&error);
+  return ready;
 }
 
 static void
-gst_strip_render_gl_stop (GstGLBaseFilter *filter)
+gst_strip_render_set_context (GstElement *element, GstContext *context)
 {
-  GST_STRIP_RENDER (filter)->priv->renderer.stop ();
+  GST_STRIP_RENDER (element)->priv->gl.set (element, context);
+  GST_ELEMENT_CLASS (gst_strip_render_parent_class)->set_context (element, context);
+}
+
+/* ---- caps ---- */
+
+namespace {
+
+/* Whether both rigs have the same cameras, in other poses perhaps. */
+bool
+has_same_cameras (const rangecast::Rig &a, const rangecast::Rig &b)
+{
+  return std::ranges::equal (
+      a.views, b.views, [] (const rangecast::View &v, const rangecast::View &w) {
+        return v.id == w.id && v.width == w.width && v.height == w.height;
+      });
+}
+
+/* rangealign may correct poses at any time: a fit outlasts that. */
+bool
+handle_input_caps (GstStripRender *self, GstCaps *caps)
+{
+  GstStripRenderPrivate *priv = self->priv;
+  if (priv->input && gst_caps_is_equal (caps, priv->input))
+    return true;
+  strip_drain (self);
+  gstrange::RangeInfo info;
+  const Status status = gstrange::parse_caps (caps, info);
+  if (status.ok ()) {
+    if (!has_same_cameras (info.rig, priv->info.rig))
+      priv->fit.reset ();
+    priv->info = std::move (info);
+    priv->scene.set_rig (priv->info.rig);
+    priv->reporter.set_views (priv->info.rig);
+    gst_caps_replace (&priv->input, caps);
+  }
+  gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
+  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+}
+
+/* Sources prefer the frame rate that downstream requests. */
+void
+answer_caps (GstStripRender *self, GstQuery *query)
+{
+  GstCaps *filter = nullptr, *input = gst_static_pad_template_get_caps (&sink_template);
+  gst_query_parse_caps (query, &filter);
+  GstCaps *output = gst_pad_get_allowed_caps (GST_AGGREGATOR_SRC_PAD (self));
+  GstCaps *caps = strip_input_caps (output, input, filter);
+  gst_query_set_caps_result (query, caps);
+  gst_caps_unref (caps);
+  gst_clear_caps (&output);
+  gst_caps_unref (input);
+}
+
+} // namespace
+
+static GstFlowReturn
+gst_strip_render_update_src_caps (GstAggregator *aggregator, GstCaps *wanted, GstCaps **caps)
+{
+  GstStripRenderPrivate *priv = GST_STRIP_RENDER (aggregator)->priv;
+  if (!priv->input)
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  GstCaps *output = gst_static_pad_template_get_caps (&src_template);
+  *caps = strip_output_caps (priv->input, output, wanted);
+  gst_caps_unref (output);
+  return GST_FLOW_OK;
+}
+
+static GstCaps *
+gst_strip_render_fixate_src_caps (GstAggregator *aggregator, GstCaps *caps)
+{
+  return strip_fixate_output (caps, GST_STRIP_RENDER (aggregator)->priv->input);
 }
 
 static gboolean
-gst_strip_render_gl_set_caps (GstGLBaseFilter *filter, GstCaps *, GstCaps *)
+gst_strip_render_negotiated_src_caps (GstAggregator *aggregator, GstCaps *caps)
 {
-  GstStripRenderPrivate *priv = GST_STRIP_RENDER (filter)->priv;
-  g_clear_error (&priv->output_error);
-  priv->renderer.set_output (filter->context, priv->out, &priv->output_error);
+  auto self = GST_STRIP_RENDER (aggregator);
+  GstStripRenderPrivate *priv = self->priv;
+  GST_INFO_OBJECT (self, "from %" GST_PTR_FORMAT " to %" GST_PTR_FORMAT, priv->input, caps);
+  if (strip_has_flags_as_text (caps)) {
+    GST_ELEMENT_ERROR (self, STREAM, FORMAT,
+        ("multiview-flags in the caps is a string; write (GstVideoMultiviewFlagsSet) before its "
+         "value"),
+        (nullptr));
+    return FALSE;
+  }
+  if (!gst_video_info_from_caps (&priv->out, caps))
+    return FALSE;
+  {
+    std::lock_guard guard (priv->lock);
+    priv->rate = strip_output_rate (priv->input, caps);
+  }
+  strip_update_latency (self);
   return TRUE;
 }
 
-/* ---- drawing: when and of which frame set, see scheduling.cpp ---- */
+/* ---- events and queries ---- */
 
-static GstFlowReturn
-gst_strip_render_transform (GstBaseTransform *base, GstBuffer *in, GstBuffer *out)
+static gboolean
+gst_strip_render_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
 {
-  return strip_draw_frame (GST_STRIP_RENDER (base), in, out, false);
+  auto self = GST_STRIP_RENDER (aggregator);
+  switch (GST_EVENT_TYPE (event)) {
+    case GST_EVENT_CAPS: {
+      GstCaps *caps;
+      gst_event_parse_caps (event, &caps);
+      const bool accepted = handle_input_caps (self, caps);
+      gst_event_unref (event);
+      return accepted;
+    }
+    case GST_EVENT_SEGMENT: {
+      const GstSegment *segment;
+      gst_event_parse_segment (event, &segment);
+      strip_drain (self);
+      strip_reset_stream (self);
+      gst_aggregator_update_segment (
+          aggregator, segment); /* pictures keep the times of the input */
+      break;
+    }
+    case GST_EVENT_SEGMENT_DONE:
+      strip_drain (self);
+      break;
+    case GST_EVENT_TAG: /* GstAggregator forwards none; those before caps follow them */
+      if (gst_pad_has_current_caps (GST_AGGREGATOR_SRC_PAD (self)))
+        return gst_pad_push_event (GST_AGGREGATOR_SRC_PAD (self), event);
+      break;
+    default:
+      break;
+  }
+  return GST_AGGREGATOR_CLASS (gst_strip_render_parent_class)->sink_event (aggregator, pad, event);
 }
 
 static gboolean
-gst_strip_render_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstBuffer *)
+gst_strip_render_sink_query (GstAggregator *aggregator, GstAggregatorPad *pad, GstQuery *query)
 {
-  return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
+  auto self = GST_STRIP_RENDER (aggregator);
+  switch (GST_QUERY_TYPE (query)) {
+    case GST_QUERY_CAPS:
+      answer_caps (self, query);
+      return TRUE;
+    case GST_QUERY_CONTEXT:
+      if (self->priv->gl.answer (GST_ELEMENT (self), query))
+        return TRUE;
+      break;
+    case GST_QUERY_DRAIN: /* upstream wants its memory back */
+      if (GstBuffer *copy =
+              self->priv->frame_set ? gst_buffer_copy_deep (self->priv->frame_set) : nullptr) {
+        gst_buffer_replace (&self->priv->frame_set, copy);
+        gst_buffer_unref (copy);
+      }
+      break;
+    default:
+      break;
+  }
+  return GST_AGGREGATOR_CLASS (gst_strip_render_parent_class)->sink_query (aggregator, pad, query);
 }
-
-/* ---- events from downstream ---- */
 
 namespace {
 
@@ -301,7 +358,38 @@ handle_navigation (GstStripRender *self, GstEvent *event)
   return handled;
 }
 
-std::vector<StatsRow>
+} // namespace
+
+static gboolean
+gst_strip_render_src_event (GstAggregator *aggregator, GstEvent *event)
+{
+  auto self = GST_STRIP_RENDER (aggregator);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_NAVIGATION) { /* GstAggregator forwards none */
+    if (!handle_navigation (self, event))
+      return gst_pad_push_event (GST_PAD (self->priv->sink), event);
+    gst_event_unref (event);
+    return TRUE;
+  }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS || GST_EVENT_TYPE (event) == GST_EVENT_LATENCY)
+    strip_handle_timing_event (self, event);
+  return GST_AGGREGATOR_CLASS (gst_strip_render_parent_class)->src_event (aggregator, event);
+}
+
+static gboolean
+gst_strip_render_src_query (GstAggregator *aggregator, GstQuery *query)
+{
+  auto self = GST_STRIP_RENDER (aggregator);
+  if (GST_QUERY_TYPE (query) == GST_QUERY_CONTEXT &&
+      self->priv->gl.answer (GST_ELEMENT (self), query))
+    return TRUE;
+  if (GST_QUERY_TYPE (query) == GST_QUERY_SEEKING) /* GstAggregator says no */
+    return gst_pad_peer_query (GST_PAD (self->priv->sink), query);
+  return GST_AGGREGATOR_CLASS (gst_strip_render_parent_class)->src_query (aggregator, query);
+}
+
+/* ---- states ---- */
+
+static std::vector<StatsRow>
 collect_stats (GstElement *element)
 {
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (element)->priv;
@@ -313,64 +401,54 @@ collect_stats (GstElement *element)
                .late = stats.dropped}}};
 }
 
-} // namespace
-
 static gboolean
-gst_strip_render_src_event (GstBaseTransform *base, GstEvent *event)
+gst_strip_render_start (GstAggregator *aggregator)
 {
-  auto self = GST_STRIP_RENDER (base);
-  if (GST_EVENT_TYPE (event) == GST_EVENT_NAVIGATION && handle_navigation (self, event)) {
-    gst_event_unref (event);
-    return TRUE;
-  }
-  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS || GST_EVENT_TYPE (event) == GST_EVENT_LATENCY)
-    strip_handle_timing_event (self, event);
-  return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->src_event (base, event);
-}
-
-/* ---- states ---- */
-
-static gboolean
-gst_strip_render_start (GstBaseTransform *base)
-{
-  auto self = GST_STRIP_RENDER (base);
+  auto self = GST_STRIP_RENDER (aggregator);
   GstStripRenderPrivate *priv = self->priv;
   priv->first_running = GST_CLOCK_TIME_NONE;
-  priv->gl_error_posted = priv->no_context = false;
-  priv->live = false;
   priv->stats_text = {};
   priv->fit.reset ();
-  gst_clear_caps (&priv->input);
   strip_reset_stream (self);
   priv->reporter.start (GST_ELEMENT (self), collect_stats);
-  {
-    std::lock_guard guard (priv->lock);
-    priv->stats = {};
-    priv->settings.camera.release ();
-  }
-  return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->start (base);
+  std::lock_guard guard (priv->lock);
+  priv->stats = {};
+  priv->rate = {};
+  priv->overrun = 0;
+  priv->pipeline_latency = 0;
+  priv->settings.camera.release ();
+  return TRUE;
+}
+
+static GstFlowReturn
+gst_strip_render_flush (GstAggregator *aggregator)
+{
+  strip_reset_stream (GST_STRIP_RENDER (aggregator));
+  return GST_FLOW_OK;
 }
 
 static gboolean
-gst_strip_render_stop (GstBaseTransform *base)
+gst_strip_render_stop (GstAggregator *aggregator)
 {
-  auto self = GST_STRIP_RENDER (base);
+  auto self = GST_STRIP_RENDER (aggregator);
   self->priv->reporter.stop ();
-  self->priv->task.stop ();
   strip_reset_stream (self);
-  return GST_BASE_TRANSFORM_CLASS (gst_strip_render_parent_class)->stop (base);
+  gst_clear_caps (&self->priv->input);
+  self->priv->scene.reset ();
+  stop_renderer (self->priv);
+  return TRUE;
 }
 
 static GstStateChangeReturn
 gst_strip_render_change_state (GstElement *element, GstStateChange transition)
 {
-  OutputTask &task = GST_STRIP_RENDER (element)->priv->task;
-  if (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED)
-    task.set_playing (false);
+  GlContext &gl = GST_STRIP_RENDER (element)->priv->gl;
+  if (transition == GST_STATE_CHANGE_NULL_TO_READY)
+    gl.open (element); /* neighbours share it; without a display, drawing is an error */
   const GstStateChangeReturn result =
       GST_ELEMENT_CLASS (gst_strip_render_parent_class)->change_state (element, transition);
-  if (transition == GST_STATE_CHANGE_PAUSED_TO_PLAYING && result != GST_STATE_CHANGE_FAILURE)
-    task.set_playing (true);
+  if (transition == GST_STATE_CHANGE_READY_TO_NULL)
+    gl.close ();
   return result;
 }
 
@@ -379,25 +457,24 @@ gst_strip_render_change_state (GstElement *element, GstStateChange transition)
 static void
 gst_strip_render_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 {
-  GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
+  auto self = GST_STRIP_RENDER (object);
+  GstStripRenderPrivate *priv = self->priv;
   if (id == PROP_STATS_INTERVAL) {
     priv->reporter.set_interval (g_value_get_uint (value));
     return;
   }
-  bool hold_changed, keep_changed;
+  bool keep_changed;
   {
     std::lock_guard guard (priv->lock);
-    const StripRenderSettings before = priv->settings;
+    const bool before = priv->settings.keep_rate;
     if (strip_properties ().set (priv->settings, id, value))
       priv->settings.strips_serial++;
     else if (!camera_properties ().set (priv->settings.camera, id, value))
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    hold_changed = priv->settings.hold_time != before.hold_time;
-    keep_changed = priv->settings.keep_rate != before.keep_rate;
-    priv->schedule.set_hold (priv->settings.hold_time);
+    keep_changed = priv->settings.keep_rate != before;
   }
-  if (hold_changed || keep_changed) /* without a task they apply to the next frame set */
-    priv->task.wake ();
+  if (keep_changed)
+    strip_update_latency (self);
 }
 
 static void
@@ -414,22 +491,21 @@ gst_strip_render_get_property (GObject *object, guint id, GValue *value, GParamS
     G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
 }
 
-static void
-gst_strip_render_finalize (GObject *object)
+static GstFlowReturn
+gst_strip_render_chain (GstPad *pad, GstObject *parent, GstBuffer *frame_set)
 {
-  GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
-  g_clear_error (&priv->gl_error);
-  g_clear_error (&priv->output_error);
-  gst_clear_caps (&priv->input);
-  delete priv;
-  G_OBJECT_CLASS (gst_strip_render_parent_class)->finalize (object);
+  auto self = GST_STRIP_RENDER (parent);
+  strip_drop_late (self);
+  return self->priv->chain (pad, parent, frame_set);
 }
 
 static void
 gst_strip_render_init (GstStripRender *self)
 {
-  self->priv = new GstStripRenderPrivate;
-  gst_base_transform_set_qos_enabled (GST_BASE_TRANSFORM (self), TRUE);
+  GstStripRenderPrivate *priv = self->priv = new GstStripRenderPrivate;
+  priv->sink = add_sink_pad (GST_ELEMENT (self), "sink");
+  priv->chain = GST_PAD_CHAINFUNC (priv->sink);
+  gst_pad_set_chain_function (GST_PAD (priv->sink), GST_DEBUG_FUNCPTR (gst_strip_render_chain));
 }
 
 static void
@@ -437,14 +513,13 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
 {
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
-  auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
-  auto filter_class = GST_GL_BASE_FILTER_CLASS (klass);
+  auto aggregator_class = GST_AGGREGATOR_CLASS (klass);
 
   strip_render_category (); /* exists from here on, for GST_DEBUG */
 
   object_class->set_property = gst_strip_render_set_property;
   object_class->get_property = gst_strip_render_get_property;
-  object_class->finalize = gst_strip_render_finalize;
+  object_class->finalize = delete_private<GstStripRender>;
   strip_properties ().install (
       object_class, camera_properties ().install (object_class, PROP_CAMERA));
   install_stats (object_class, PROP_STATS,
@@ -453,32 +528,26 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
       "uploaded-bytes");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
-  gst_element_class_add_static_pad_template (element_class, &sink_template);
-  gst_element_class_add_static_pad_template (element_class, &src_template);
+  for (GstStaticPadTemplate *pad_template : {&sink_template, &src_template})
+    gst_element_class_add_static_pad_template_with_gtype (
+        element_class, pad_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Strip renderer", "Filter/Converter/Video",
       "Renders range images with OpenGL without building a mesh", "gst-rangecast");
   element_class->change_state = GST_DEBUG_FUNCPTR (gst_strip_render_change_state);
+  element_class->set_context = GST_DEBUG_FUNCPTR (gst_strip_render_set_context);
 
-  transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_strip_render_transform_caps);
-  transform_class->fixate_caps = GST_DEBUG_FUNCPTR (gst_strip_render_fixate_caps);
-  transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_strip_render_set_caps);
-  transform_class->get_unit_size = GST_DEBUG_FUNCPTR (gst_strip_render_get_unit_size);
-  transform_class->propose_allocation = GST_DEBUG_FUNCPTR (gst_strip_render_propose_allocation);
-  transform_class->decide_allocation = GST_DEBUG_FUNCPTR (gst_strip_render_decide_allocation);
-
-  filter_class->supported_gl_api =
-      GstGLAPI (GST_GL_API_OPENGL | GST_GL_API_OPENGL3 | GST_GL_API_GLES2);
-  filter_class->gl_start = GST_DEBUG_FUNCPTR (gst_strip_render_gl_start);
-  filter_class->gl_stop = GST_DEBUG_FUNCPTR (gst_strip_render_gl_stop);
-  filter_class->gl_set_caps = GST_DEBUG_FUNCPTR (gst_strip_render_gl_set_caps);
-
-  transform_class->submit_input_buffer = GST_DEBUG_FUNCPTR (gst_strip_render_submit_input_buffer);
-  transform_class->generate_output = GST_DEBUG_FUNCPTR (gst_strip_render_generate_output);
-  transform_class->transform = GST_DEBUG_FUNCPTR (gst_strip_render_transform);
-  transform_class->transform_meta = GST_DEBUG_FUNCPTR (gst_strip_render_transform_meta);
-  transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_strip_render_sink_event);
-  transform_class->src_event = GST_DEBUG_FUNCPTR (gst_strip_render_src_event);
-  transform_class->query = GST_DEBUG_FUNCPTR (gst_strip_render_query);
-  transform_class->start = GST_DEBUG_FUNCPTR (gst_strip_render_start);
-  transform_class->stop = GST_DEBUG_FUNCPTR (gst_strip_render_stop);
+  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_strip_render_update_src_caps);
+  aggregator_class->fixate_src_caps = GST_DEBUG_FUNCPTR (gst_strip_render_fixate_src_caps);
+  aggregator_class->negotiated_src_caps = GST_DEBUG_FUNCPTR (gst_strip_render_negotiated_src_caps);
+  aggregator_class->propose_allocation = GST_DEBUG_FUNCPTR (gst_strip_render_propose_allocation);
+  aggregator_class->decide_allocation = GST_DEBUG_FUNCPTR (gst_strip_render_decide_allocation);
+  aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_strip_render_sink_event);
+  aggregator_class->sink_query = GST_DEBUG_FUNCPTR (gst_strip_render_sink_query);
+  aggregator_class->src_event = GST_DEBUG_FUNCPTR (gst_strip_render_src_event);
+  aggregator_class->src_query = GST_DEBUG_FUNCPTR (gst_strip_render_src_query);
+  aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_strip_render_aggregate);
+  aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_strip_render_get_next_time);
+  aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_strip_render_flush);
+  aggregator_class->start = GST_DEBUG_FUNCPTR (gst_strip_render_start);
+  aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_strip_render_stop);
 }

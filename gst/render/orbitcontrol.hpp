@@ -4,7 +4,7 @@
 #include <gst/video/navigation.h>
 
 #include <array>
-#include <rangecast/surface/orbit_motion.hpp>
+#include <rangecast/surface/orbit.hpp>
 
 /** The orbit camera, moved by mouse, touch and keys (GstNavigation) and by time. Has no lock:
  *  callers share it between threads under theirs. */

@@ -2,6 +2,7 @@
 #include "renderer.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <exception>
 #include <utility>
 
@@ -40,6 +41,49 @@ struct Colour {
 
 } // namespace
 
+MultiviewLayout::MultiviewLayout (const GstVideoInfo &info)
+{
+  const int width = GST_VIDEO_INFO_WIDTH (&info), height = GST_VIDEO_INFO_HEIGHT (&info);
+  guint flags; /* copied: caps may have bits that are not in the enumeration */
+  static_assert (sizeof flags == sizeof GST_VIDEO_INFO_MULTIVIEW_FLAGS (&info));
+  std::memcpy (&flags, &GST_VIDEO_INFO_MULTIVIEW_FLAGS (&info), sizeof flags);
+  const bool half = (flags & GST_VIDEO_MULTIVIEW_FLAGS_HALF_ASPECT) != 0;
+  EyeViewport &first = eyes_[0], &second = eyes_[1];
+  first = {0, 0, 0, 0, width, height, 1};
+  first.aspect = double (width) * GST_VIDEO_INFO_PAR_N (&info) /
+                 (double (height) * GST_VIDEO_INFO_PAR_D (&info));
+  count_ = 2;
+  switch (GST_VIDEO_INFO_MULTIVIEW_MODE (&info)) {
+    case GST_VIDEO_MULTIVIEW_MODE_SIDE_BY_SIDE:
+      first.aspect *= half ? 1 : 0.5;
+      first.width = width / 2;
+      second = first;
+      second.x = width - second.width;
+      break;
+    case GST_VIDEO_MULTIVIEW_MODE_TOP_BOTTOM:
+      first.aspect *= half ? 1 : 2;
+      first.height = height / 2;
+      second = first;
+      second.y = height - second.height;
+      break;
+    case GST_VIDEO_MULTIVIEW_MODE_SEPARATED:
+      second = first;
+      second.memory = 1;
+      break;
+    case GST_VIDEO_MULTIVIEW_MODE_LEFT:
+    case GST_VIDEO_MULTIVIEW_MODE_RIGHT:
+      first.side = GST_VIDEO_INFO_MULTIVIEW_MODE (&info) == GST_VIDEO_MULTIVIEW_MODE_LEFT ? -1 : 1;
+      [[fallthrough]];
+    default:
+      count_ = 1;
+      return;
+  }
+  first.side = -1;
+  second.side = 1;
+  if (flags & GST_VIDEO_MULTIVIEW_FLAGS_RIGHT_VIEW_FIRST)
+    std::swap (first.side, second.side);
+}
+
 bool
 Renderer::start (GstGLContext *context, GError **error)
 {
@@ -58,9 +102,7 @@ Renderer::stop ()
 {
   painter_.stop ();
   background_painter_.stop ();
-  camera_painter_.stop ();
   panel_painter_.stop ();
-  multisampler_.stop ();
   gst_clear_object (&framebuffer_);
   uploaded_ = 0;
   context_ = nullptr;
@@ -80,7 +122,7 @@ Renderer::set_output (GstGLContext *context, const GstVideoInfo &info, GError **
         gst_gl_framebuffer_new_with_default_depth (context, guint (width_), guint (height_));
   if (!framebuffer_)
     g_set_error (error, GST_GL_CONTEXT_ERROR, GST_GL_CONTEXT_ERROR_FAILED,
-        "pictures of %dx%d pixels, expected no more than %dx%d", width_, height_, largest, largest);
+        "%dx%d is too large; set caps of at most %dx%d", width_, height_, largest, largest);
   return framebuffer_ != nullptr;
 }
 
@@ -166,7 +208,7 @@ Renderer::draw_buffer (Call &call)
 bool
 Renderer::upload (Call &call)
 {
-  const StripScene &scene = *call.job->scene;
+  const rangecast::SurfaceScene &scene = *call.job->scene;
   if (uploaded_ == scene.serial ())
     return true;
   if (!painter_.fits (scene.layers ()))
@@ -180,26 +222,18 @@ Renderer::upload (Call &call)
 void
 Renderer::draw_memory (Call &call)
 {
-  const StripRenderSettings &settings = *call.job->settings;
-  /* mode blend has smooth outlines of its own */
-  const int samples = settings.strips.mode == rangecast::StripMode::kBlend ? 0 : settings.samples;
-  const bool antialiased = multisampler_.begin (context_, width_, height_, samples);
   for (const EyeViewport &viewport : layout_.eyes ())
     if (viewport.memory == call.memory)
-      draw_eye (call, viewport, antialiased);
-  if (antialiased)
-    multisampler_.end (Colour (settings.background).rgba);
+      draw_eye (call, viewport);
 }
 
 /* Scissors keep the painter, which clears and draws whole pictures, to this eye's part. */
 void
-Renderer::draw_eye (Call &call, const EyeViewport &viewport, bool antialiased)
+Renderer::draw_eye (Call &call, const EyeViewport &viewport)
 {
   const RenderJob &job = *call.job;
   const GstGLFuncs *gl = context_->gl_vtable;
-  RenderPicture picture = make_picture (job, viewport, call.result);
-  if (antialiased && picture.background[3] < 1) /* it comes behind the means of the samples */
-    std::ranges::fill (picture.background, 0.f);
+  const RenderPicture picture = make_picture (job, viewport, call.result);
   const bool whole = viewport.width == width_ && viewport.height == height_;
   if (!whole) {
     gl->Enable (GL_SCISSOR_TEST);
@@ -211,7 +245,7 @@ Renderer::draw_eye (Call &call, const EyeViewport &viewport, bool antialiased)
       background_painter_.draw (
           context_, picture.background, picture.background_shade, picture.part);
   };
-  if (blends && (picture.keeps_depth || picture.background_shade > 0))
+  if (blends && picture.background_shade > 0)
     gl->Clear (GL_DEPTH_BUFFER_BIT);
   if (blends) /* is drawn over the background; other modes leave the background's depth */
     draw_shade ();
@@ -219,11 +253,6 @@ Renderer::draw_eye (Call &call, const EyeViewport &viewport, bool antialiased)
     call.failure = failure;
   if (!blends)
     draw_shade ();
-  if (job.settings->show_cameras)
-    call.result.uploaded +=
-        camera_painter_.draw (context_, job.scene->camera_lines (), job.scene->serial (),
-            picture.back_faces ? rangecast::in_half_of_depths (picture.clip_from_world, false)
-                               : picture.clip_from_world);
   if (!job.panel.empty ())
     call.result.uploaded +=
         panel_painter_.draw (context_, job.panel, std::exchange (call.panel_changed, false),
@@ -238,9 +267,10 @@ Renderer::make_picture (const RenderJob &job, const EyeViewport &viewport, Resul
   const StripRenderSettings &settings = *job.settings;
   const rangecast::SceneFrame &frame = *job.frame;
   const rangecast::Eye eye = {viewport.side * settings.eye_distance_m / 2, settings.convergence_m};
-  const auto matrices = rangecast::orbit_matrices (frame, job.orbit, viewport.aspect, true, eye,
-      job.scene->hull (),
-      std::max (2 * settings.view_gap_m, settings.blend_range_m) /* by which surfaces move back */);
+  const auto matrices =
+      rangecast::orbit_matrices (frame, job.orbit, viewport.aspect, true, eye, job.scene->hull (),
+          std::max (
+              2 * rangecast::kViewGap_m, settings.blend_range_m) /* by which surfaces move back */);
   if (result.width == 0) {
     result.matrices = matrices;
     result.width = viewport.width;
@@ -259,11 +289,8 @@ Renderer::make_picture (const RenderJob &job, const EyeViewport &viewport, Resul
   picture.mode = settings.strips.mode;
   picture.depth_step = settings.strips.depth_step;
   /* What one camera sees is open at the back, where there is nothing else to see. */
-  picture.back_faces = (settings.back_faces || job.scene->rig_views () == 1) &&
-                       picture.mode != rangecast::StripMode::kBlend;
-  picture.view_gap_m = settings.view_gap_m;
+  picture.back_faces = job.scene->rig_views () == 1;
   picture.blend_range_m = settings.blend_range_m;
-  picture.keeps_depth = settings.show_cameras;
   picture.width = width_;
   picture.height = height_;
   picture.part = {viewport.x, viewport.y, viewport.width, viewport.height};

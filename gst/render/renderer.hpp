@@ -1,18 +1,43 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
-#include "backgroundpainter.hpp"
-#include "camerapainter.hpp"
-#include "multisampler.hpp"
-#include "multiviewlayout.hpp"
-#include "panelpainter.hpp"
-#include "scene.hpp"
+#include <gst/video/video.h>
+
+#include <array>
+#include <rangecast/surface/surface_scene.hpp>
+#include <span>
+
+#include "layerpainters.hpp"
 #include "settings.hpp"
 #include "strippainter.hpp"
 
+/** Where the picture of one eye lies in an output buffer. */
+struct EyeViewport {
+  double side = 0;           ///< of the camera: -1 left, 1 right, 0 neither
+  guint memory = 0;          ///< number of the buffer's memory
+  int x = 0, y = 0;          ///< pixels of that memory's picture
+  int width = 0, height = 0; ///< pixels
+  double aspect = 1;         ///< width / height as displayed
+};
+
+/** One or two eyes' pictures, from multiview-mode and multiview-flags of the caps. */
+class MultiviewLayout {
+public:
+  MultiviewLayout () = default;
+  explicit MultiviewLayout (const GstVideoInfo &info);
+  [[nodiscard]] std::span<const EyeViewport> eyes () const { return {eyes_.data (), count_}; }
+
+private:
+  std::array<EyeViewport, 2> eyes_;
+  std::size_t count_ = 0;
+};
+
+/** Supported values of multiview-mode, for caps. */
+#define STRIP_MULTIVIEW_MODES "{ mono, left, right, side-by-side, top-bottom, separated }"
+
 /** What to draw into one output buffer. */
 struct RenderJob {
-  const StripScene *scene;
+  const rangecast::SurfaceScene *scene;
   const StripRenderSettings *settings;
   const rangecast::SceneFrame *frame; ///< the camera's default position
   rangecast::Orbit orbit;
@@ -47,7 +72,7 @@ private:
   void draw_buffer (Call &call);
   bool upload (Call &call);
   void draw_memory (Call &call);
-  void draw_eye (Call &call, const EyeViewport &viewport, bool antialiased);
+  void draw_eye (Call &call, const EyeViewport &viewport);
   RenderPicture make_picture (
       const RenderJob &job, const EyeViewport &viewport, Result &result) const;
 
@@ -58,7 +83,5 @@ private:
   guint64 uploaded_ = 0; /* serial of the scene that OpenGL has; 0: none */
   StripPainter painter_;
   BackgroundPainter background_painter_;
-  CameraPainter camera_painter_;
   PanelPainter panel_painter_;
-  Multisampler multisampler_;
 };

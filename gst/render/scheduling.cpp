@@ -1,140 +1,109 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* When striprender draws. There are two modes:
+/* When striprender draws. GstAggregator waits for frame sets, live also for the clock, and calls
+ * aggregate() on the source pad's thread. There are two modes:
  *
- * One picture per frame set: the output has the input's frame rate, or none.
- *   chain -> submit_input_buffer() -> transform() -> push, all on the streaming thread. A picture
- *   has the times of its frame set; a late one is skipped.
+ * One picture per frame set, if the output has the input's frame rate or none: a picture has the
+ * times of its frame set; a late one is skipped.
  *
- * A frame rate of its own: downstream asked for another one than the input's, or keep-rate is set.
- *   chain -> submit_input_buffer() -> OutputSchedule, which says when there are pictures and which
- *   frame set each of them shows. They are drawn
- *   - not live: by generate_output() on the streaming thread, once no later frame set can replace
- *     theirs;
- *   - live: by the source pad's task, by the clock, also while the stream stalls.
- *   Serialized events go out after the pictures before them: drain() draws those on the streaming
- *   thread, live or not. The part of a GAP that pictures do not cover is kept in priv->gap until
- *   they are out.
- *
- * Locks, in the order in which they are taken:
- * 1. the sink pad's stream lock, which the streaming thread holds;
- * 2. the source pad's stream lock. The thread that draws and pushes holds it while both may:
- *    for serialized events and queries, and for each picture of the task. The task takes both to
- *    negotiate and releases the sink pad's before it draws, so that frame sets come in meanwhile;
- * 3. GstStripRenderPrivate::lock (settings, statistics, schedule), or OutputTask's own lock. No
- * other lock is taken while one of them is held, and nothing is pushed, posted or queried. */
+ * A frame rate of its own, if downstream requested another one than the input's, or keep-rate is
+ * set: pictures are at whole multiples of the period, counted from stream position 0. A picture
+ * shows the newest frame set that is no more than a quarter of a period after it, so that slightly
+ * uneven times neither repeat a frame set nor skip one. Live, a picture whose frame set no later
+ * one has followed is drawn a quarter of a period (and upstream's latency) after its time, and has
+ * the rest of the period to be drawn in: the stream may stall. */
 #include <algorithm>
+#include <gstrange/gstrangemeta.h>
+#include <gstrange/gstrangepairing.hpp>
 #include <utility>
 
 #include "striprenderprivate.hpp"
 
 namespace {
 
-using Picture = OutputSchedule::Picture;
+/* Longer durations and gaps are errors of the stream, and not filled with pictures. */
+constexpr GstClockTime kMaxGap = 60 * GST_SECOND;
 
-/* Both stream locks in their order. */
-class StreamLocks {
-public:
-  explicit StreamLocks (GstBaseTransform *base) : base_ (base)
-  {
-    GST_PAD_STREAM_LOCK (base_->sinkpad);
-    GST_PAD_STREAM_LOCK (base_->srcpad);
-  }
-  ~StreamLocks ()
-  {
-    GST_PAD_STREAM_UNLOCK (base_->srcpad);
-    if (has_sink_)
-      GST_PAD_STREAM_UNLOCK (base_->sinkpad);
-  }
-  StreamLocks (const StreamLocks &) = delete;
-  StreamLocks &operator= (const StreamLocks &) = delete;
-  void unlock_sink ()
-  {
-    GST_PAD_STREAM_UNLOCK (base_->sinkpad);
-    has_sink_ = false;
-  }
-
-private:
-  GstBaseTransform *base_;
-  bool has_sink_ = true;
-};
-
-GstClockTime output_tick (GstElement *element);
-void push_gap (GstStripRender *self, GstClockTime next);
-
-GstBaseTransformClass *
-parent_class ()
+/* The streaming thread needs it, too. */
+GstSegment
+segment_of (GstStripRender *self)
 {
-  return GST_BASE_TRANSFORM_CLASS (g_type_class_peek (GST_TYPE_GL_BASE_FILTER));
+  GstAggregatorPad *sink = self->priv->sink;
+  GST_OBJECT_LOCK (sink);
+  const GstSegment segment = sink->segment;
+  GST_OBJECT_UNLOCK (sink);
+  return segment;
 }
 
-/* ---- mode ---- */
-
-/* False for reverse segments and those not in time. With either stream lock. */
-bool
-has_own_rate (GstStripRender *self)
+/* ns from one picture to the next; 0: one per frame set. With the lock. */
+GstClockTime
+period_of (const GstStripRenderPrivate *priv)
 {
-  const GstSegment &segment = GST_BASE_TRANSFORM (self)->segment;
+  const FrameRate &rate = priv->rate;
+  const bool own = rate.n > 0 && (!rate.is_inputs || priv->settings.keep_rate) &&
+                   gst_util_fraction_compare (rate.n, rate.d, kMaxFrameRate, 1) <= 0;
+  return own ? gst_util_uint64_scale (GST_SECOND, guint64 (rate.d), guint64 (rate.n)) : 0;
+}
+
+/* The same; 0 for reverse segments and those not in time, too. */
+GstClockTime
+own_period (GstStripRender *self)
+{
+  const GstSegment segment = segment_of (self);
   if (segment.format != GST_FORMAT_TIME || segment.rate <= 0)
-    return false;
+    return 0;
   std::lock_guard guard (self->priv->lock);
-  return self->priv->schedule.active ();
+  return period_of (self->priv);
 }
 
-/* With both stream locks. */
-void
-set_live (GstStripRender *self, bool live)
+/* The first picture at a stream position or after it. */
+GstClockTime
+first_picture (const FrameRate &rate, GstClockTime from)
 {
-  GstStripRenderPrivate *priv = self->priv;
-  std::lock_guard guard (priv->lock);
-  priv->live = live;
-  priv->schedule.set_live (live);
+  const guint64 second = guint64 (rate.d) * GST_SECOND, n = guint64 (rate.n);
+  return gst_util_uint64_scale (gst_util_uint64_scale_ceil (from, n, second), second, n);
 }
 
-/* Once per stream, on the streaming thread. */
-void
-query_whether_live (GstStripRender *self)
+GstClockTime
+running_now (GstStripRender *self)
 {
-  GstStripRenderPrivate *priv = self->priv;
-  if (priv->live_known)
-    return;
-  gboolean live = FALSE;
-  GstClockTime latency = 0;
-  GstQuery *query = gst_query_new_latency ();
-  if (gst_pad_peer_query (GST_BASE_TRANSFORM (self)->sinkpad, query))
-    gst_query_parse_latency (query, &live, &latency, nullptr);
-  gst_query_unref (query);
-  const bool has_clock = GST_CLOCK_TIME_IS_VALID (strip_running_now (self));
-  GST_DEBUG_OBJECT (self, "upstream is %slive%s, latency %" GST_TIME_FORMAT, live ? "" : "not ",
-      live && !has_clock ? ", but there is no clock to draw by" : "", GST_TIME_ARGS (latency));
-  {
-    std::lock_guard guard (priv->lock);
-    priv->upstream_latency = latency;
-  }
-  StreamLocks locks (GST_BASE_TRANSFORM (self));
-  set_live (self, live && has_clock);
-  priv->live_known = true;
+  return gst_element_get_current_running_time (GST_ELEMENT (self));
+}
+
+bool
+is_live (GstStripRender *self)
+{
+  return GST_CLOCK_TIME_IS_VALID (gst_aggregator_get_latency (GST_AGGREGATOR (self)));
 }
 
 /* ---- late pictures ---- */
 
-const char *const kLateReason = "late according to QoS events";
-
 bool
 is_late (GstStripRender *self, GstClockTime running)
 {
-  GstStripRenderPrivate *priv = self->priv;
-  if (!gst_base_transform_is_qos_enabled (GST_BASE_TRANSFORM (self)))
-    return false;
-  std::lock_guard guard (priv->lock);
-  return GST_CLOCK_TIME_IS_VALID (priv->earliest) && GST_CLOCK_TIME_IS_VALID (running) &&
-         running <= priv->earliest;
+  std::lock_guard guard (self->priv->lock);
+  const GstClockTime earliest = self->priv->earliest;
+  return GST_CLOCK_TIME_IS_VALID (earliest) && GST_CLOCK_TIME_IS_VALID (running) &&
+         running <= earliest;
 }
 
-/* Counts pictures that are not drawn, because they would be late, and posts a QOS message with the
- * times of the last one. */
+/* ns by which a live picture misses its time and the latency; 0 if it does not. */
+GstClockTime
+lateness_at (GstStripRender *self, GstClockTime running, GstClockTime now)
+{
+  const GstClockTime latency = gst_aggregator_get_latency (GST_AGGREGATOR (self));
+  if (!GST_CLOCK_TIME_IS_VALID (running) || !GST_CLOCK_TIME_IS_VALID (now) ||
+      !GST_CLOCK_TIME_IS_VALID (latency))
+    return 0;
+  /* A sink without a queue before it blocks this thread for the pipeline's latency. */
+  std::lock_guard guard (self->priv->lock);
+  const GstClockTime last = running + std::max (latency, self->priv->pipeline_latency);
+  return now - std::min (now, last);
+}
+
+/* Counts pictures that are not drawn because they would be late, and posts a QOS message with the
+ * times of the first one. */
 void
-drop_pictures (GstStripRender *self, const char *reason, guint64 count, GstClockTime pts,
-    GstClockTime duration)
+drop_pictures (GstStripRender *self, guint64 count, GstClockTime pts, GstClockTime duration)
 {
   GstStripRenderPrivate *priv = self->priv;
   const GstClockTime running = strip_running_time (self, pts);
@@ -142,601 +111,322 @@ drop_pictures (GstStripRender *self, const char *reason, guint64 count, GstClock
   guint64 drawn, dropped;
   {
     std::lock_guard guard (priv->lock);
-    priv->stats.dropped += count;
-    dropped = priv->stats.dropped;
-    priv->discont = true;
+    dropped = priv->stats.dropped += count;
     drawn = priv->stats.frames;
     earliest = priv->earliest;
   }
+  priv->discont = true;
   GST_DEBUG_OBJECT (self,
-      "dropping %" G_GUINT64_FORMAT " picture(s) up to running time %" GST_TIME_FORMAT ": %s",
-      count, GST_TIME_ARGS (running), reason);
+      "dropping %" G_GUINT64_FORMAT " late frame(s) from running time %" GST_TIME_FORMAT, count,
+      GST_TIME_ARGS (running));
   GstMessage *message = gst_message_new_qos (
-      GST_OBJECT (self), priv->live, running, strip_stream_time (self, pts), pts, duration);
+      GST_OBJECT (self), is_live (self), running, strip_stream_time (self, pts), pts, duration);
   if (GST_CLOCK_TIME_IS_VALID (earliest))
     gst_message_set_qos_values (message, GST_CLOCK_DIFF (running, earliest), 1.0, 1000000);
   gst_message_set_qos_stats (message, GST_FORMAT_BUFFERS, drawn, dropped);
   gst_element_post_message (GST_ELEMENT (self), message);
 }
 
-/* ---- frame sets come in ---- */
-
-bool
-negotiate (GstStripRender *self)
-{
-  GstBaseTransform *base = GST_BASE_TRANSFORM (self);
-  if (self->priv->live && has_own_rate (self))
-    return true; /* the task negotiates */
-  StreamLocks locks (base);
-  strip_select_mode (self);
-  return gst_base_transform_reconfigure (base) && gst_pad_has_current_caps (base->srcpad);
-}
-
-/* For a picture that is not in the schedule: it becomes the schedule's last one, for the case that
- * downstream asks for a rate.
- * @return false if it is before that, as when downstream has just given up a rate of its own */
-bool
-follows_schedule (GstStripRender *self, GstClockTime pts)
-{
-  std::lock_guard guard (self->priv->lock);
-  OutputSchedule &schedule = self->priv->schedule;
-  if (!GST_CLOCK_TIME_IS_VALID (pts))
-    return true;
-  if (GST_CLOCK_TIME_IS_VALID (schedule.last ()) && pts < schedule.last ())
-    return false;
-  schedule.begin_after (pts);
-  return true;
-}
-
-/* @param in  transfer full */
-GstFlowReturn
-schedule_frame_set (GstStripRender *self, GstBuffer *in)
-{
-  GstStripRenderPrivate *priv = self->priv;
-  GstBaseTransform *base = GST_BASE_TRANSFORM (self);
-  GstClockTime duration = GST_BUFFER_DURATION (in);
-  if (!GST_CLOCK_TIME_IS_VALID (duration) || duration == 0)
-    duration = priv->info.frame_duration ();
-  if (priv->live && !priv->task.start (base->srcpad, output_tick)) {
-    GST_WARNING_OBJECT (self, "could not start the output task: drawing as if not live");
-    StreamLocks locks (base);
-    set_live (self, false);
-  }
-  guint removed;
-  bool idle;
-  {
-    std::unique_lock guard (priv->lock);
-    if (priv->live && priv->task_flow != GST_FLOW_OK) {
-      const GstFlowReturn flow = priv->task_flow;
-      guard.unlock ();
-      GST_DEBUG_OBJECT (self, "dropping frame set: the output task's last push returned %s",
-          gst_flow_get_name (flow));
-      gst_buffer_unref (in);
-      return flow;
-    }
-    idle = !GST_CLOCK_TIME_IS_VALID (priv->schedule.next_pts ());
-    removed = priv->schedule.add (in, duration);
-  }
-  if (removed > 0)
-    GST_DEBUG_OBJECT (
-        self, "removed %u frame set(s) whose times are wrong, or which are too many", removed);
-  if (priv->live && idle)
-    priv->task.wake ();
-  return GST_FLOW_OK;
-}
-
-} // namespace
-
-/* Replaces GstBaseTransform's, which drops late buffers by their input times and sends QoS messages
- * of its own: pictures of the schedule have other times. It negotiates as that one does. */
-GstFlowReturn
-gst_strip_render_submit_input_buffer (GstBaseTransform *base, gboolean, GstBuffer *in)
-{
-  auto self = GST_STRIP_RENDER (base);
-  GstStripRenderPrivate *priv = self->priv;
-  const GstClockTime pts = GST_BUFFER_PTS (in), duration = GST_BUFFER_DURATION (in);
-  GST_LOG_OBJECT (self, "%" GST_PTR_FORMAT, in);
-  if (!gst_pad_has_current_caps (base->sinkpad) || !negotiate (self)) {
-    const bool flushing = GST_PAD_IS_FLUSHING (base->srcpad);
-    GST_DEBUG_OBJECT (self, "dropping frame set: %s", flushing ? "flushing" : "not negotiated");
-    gst_buffer_unref (in);
-    return flushing ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED;
-  }
-  {
-    std::lock_guard guard (priv->lock);
-    priv->stats.frame_sets++;
-  }
-  query_whether_live (self);
-  if (has_own_rate (self))
-    return schedule_frame_set (self, in);
-  const bool late = is_late (self, strip_running_time (self, pts));
-  if (late || !follows_schedule (self, pts)) {
-    drop_pictures (self, late ? kLateReason : "before the last picture", 1, pts, duration);
-    gst_buffer_unref (in);
-    return GST_BASE_TRANSFORM_FLOW_DROPPED;
-  }
-  gst_clear_buffer (&base->queued_buf);
-  base->queued_buf = in; /* for generate_output() of the base class, which calls transform() */
-  return GST_FLOW_OK;
-}
-
-/* ---- pictures of the schedule ---- */
-
-namespace {
-
-/* The next picture, whose frame set is then the caller's. */
-bool
-next_picture (GstStripRender *self, GstClockTime limit, Picture &picture)
-{
-  std::lock_guard guard (self->priv->lock);
-  if (!self->priv->schedule.next (limit, picture))
-    return false;
-  gst_buffer_ref (picture.frame_set);
-  return true;
-}
-
-GstFlowReturn
-draw_picture (GstStripRender *self, const Picture &picture, GstBuffer **out)
-{
-  GstBaseTransform *base = GST_BASE_TRANSFORM (self);
-  GstFlowReturn flow =
-      GST_BASE_TRANSFORM_GET_CLASS (base)->prepare_output_buffer (base, picture.frame_set, out);
-  if (flow != GST_FLOW_OK) {
-    GST_DEBUG_OBJECT (self, "no output buffer: %s", gst_flow_get_name (flow));
-    return flow;
-  }
-  GST_BUFFER_PTS (*out) = picture.pts;
-  GST_BUFFER_DTS (*out) = GST_CLOCK_TIME_NONE;
-  GST_BUFFER_DURATION (*out) = picture.duration;
-  if (picture.discont)
-    GST_BUFFER_FLAG_SET (*out, GST_BUFFER_FLAG_DISCONT);
-  else
-    GST_BUFFER_FLAG_UNSET (*out, GST_BUFFER_FLAG_DISCONT);
-  flow = strip_draw_frame (self, picture.frame_set, *out, true);
-  if (flow != GST_FLOW_OK)
-    gst_clear_buffer (out);
-  return flow;
-}
-
-/* Draws the next picture that is in time and whose frame set is certain, given that none before
- * `limit` (stream position) follows. @return GST_FLOW_OK without a buffer if there is none */
-GstFlowReturn
-draw_next (GstStripRender *self, GstClockTime limit, GstBuffer **out)
-{
-  GstFlowReturn flow = GST_FLOW_OK;
-  Picture picture;
-  *out = nullptr;
-  while (flow == GST_FLOW_OK && !*out && next_picture (self, limit, picture)) {
-    const GstClockTime running = strip_running_time (self, picture.pts);
-    if (is_late (self, running))
-      drop_pictures (self, kLateReason, 1, picture.pts, picture.duration);
-    else if (GST_CLOCK_TIME_IS_VALID (running))
-      flow = draw_picture (self, picture, out);
-    else
-      GST_DEBUG_OBJECT (self, "skipping picture of %" GST_TIME_FORMAT ": outside the segment",
-          GST_TIME_ARGS (picture.pts));
-    gst_buffer_unref (picture.frame_set);
-  }
-  return flow;
-}
-
-} // namespace
-
-/* On the streaming thread, again and again until there is no buffer. */
-GstFlowReturn
-gst_strip_render_generate_output (GstBaseTransform *base, GstBuffer **out)
-{
-  auto self = GST_STRIP_RENDER (base);
-  GstStripRenderPrivate *priv = self->priv;
-  if (!has_own_rate (self))
-    return parent_class ()->generate_output (base, out);
-  *out = nullptr;
-  if (priv->live)
-    return GST_FLOW_OK;
-  GstClockTime limit;
-  {
-    std::lock_guard guard (priv->lock);
-    limit = priv->schedule.known_until ();
-  }
-  return draw_next (self, limit, out);
-}
-
-/* ---- the output task: live pictures by the clock ---- */
-
-namespace {
-
-/* Stream position of the next picture, or GST_CLOCK_TIME_NONE. */
-GstClockTime
-next_pts (GstStripRender *self)
-{
-  std::lock_guard guard (self->priv->lock);
-  return self->priv->schedule.next_pts ();
-}
-
-/* Running time at which the next picture is due: as soon as its frame set is certain. */
-GstClockTime
-next_due (GstStripRender *self)
-{
-  GstStripRenderPrivate *priv = self->priv;
-  GstClockTime pts, wait;
-  {
-    std::lock_guard guard (priv->lock);
-    pts = priv->schedule.next_pts ();
-    wait = priv->upstream_latency + priv->schedule.tolerance ();
-  }
-  const GstSegment &segment = GST_BASE_TRANSFORM (self)->segment;
-  if (!GST_CLOCK_TIME_IS_VALID (pts))
-    return GST_CLOCK_TIME_NONE;
-  if (pts < segment.start)
-    return 0; /* to be skipped at once */
-  const GstClockTime running = strip_running_time (self, pts);
-  return GST_CLOCK_TIME_IS_VALID (running) ? running + wait : GST_CLOCK_TIME_NONE;
-}
-
-/* Drops what could not be in time any more. A sink without a queue before it blocks the task until
- * a picture's time: late is what comes later than the pipeline's latency, not what comes later than
- * its turn. */
-void
-drop_overdue (GstStripRender *self, GstClockTime now)
-{
-  GstStripRenderPrivate *priv = self->priv;
-  GstClockTime slack;
-  {
-    std::lock_guard guard (priv->lock);
-    const GstClockTime own = priv->upstream_latency + priv->schedule.period ();
-    /* What drawing takes beyond a period is no time in which it may begin. */
-    slack = std::max (priv->pipeline_latency, own + priv->overrun) - priv->overrun -
-            priv->upstream_latency - priv->schedule.tolerance ();
-  }
-  guint64 late = 0;
-  Picture picture;
-  for (GstClockTime due = next_due (self); GST_CLOCK_TIME_IS_VALID (due) && due + slack < now;
-       due = next_due (self)) {
-    if (!next_picture (self, GST_CLOCK_TIME_NONE, picture))
-      break;
-    late += GST_CLOCK_TIME_IS_VALID (strip_running_time (self, picture.pts));
-    gst_buffer_unref (picture.frame_set);
-  }
-  if (late > 0)
-    drop_pictures (self, "overdue", late, picture.pts, picture.duration);
-}
-
 /* Pictures that take longer to draw than is left of their period would all be late, so the latency
  * grows. A few slow pictures do not count (shaders are compiled, the machine is busy); latency
  * never shrinks again, because each change interrupts playback. */
 void
-adapt_latency (GstStripRender *self, GstClockTime took)
+adapt_latency (GstStripRender *self, GstClockTime period, GstClockTime took)
 {
   constexpr int kMinSlowPictures = 5;
   GstStripRenderPrivate *priv = self->priv;
-  GstClockTime overrun;
+  const GstClockTime rest = period - period / 4;
+  priv->slow_pictures = took > rest + priv->overrun ? priv->slow_pictures + 1 : 0;
+  if (priv->slow_pictures < kMinSlowPictures)
+    return;
+  priv->slow_pictures = 0;
   {
     std::lock_guard guard (priv->lock);
-    const GstClockTime period = priv->schedule.period ();
-    const GstClockTime rest = period - std::min (period, priv->schedule.tolerance ());
-    const bool slow = period > 0 && took > rest + priv->overrun;
-    priv->slow_pictures = slow ? priv->slow_pictures + 1 : 0;
-    if (priv->slow_pictures < kMinSlowPictures)
-      return;
-    priv->slow_pictures = 0;
-    overrun = priv->overrun = std::min<GstClockTime> (took + took / 8 - rest, GST_SECOND);
+    priv->overrun = std::min<GstClockTime> (took + took / 8 - rest, GST_SECOND);
   }
-  GST_DEBUG_OBJECT (self,
-      "drawing takes %" GST_TIME_FORMAT ": %" GST_TIME_FORMAT " of latency beyond a period",
-      GST_TIME_ARGS (took), GST_TIME_ARGS (overrun));
-  gst_element_post_message (GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
+  strip_update_latency (self);
 }
 
-/* A failure ends the task's work, as a source's: upstream gets it with its next frame set, which
- * does not come while the stream stalls. */
-void
-set_task_flow (GstStripRender *self, GstFlowReturn flow, bool posts_error)
-{
-  {
-    std::lock_guard guard (self->priv->lock);
-    self->priv->task_flow = flow;
-  }
-  if (flow == GST_FLOW_OK)
-    return;
-  GST_DEBUG_OBJECT (self, "the output task draws no more: %s", gst_flow_get_name (flow));
-  if (!posts_error || (flow != GST_FLOW_NOT_LINKED && flow >= GST_FLOW_EOS)) /* or FLUSHING */
-    return;
-  GST_ELEMENT_FLOW_ERROR (self, flow);
-  gst_pad_push_event (GST_BASE_TRANSFORM (self)->srcpad, gst_event_new_eos ());
-}
+/* ---- drawing ---- */
 
-/* Draws what is due now, one picture at most. @return when to call again, running time */
-GstClockTime
-draw_due (GstStripRender *self)
+struct Picture {
+  GstBuffer *frame_set;
+  GstClockTime pts, duration;
+  bool repeated; /* the last one showed the same frame set */
+};
+
+GstFlowReturn
+draw (GstStripRender *self, const Picture &picture, GstBuffer *&out)
 {
   GstStripRenderPrivate *priv = self->priv;
-  GstBaseTransform *base = GST_BASE_TRANSFORM (self);
-  const GstClockTime now = strip_running_now (self);
-  if (!GST_CLOCK_TIME_IS_VALID (now))
-    return GST_CLOCK_TIME_NONE;
-  drop_overdue (self, now);
-  push_gap (self, next_pts (self));
-  const GstClockTime due = next_due (self);
-  if (!GST_CLOCK_TIME_IS_VALID (due) || due > now) {
-    GST_LOG_OBJECT (
-        self, "next picture is due at running time %" GST_TIME_FORMAT, GST_TIME_ARGS (due));
-    return due;
-  }
-  GstClockTime limit;
-  {
-    std::lock_guard guard (priv->lock);
-    limit = priv->schedule.next_pts () + priv->schedule.tolerance () + 1;
-  }
-  GstBuffer *out = nullptr;
-  GstFlowReturn flow = draw_next (self, limit, &out);
-  const bool drawn = out;
-  if (drawn) {
-    const GstClockTime done = strip_running_now (self);
-    if (GST_CLOCK_TIME_IS_VALID (done) && done > now)
-      adapt_latency (self, done - now);
-    base->segment.position = GST_BUFFER_PTS (out);
-    flow = gst_pad_push (base->srcpad, out);
-  }
-  set_task_flow (self, flow, drawn); /* drawing has posted its own error */
+  GstBufferPool *pool = gst_aggregator_get_buffer_pool (GST_AGGREGATOR (self));
+  GstFlowReturn flow = pool && priv->context && gst_buffer_pool_set_active (pool, TRUE)
+                           ? gst_buffer_pool_acquire_buffer (pool, &out, nullptr)
+                           : GST_FLOW_NOT_NEGOTIATED;
+  gst_clear_object (&pool);
   if (flow != GST_FLOW_OK)
-    return GST_CLOCK_TIME_NONE;
-  push_gap (self, next_pts (self)); /* if this was the last picture before it */
-  return next_due (self);
+    return flow;
+  GST_BUFFER_PTS (out) = picture.pts;
+  GST_BUFFER_DURATION (out) = picture.duration;
+  const GstClockTime capture = gst_range_buffer_get_capture_time (picture.frame_set);
+  if (GST_CLOCK_TIME_IS_VALID (capture))
+    gst_range_buffer_set_capture_time (out, capture);
+  if (priv->discont.exchange (false))
+    GST_BUFFER_FLAG_SET (out, GST_BUFFER_FLAG_DISCONT);
+  flow = strip_draw_frame (self, picture.frame_set, out, picture.repeated);
+  if (flow != GST_FLOW_OK)
+    gst_clear_buffer (&out);
+  else
+    priv->segment_sent = true; /* with the picture */
+  return flow;
 }
 
-/* With either stream lock. */
-bool
-task_draws (GstStripRender *self)
-{
-  GstStripRenderPrivate *priv = self->priv;
-  if (!priv->live || !has_own_rate (self))
-    return false;
-  std::lock_guard guard (priv->lock);
-  return priv->task_flow == GST_FLOW_OK;
-}
-
-GstClockTime
-output_tick (GstElement *element)
-{
-  auto self = GST_STRIP_RENDER (element);
-  GstStripRenderPrivate *priv = self->priv;
-  GstBaseTransform *base = GST_BASE_TRANSFORM (self);
-  StreamLocks locks (base);
-  if (!task_draws (self) || GST_PAD_IS_FLUSHING (base->srcpad))
-    return GST_CLOCK_TIME_NONE;
-  strip_select_mode (self);
-  if (!gst_base_transform_reconfigure (base)) {
-    const bool flushing = GST_PAD_IS_FLUSHING (base->srcpad);
-    const bool posted = priv->no_context || priv->gl_error_posted;
-    set_task_flow (
-        self, flushing ? GST_FLOW_FLUSHING : GST_FLOW_NOT_NEGOTIATED, !flushing && !posted);
-    return GST_CLOCK_TIME_NONE;
-  }
-  if (!task_draws (self)) /* downstream has asked for another rate */
-    return GST_CLOCK_TIME_NONE;
-  locks.unlock_sink ();
-  return draw_due (self);
-}
-
-/* ---- gaps ---- */
-
-/* Sends the part of the gap that pictures before `next` do not cover. `next` is the position of the
- * next picture, or GST_CLOCK_TIME_NONE if there is none. With the source pad's stream lock. */
+/* Forwards a gap. */
 void
-push_gap (GstStripRender *self, GstClockTime next)
+push_gap (GstStripRender *self, GstBuffer *gap)
 {
   GstStripRenderPrivate *priv = self->priv;
-  StreamGap &gap = priv->gap;
-  GstClockTime covered, tolerance;
-  {
-    std::lock_guard guard (priv->lock);
-    covered = priv->schedule.covered ();
-    tolerance = covered > gap.begin ? priv->schedule.tolerance () : 0; /* for rounded times */
-  }
-  const GstClockTime begin = std::max (gap.begin, covered), end = std::min (gap.end, next);
-  if (begin >= gap.end) /* it is filled, or there is none */
-    gap = {};
-  if (begin + tolerance >= end)
+  GstPad *src = GST_AGGREGATOR_SRC_PAD (self);
+  if (!GST_CLOCK_TIME_IS_VALID (GST_BUFFER_PTS (gap)) || !gst_pad_has_current_caps (src))
     return;
-  GstEvent *event = gst_event_new_gap (begin, end - begin);
-  gst_event_set_gap_flags (event, gap.flags);
-  gap.begin = end;
-  GST_DEBUG_OBJECT (self, "gap of %" GST_TIME_FORMAT " from %" GST_TIME_FORMAT,
-      GST_TIME_ARGS (end - begin), GST_TIME_ARGS (begin));
-  gst_pad_push_event (GST_BASE_TRANSFORM (self)->srcpad, event);
-}
-
-/* Draws and pushes, with both stream locks, all pictures before `limit`. */
-void
-drain_until (GstStripRender *self, GstClockTime limit)
-{
-  GstBuffer *out = nullptr;
-  while (draw_next (self, limit, &out) == GST_FLOW_OK && out)
-    if (gst_pad_push (GST_BASE_TRANSFORM (self)->srcpad, out) != GST_FLOW_OK)
-      break;
-}
-
-/* Fills a gap with pictures of the frame sets that are held; the rest of it is sent in its turn.
- * With both stream locks.
- * @return false if there are none: the event is to be forwarded */
-bool
-handle_gap (GstStripRender *self, GstEvent *event)
-{
-  GstStripRenderPrivate *priv = self->priv;
-  StreamGap gap;
-  GstClockTime duration;
-  gst_event_parse_gap (event, &gap.begin, &duration);
-  gst_event_parse_gap_flags (event, &gap.flags);
-  if (gap.begin >= G_MAXINT64) /* the schedule ends there */
-    return false;
-  const bool open_end = !GST_CLOCK_TIME_IS_VALID (duration);
-  gap.end = gap.begin + (open_end ? 0 : std::min<GstClockTime> (duration, G_MAXINT64));
-  {
-    std::lock_guard guard (priv->lock);
-    if (priv->schedule.frame_sets () == 0)
-      return false;
+  if (!std::exchange (priv->segment_sent, true)) { /* GstAggregator sends it with buffers only */
+    GstEvent *event = gst_event_new_segment (&priv->sink->segment);
+    if (GstEvent *cause = gst_pad_get_sticky_event (GST_PAD (priv->sink), GST_EVENT_SEGMENT, 0)) {
+      gst_event_set_seqnum (event, gst_event_get_seqnum (cause));
+      gst_event_unref (cause);
+    }
+    gst_pad_push_event (src, event);
   }
-  if (!has_own_rate (self))
-    return false;
-  if (!priv->live)
-    drain_until (self, gap.end);
-  const GstClockTime next = next_pts (self);
-  if (open_end)
-    return GST_CLOCK_TIME_IS_VALID (next);
-  if (priv->gap.end > priv->gap.begin) /* the one before still waits for pictures before it */
-    gap.begin = priv->gap.begin;
-  priv->gap = gap;
-  push_gap (self, next);
-  if (priv->live)
-    priv->task.wake ();
-  return true;
+  gst_pad_push_event (src, gst_event_new_gap (GST_BUFFER_PTS (gap), GST_BUFFER_DURATION (gap)));
 }
 
-/* ---- serialized events and queries, with both stream locks ---- */
-
-/* Draws and pushes what frame sets are still to show, and removes them.
- * @param new_stream  pictures to come need not be later than those */
 void
-drain (GstStripRender *self, bool new_stream)
+count_frame_set (GstStripRenderPrivate *priv)
 {
-  GstStripRenderPrivate *priv = self->priv;
-  GstClockTime limit;
-  {
-    std::lock_guard guard (priv->lock);
-    limit = priv->schedule.drain_limit ();
-  }
-  if (has_own_rate (self))
-    drain_until (self, limit);
-  push_gap (self, GST_CLOCK_TIME_NONE);
-  gst_clear_buffer (&priv->drawn);
   std::lock_guard guard (priv->lock);
-  if (new_stream) {
-    priv->schedule.reset ();
-    priv->task_flow = GST_FLOW_OK; /* its frame sets may be accepted */
-  } else
-    priv->schedule.remove_frame_sets ();
+  priv->stats.frame_sets++;
 }
 
-/* Replaces all frame sets that are held by copies, so that upstream gets their memory back. */
-void
-replace_frame_sets (GstStripRender *self)
+/* Draws the picture of one frame set, or forwards a gap. */
+GstFlowReturn
+draw_each (GstStripRender *self)
 {
   GstStripRenderPrivate *priv = self->priv;
-  bool drawn_is_held = false;
-  const auto frame_set = [&] (std::size_t i) -> GstBuffer * {
-    std::lock_guard guard (priv->lock);
-    return i < priv->schedule.frame_sets () ? priv->schedule.frame_set (i) : nullptr;
-  };
-  std::size_t i = 0;
-  while (GstBuffer *original = frame_set (i)) { /* both stream locks keep it there */
-    GstBuffer *copy = gst_buffer_copy_deep (original);
-    if (original == priv->drawn) {
-      gst_buffer_replace (&priv->drawn, copy);
-      drawn_is_held = true;
-    }
-    {
-      std::lock_guard guard (priv->lock);
-      priv->schedule.replace_frame_set (i++, copy);
-    }
-    gst_buffer_unref (original);
+  gst_clear_buffer (&priv->frame_set);
+  GstBuffer *in = gst_aggregator_pad_pop_buffer (priv->sink);
+  if (!in)
+    return gst_aggregator_pad_is_eos (priv->sink) ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
+  const GstClockTime pts = GST_BUFFER_PTS (in), duration = GST_BUFFER_DURATION (in);
+  GstFlowReturn flow = GST_AGGREGATOR_FLOW_NEED_DATA;
+  if (gstrange::is_gap (in)) {
+    push_gap (self, in);
+  } else if (count_frame_set (priv); is_late (self, strip_running_time (self, pts))) {
+    drop_pictures (self, 1, pts, duration);
+  } else {
+    if (GST_BUFFER_IS_DISCONT (in))
+      priv->discont = true;
+    GstBuffer *out = nullptr;
+    flow = draw (self, {in, pts, duration, false}, out);
+    if (flow == GST_FLOW_OK)
+      flow = gst_aggregator_finish_buffer (GST_AGGREGATOR (self), out);
+    if (GST_CLOCK_TIME_IS_VALID (pts)) /* for the case that downstream requests a rate */
+      priv->next = pts + 1;
   }
-  if (!drawn_is_held)
-    gst_clear_buffer (&priv->drawn);
+  gst_buffer_unref (in);
+  return flow;
 }
 
-bool
-is_other_input (GstBaseTransform *base, GstEvent *caps_event)
+/* Draws the next picture if it is in time. */
+GstFlowReturn
+draw_next (GstStripRender *self, GstClockTime period)
 {
-  GstCaps *caps, *current = gst_pad_get_current_caps (base->sinkpad);
-  gst_event_parse_caps (caps_event, &caps);
-  const bool other = !current || !gst_caps_is_equal (current, caps);
-  gst_clear_caps (&current);
-  return other;
+  GstStripRenderPrivate *priv = self->priv;
+  const GstClockTime pts = priv->next, running = strip_running_time (self, pts);
+  priv->next = first_picture (priv->rate, pts + 1);
+  if (!GST_CLOCK_TIME_IS_VALID (running))
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  const GstClockTime now = running_now (self), lateness = lateness_at (self, running, now);
+  if (lateness > 0) {
+    const guint64 more = lateness / period;
+    drop_pictures (self, more + 1, pts, period);
+    priv->next = first_picture (priv->rate, priv->next + more * period);
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
+  if (is_late (self, running)) {
+    drop_pictures (self, 1, pts, period);
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
+  GstBuffer *out = nullptr;
+  const GstFlowReturn flow =
+      draw (self, {priv->frame_set, pts, period, std::exchange (priv->is_built, true)}, out);
+  if (flow != GST_FLOW_OK)
+    return flow;
+  if (is_live (self) && GST_CLOCK_TIME_IS_VALID (now))
+    adapt_latency (self, period, running_now (self) - now);
+  return gst_aggregator_finish_buffer (GST_AGGREGATOR (self), out);
+}
+
+/* ---- output frame rate ---- */
+
+/* Whether the next picture, or that after a gap, is to show a frame set. */
+bool
+is_due (const GstStripRenderPrivate *priv, GstBuffer *frame_set, GstClockTime period)
+{
+  const bool timed = GST_BUFFER_PTS_IS_VALID (frame_set);
+  const GstClockTime pts = timed ? GST_BUFFER_PTS (frame_set) : priv->follows, next = priv->next;
+  return !priv->frame_set || gstrange::is_gap (frame_set) || pts <= next + period / 4 ||
+         (pts - next > kMaxGap && next >= priv->end);
+}
+
+/* @param frame_set  transfer full */
+void
+take (GstStripRender *self, GstBuffer *frame_set, GstClockTime period)
+{
+  GstStripRenderPrivate *priv = self->priv;
+  const GstSegment &segment = priv->sink->segment;
+  GstClockTime begin = GST_BUFFER_PTS (frame_set), duration = GST_BUFFER_DURATION (frame_set);
+  if (!GST_CLOCK_TIME_IS_VALID (begin))
+    begin = priv->frame_set ? priv->follows : segment.start;
+  const GstClockTime running = strip_running_time (self, begin), now = running_now (self);
+  const bool is_ahead = GST_CLOCK_TIME_IS_VALID (running) && GST_CLOCK_TIME_IS_VALID (now) &&
+                        is_live (self) && running > now + kMaxGap;
+  if (gstrange::is_gap (frame_set) || is_ahead || begin >= G_MAXINT64) {
+    if (is_ahead)
+      GST_WARNING_OBJECT (self, "dropping a frame set whose time is far ahead of the clock");
+    else if (gstrange::is_gap (frame_set) && !priv->frame_set) /* a sink may wait for data */
+      push_gap (self, frame_set);
+    gst_buffer_unref (frame_set);
+    return;
+  }
+  count_frame_set (priv);
+  if (!GST_CLOCK_TIME_IS_VALID (duration) || duration == 0)
+    duration = priv->info.frame_duration ();
+  if (!GST_CLOCK_TIME_IS_VALID (duration) || duration == 0)
+    duration = period;
+  gst_buffer_replace (&priv->frame_set, frame_set);
+  gst_buffer_unref (frame_set);
+  priv->is_built = false;
+  duration = std::min (duration, kMaxGap);
+  priv->follows = begin + duration;
+  priv->end = priv->follows - std::min (period, duration) / 4; /* ends are not exact */
+  if (!GST_CLOCK_TIME_IS_VALID (priv->next) || begin > priv->next + kMaxGap ||
+      (begin + kMaxGap < priv->next && !is_live (self)))
+    priv->next = first_picture (
+        priv->rate, std::max<GstClockTime> (begin - std::min (begin, period / 4), segment.start));
+}
+
+/* Whether the newest frame set is to be shown once more if no other follows. */
+bool
+has_more (const GstStripRenderPrivate *priv)
+{
+  return priv->frame_set && priv->next < priv->end;
+}
+
+GstFlowReturn
+draw_by_rate (GstStripRender *self, GstClockTime period, bool timeout)
+{
+  GstStripRenderPrivate *priv = self->priv;
+  if (GST_CLOCK_TIME_IS_VALID (priv->next)) /* the rate may be another */
+    priv->next = first_picture (priv->rate, priv->next);
+  while (GstBuffer *head = gst_aggregator_pad_peek_buffer (priv->sink)) {
+    const bool due = is_due (priv, head, period);
+    gst_buffer_unref (head);
+    if (!due)
+      return draw_next (self, period);
+    if (GstBuffer *popped = gst_aggregator_pad_pop_buffer (priv->sink))
+      take (self, popped, period);
+  }
+  if (gst_aggregator_pad_is_eos (priv->sink))
+    return has_more (priv) ? draw_next (self, period) : GST_FLOW_EOS;
+  return timeout && priv->frame_set ? draw_next (self, period) : GST_AGGREGATOR_FLOW_NEED_DATA;
 }
 
 } // namespace
 
-gboolean
-gst_strip_render_sink_event (GstBaseTransform *base, GstEvent *event)
+GstFlowReturn
+gst_strip_render_aggregate (GstAggregator *aggregator, gboolean timeout)
 {
-  auto self = GST_STRIP_RENDER (base);
-  if (!(gst_event_type_get_flags (GST_EVENT_TYPE (event)) & GST_EVENT_TYPE_SERIALIZED))
-    return parent_class ()->sink_event (base, event);
-  StreamLocks locks (base);
-  switch (GST_EVENT_TYPE (event)) {
-    case GST_EVENT_FLUSH_STOP:
-      strip_reset_stream (self);
-      break;
-    case GST_EVENT_CAPS:
-      if (is_other_input (base, event))
-        drain (self, false);
-      break;
-    case GST_EVENT_SEGMENT:
-    case GST_EVENT_SEGMENT_DONE:
-    case GST_EVENT_STREAM_START:
-      drain (self, true);
-      break;
-    case GST_EVENT_EOS:
-      drain (self, true);
-      self->priv->reporter.finish ();
-      break;
-    case GST_EVENT_GAP:
-      if (handle_gap (self, event)) {
-        gst_event_unref (event);
-        return TRUE;
-      }
-      break;
-    default:
-      break;
-  }
-  return parent_class ()->sink_event (base, event);
+  auto self = GST_STRIP_RENDER (aggregator);
+  const GstClockTime period = own_period (self);
+  const GstFlowReturn flow = period > 0 ? draw_by_rate (self, period, timeout) : draw_each (self);
+  if (flow == GST_FLOW_EOS)
+    self->priv->reporter.finish ();
+  return flow;
+}
+
+GstClockTime
+gst_strip_render_get_next_time (GstAggregator *aggregator)
+{
+  auto self = GST_STRIP_RENDER (aggregator);
+  GstStripRenderPrivate *priv = self->priv;
+  const GstClockTime period = own_period (self);
+  if (period == 0 || !priv->frame_set)
+    return GST_CLOCK_TIME_NONE;
+  const GstClockTime running = strip_running_time (self, priv->next);
+  if (!GST_CLOCK_TIME_IS_VALID (running))
+    return GST_CLOCK_TIME_NONE;
+  /* GstAggregator adds the latency, which includes a period. */
+  const GstClockTime due = running + period / 4, own = period + priv->overrun;
+  return due - std::min (due, own);
 }
 
 void
-strip_select_mode (GstStripRender *self)
+strip_drain (GstStripRender *self)
 {
   GstStripRenderPrivate *priv = self->priv;
-  GstClockTime before, period;
-  FrameRate rate;
-  {
-    std::lock_guard guard (priv->lock);
-    before = priv->schedule.period ();
-    rate = priv->rate;
-    const bool own = !rate.is_inputs || priv->settings.keep_rate;
-    priv->schedule.set_rate (own ? rate.n : 0, rate.d);
-    period = priv->schedule.period ();
-    if (!priv->schedule.active ())
-      priv->schedule.remove_frame_sets ();
-  }
-  if (period == before)
+  const GstClockTime period = own_period (self);
+  while (period > 0 && has_more (priv))
+    if (const GstFlowReturn flow = draw_next (self, period);
+        flow != GST_FLOW_OK && flow != GST_AGGREGATOR_FLOW_NEED_DATA)
+      break;
+  gst_clear_buffer (&priv->frame_set);
+}
+
+void
+strip_drop_late (GstStripRender *self)
+{
+  GstStripRenderPrivate *priv = self->priv;
+  GstBuffer *waiting =
+      own_period (self) == 0 ? gst_aggregator_pad_peek_buffer (priv->sink) : nullptr;
+  if (!waiting)
     return;
-  if (period > 0)
-    GST_DEBUG_OBJECT (self, "output at a frame rate of its own, %d/%d", rate.n, rate.d);
-  else
-    GST_DEBUG_OBJECT (self, "output of one picture per frame set");
-  if (!has_own_rate (self))
-    push_gap (self, GST_CLOCK_TIME_NONE);
-  gst_element_post_message (GST_ELEMENT (self), gst_message_new_latency (GST_OBJECT (self)));
-  priv->task.wake (); /* it may be waiting for a picture of the old rate */
+  const GstClockTime running = strip_running_time (self, GST_BUFFER_PTS (waiting));
+  const bool late =
+      !gstrange::is_gap (waiting) && lateness_at (self, running, running_now (self)) > 0;
+  gst_buffer_unref (waiting);
+  if (GstBuffer *dropped = late ? gst_aggregator_pad_pop_buffer (priv->sink) : nullptr) {
+    count_frame_set (priv);
+    drop_pictures (self, 1, GST_BUFFER_PTS (dropped), GST_BUFFER_DURATION (dropped));
+    gst_buffer_unref (dropped);
+  }
 }
 
 void
 strip_reset_stream (GstStripRender *self)
 {
   GstStripRenderPrivate *priv = self->priv;
-  priv->live_known = false;
-  priv->gap = {};
-  gst_clear_buffer (&priv->drawn);
-  std::lock_guard guard (priv->lock);
-  priv->schedule.reset ();
-  priv->earliest = GST_CLOCK_TIME_NONE;
-  priv->overrun = 0;
+  gst_clear_buffer (&priv->frame_set);
+  priv->next = GST_CLOCK_TIME_NONE;
   priv->slow_pictures = 0;
-  priv->task_flow = GST_FLOW_OK;
-  priv->discont = false;
+  priv->segment_sent = false;
+  priv->discont = true;
+  std::lock_guard guard (priv->lock);
+  priv->earliest = GST_CLOCK_TIME_NONE;
 }
 
 /* ---- QoS and latency ---- */
+
+void
+strip_update_latency (GstStripRender *self)
+{
+  GstClockTime own;
+  {
+    std::lock_guard guard (self->priv->lock);
+    const GstClockTime period = period_of (self->priv);
+    own = period > 0 ? period + self->priv->overrun : 0;
+  }
+  gst_aggregator_set_latency (GST_AGGREGATOR (self), own, own);
+}
 
 void
 strip_handle_timing_event (GstStripRender *self, GstEvent *event)
@@ -761,56 +451,12 @@ strip_handle_timing_event (GstStripRender *self, GstEvent *event)
   priv->earliest = diff < 0 && GstClockTime (-diff) > time ? 0 : time + GstClockTime (diff);
 }
 
-namespace {
-
-/* A live picture is begun when its frame set is certain, a quarter of a period after its time, and
- * has the rest of the period to be drawn in, and longer where that has turned out to be too short.
- */
-gboolean
-answer_latency (GstStripRender *self, GstQuery *query)
-{
-  GstStripRenderPrivate *priv = self->priv;
-  if (!gst_pad_peer_query (GST_BASE_TRANSFORM (self)->sinkpad, query))
-    return FALSE;
-  gboolean live;
-  GstClockTime min, max;
-  gst_query_parse_latency (query, &live, &min, &max);
-  GstClockTime own;
-  {
-    std::lock_guard guard (priv->lock);
-    priv->upstream_latency = min;
-    const GstClockTime period = priv->schedule.period ();
-    own = live && period > 0 ? period + priv->overrun : 0;
-  }
-  GST_DEBUG_OBJECT (self, "latency: upstream %" GST_TIME_FORMAT ", own %" GST_TIME_FORMAT,
-      GST_TIME_ARGS (min), GST_TIME_ARGS (own));
-  gst_query_set_latency (query, live, min + own, GST_CLOCK_TIME_IS_VALID (max) ? max + own : max);
-  return TRUE;
-}
-
-} // namespace
-
-gboolean
-gst_strip_render_query (GstBaseTransform *base, GstPadDirection direction, GstQuery *query)
-{
-  auto self = GST_STRIP_RENDER (base);
-  if (direction == GST_PAD_SRC && GST_QUERY_TYPE (query) == GST_QUERY_LATENCY)
-    return answer_latency (self, query);
-  if (direction != GST_PAD_SINK ||
-      !(gst_query_type_get_flags (GST_QUERY_TYPE (query)) & GST_QUERY_TYPE_SERIALIZED))
-    return parent_class ()->query (base, direction, query);
-  StreamLocks locks (base); /* the base class may negotiate */
-  if (GST_QUERY_TYPE (query) == GST_QUERY_DRAIN)
-    replace_frame_sets (self);
-  return parent_class ()->query (base, direction, query);
-}
-
 /* ---- times ---- */
 
 GstClockTime
 strip_running_time (GstStripRender *self, GstClockTime pts)
 {
-  const GstSegment &segment = GST_BASE_TRANSFORM (self)->segment;
+  const GstSegment segment = segment_of (self);
   if (segment.format != GST_FORMAT_TIME) /* then nothing has a time */
     return GST_CLOCK_TIME_NONE;
   return gst_segment_to_running_time (&segment, GST_FORMAT_TIME, pts);
@@ -819,20 +465,8 @@ strip_running_time (GstStripRender *self, GstClockTime pts)
 GstClockTime
 strip_stream_time (GstStripRender *self, GstClockTime pts)
 {
-  const GstSegment &segment = GST_BASE_TRANSFORM (self)->segment;
+  const GstSegment segment = segment_of (self);
   if (segment.format != GST_FORMAT_TIME)
     return GST_CLOCK_TIME_NONE;
   return gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, pts);
-}
-
-GstClockTime
-strip_running_now (GstStripRender *self)
-{
-  GstClock *clock = gst_element_get_clock (GST_ELEMENT (self));
-  if (!clock)
-    return GST_CLOCK_TIME_NONE;
-  const GstClockTime now = gst_clock_get_time (clock);
-  const GstClockTime base_time = gst_element_get_base_time (GST_ELEMENT (self));
-  gst_object_unref (clock);
-  return now > base_time ? now - base_time : 0;
 }

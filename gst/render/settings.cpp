@@ -60,14 +60,6 @@ strip_properties ()
           "Depth difference, as a fraction of depth, beyond which neighbouring pixels are not "
           "joined",
           0, 1, kControllable),
-      P::number<&S::strips, &Strips::merge> ("merge", "Merge tolerance",
-          "Tolerance of strip simplification (0 = keep every pixel, 1 = 0.07 % of depth and 1.5 "
-          "colour levels)",
-          0, 100, kControllable),
-      P::number<&S::view_gap_m> ("view-gap", "View gap",
-          "Metres by which a view is moved behind the others, times 1 - cosine of its angle to the "
-          "viewing direction; not used by mode=blend",
-          0, 1, kControllable),
       P::number<&S::blend_range_m> ("blend-range", "Blend range",
           "Depth behind the nearest surface in metres within which views are blended with "
           "mode=blend",
@@ -88,14 +80,6 @@ strip_properties ()
           "Fit the view to the content at the start of the stream and on the keys r and Home; "
           "camera properties then count from that view",
           kControllable),
-      P::boolean<&S::show_cameras> ("show-cameras", "Show cameras",
-          "Draw the rig's cameras and their frusta from near to far", kControllable),
-      P::boolean<&S::back_faces> ("back-faces", "Back faces",
-          "Draw back faces where no front face covers them, for mode=strips (always on for rigs of "
-          "one camera)",
-          kControllable),
-      P::boolean<&S::tint_views> ("show-units", "Tint views", "Former name of tint-views",
-          GParamFlags (kControllable | G_PARAM_DEPRECATED)),
       P::boolean<&S::show_stats> (
           "show-stats", "Show statistics", "Overlay statistics on the output", kControllable),
       P::boolean<&S::keep_rate> ("keep-rate", "Keep rate",
@@ -110,18 +94,6 @@ strip_properties ()
           "background", "Background", "Background colour, ARGB", 0, G_MAXUINT32, kControllable),
       P::number<&S::view_mask> ("view-mask", "View mask",
           "Bit mask of the views to draw; bit n is view-id n", 0, G_MAXUINT64, kControllable),
-      P::number<&S::strips, &Strips::max_gap> ("max-gap", "Maximum gap",
-          "Maximum number of invalid pixels in a row or column that strips bridge", 0, 1000,
-          kControllable),
-      P::number<&S::samples> ("samples", "Multisampling",
-          "Number of samples per pixel for antialiasing, limited by OpenGL (0 or 1 = off); not "
-          "used by mode=blend",
-          0, 64, kControllable),
-      P::number<&S::hold_time> ("hold-time", "Hold time",
-          "Time in nanoseconds for which the last frame set is repeated when no other follows, if "
-          "the output has a frame rate of its own (G_MAXUINT64 = forever; not live: one minute at "
-          "most)",
-          0, G_MAXUINT64, kMutablePlaying),
   };
   return table;
 }

@@ -16,17 +16,12 @@ struct StripRenderSettings {
   double point_size = 1;                                        ///< in footprints of a pixel
   bool fit = false;                                             ///< to the content
   guint64 view_mask = G_MAXUINT64;                              ///< bit n: view-id n is drawn
-  bool show_cameras = false;
-  bool back_faces = false;
-  double view_gap_m = rangecast::kViewGap_m;
   double blend_range_m = rangecast::kBlendRange_m;
-  int samples = 0; ///< a pixel; below 2: no antialiasing
   bool tint_views = false;
   bool show_stats = false;
-  double eye_distance_m = 0.063;                ///< most people's
-  double convergence_m = 0;                     ///< 0: the camera target's distance
-  bool keep_rate = false;                       ///< even if it is the input's
-  GstClockTime hold_time = GST_CLOCK_TIME_NONE; ///< of a frame set that none follows
+  double eye_distance_m = 0.063; ///< most people's
+  double convergence_m = 0;      ///< 0: the camera target's distance
+  bool keep_rate = false;        ///< even if it is the input's
   rangecast::StripSettings strips;
   guint strips_serial = 0; ///< changes with each property but the camera's
 };

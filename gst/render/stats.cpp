@@ -37,8 +37,8 @@ StatsText::update (const RenderStats &stats, std::size_t views, GstClockTime lat
   if (last_us_ < 0)
     lines_[0] = "counting";
   else
-    print_line (lines_[0], "%.1f pictures/s of %.1f frame sets/s",
-        rate (stats.frames, last_.frames), rate (stats.frame_sets, last_.frame_sets));
+    print_line (lines_[0], "%.1f frames/s of %.1f frame sets/s", rate (stats.frames, last_.frames),
+        rate (stats.frame_sets, last_.frame_sets));
   print_line (lines_[1], "%" G_GUINT64_FORMAT " points of %u views", stats.points, guint (views));
   print_line (lines_[2], "%" G_GUINT64_FORMAT " triangles", stats.triangles);
   if (last_us_ < 0)

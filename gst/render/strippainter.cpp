@@ -165,16 +165,13 @@ StripPainter::upload (std::span<const RenderLayer> layers)
 }
 
 void
-StripPainter::draw_layer (const ViewObjects &objects, const RenderLayer &layer,
-    const RenderPicture &picture, bool back) const
+StripPainter::draw_layer (
+    const ViewObjects &objects, const RenderLayer &layer, const RenderPicture &picture) const
 {
   const GstGLFuncs *gl = context_->gl_vtable;
   GstGLShader *shader = shaders_[std::size_t (picture.mode) - 1];
-  Mat4 matrix = clip_from_pixel (picture.clip_from_world, *layer.view, layer.image.roi);
-  if (picture.back_faces) /* half of the depth buffer for each side: fronts are before all backs */
-    matrix = rangecast::in_half_of_depths (matrix, back);
-  const double gap_m =
-      rangecast::strip_gap (picture.clip_from_world, *layer.view, picture.view_gap_m);
+  const Mat4 matrix = clip_from_pixel (picture.clip_from_world, *layer.view, layer.image.roi);
+  const double gap_m = rangecast::strip_gap (picture.clip_from_world, *layer.view);
   set_position_uniforms (shader, rangecast::place_layer (matrix, picture.clip_from_world, gap_m));
   gst_gl_shader_set_uniform_1f (shader, "u_focal", gfloat (layer.view->intrinsics.fx));
   gst_gl_shader_set_uniform_1f (shader, "u_unit", gfloat (layer.view->depth_unit_m));
@@ -187,22 +184,6 @@ StripPainter::draw_layer (const ViewObjects &objects, const RenderLayer &layer,
   gl->BindVertexArray (objects.array);
   gl->DrawArrays (picture.mode == StripMode::kPoints ? GL_POINTS : GL_TRIANGLE_STRIP, 0,
       GLsizei (layer.vertices.size ()));
-}
-
-/* Draws the surfaces' fronts, or their backs. Only strips have sides: noise turns many a single
- * rectangle over. */
-void
-StripPainter::draw_side (
-    std::span<const RenderLayer> layers, const RenderPicture &picture, bool back) const
-{
-  const GstGLFuncs *gl = context_->gl_vtable;
-  if (picture.mode == StripMode::kStrips) {
-    gl->Enable (GL_CULL_FACE);
-    gl->CullFace (rangecast::mirrors (picture.clip_from_world) != back ? GL_FRONT : GL_BACK);
-  }
-  for (const RenderLayer &layer : layers)
-    if (!layer.vertices.empty ())
-      draw_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer, picture, back);
 }
 
 const char *
@@ -226,9 +207,14 @@ StripPainter::draw (const RenderPicture &picture, std::span<const RenderLayer> l
   gst_gl_shader_set_uniform_1f (shader, "u_step", gfloat (picture.depth_step));
   gst_gl_shader_set_uniform_1f (
       shader, "u_point_size", picture.point_size * picture.pixels_per_unit);
-  draw_side (layers, picture, false);
-  if (picture.back_faces && picture.mode == StripMode::kStrips)
-    draw_side (layers, picture, true);
+  /* Only strips have sides: noise turns many a single rectangle over. */
+  if (picture.mode == StripMode::kStrips && !picture.back_faces) {
+    gl->Enable (GL_CULL_FACE);
+    gl->CullFace (rangecast::mirrors (picture.clip_from_world) ? GL_FRONT : GL_BACK);
+  }
+  for (const RenderLayer &layer : layers)
+    if (!layer.vertices.empty ())
+      draw_layer (objects_[turn_][std::size_t (layer.image.view_id)], layer, picture);
   gl->BindVertexArray (0);
   gl->BindBuffer (GL_ARRAY_BUFFER, 0);
   gl->Disable (GL_DEPTH_TEST);

@@ -34,10 +34,8 @@ private:
   };
   void prepare (ViewObjects &objects, int width, int height);
   guint64 upload_layer (ViewObjects &objects, const RenderLayer &layer);
-  void draw_layer (const ViewObjects &objects, const RenderLayer &layer,
-      const RenderPicture &picture, bool back) const;
-  void draw_side (
-      std::span<const RenderLayer> layers, const RenderPicture &picture, bool back) const;
+  void draw_layer (
+      const ViewObjects &objects, const RenderLayer &layer, const RenderPicture &picture) const;
 
   /* glVertexAttribIPointer, which GStreamer's table of functions lacks */
   using AttributePointer = void (GSTGLAPI *) (

@@ -2,8 +2,10 @@
 #pragma once
 
 /* What the files of striprender share: gststriprender.cpp is the element, scheduling.cpp decides
- * when which frame set is drawn and has the locking order, frame.cpp draws one. */
+ * which frame set is drawn when, frame.cpp draws one. */
 
+#include <atomic>
+#include <gst/base/gstaggregator.h>
 #include <gst/gl/gl.h>
 #include <gst/video/video.h>
 
@@ -12,93 +14,84 @@
 #include <rangecast/overlay/stats_panel.hpp>
 #include <rangecast/surface/view_fit.hpp>
 
+#include "caps.hpp"
 #include "category.hpp"
 #include "common/statsreporter.hpp"
-#include "gststriprender.h"
-#include "outputschedule.hpp"
-#include "outputtask.hpp"
+#include "glcontext.hpp"
 #include "renderer.hpp"
-#include "scene.hpp"
 #include "settings.hpp"
 #include "stats.hpp"
 
-/** A part of the stream without frame sets. */
-struct StreamGap {
-  GstClockTime begin = 0, end = 0; /* stream position; equal: there is none */
-  GstGapFlags flags = GstGapFlags (0);
-};
-
 struct GstStripRenderPrivate {
-  std::mutex lock; /* guards what follows; the last of the locks, see scheduling.cpp */
+  std::mutex lock; /* guards what follows; nothing is pushed, posted or queried with it */
   StripRenderSettings settings;
   RenderStats stats;
   FrameRate rate;                              /* of the output's caps */
-  OutputSchedule schedule;                     /* active: the output has a rate of its own */
   GstClockTime earliest = GST_CLOCK_TIME_NONE; /* running time up to which pictures are late */
-  GstClockTime upstream_latency = 0;
-  GstClockTime pipeline_latency = 0;     /* from the LATENCY event */
-  GstClockTime overrun = 0;              /* latency for drawing that takes longer than a period */
-  int slow_pictures = 0;                 /* the last ones that took longer than that */
-  GstFlowReturn task_flow = GST_FLOW_OK; /* of the output task's last push */
-  bool discont = false;                  /* pictures before the next one were dropped */
+  GstClockTime pipeline_latency = 0;           /* from the LATENCY event */
+  GstClockTime overrun = 0; /* latency for drawing that takes longer than a period */
 
-  /* Written with both stream locks, read with either. */
+  GstAggregatorPad *sink = nullptr;
+  GstPadChainFunction chain = nullptr; /* GstAggregator's, of that pad */
+  GlContext gl;                        /* has a lock of its own */
+  StatsReporter reporter;              /* has locks of its own */
+
+  /* Of the aggregator's thread, and on the OpenGL thread while that one waits for it. */
   GstCaps *input = nullptr; /* the last ones that were accepted */
   gstrange::RangeInfo info; /* of these */
   GstVideoInfo out;
-  bool live = false, live_known = false;
-
-  /* Of drawing: with the source pad's stream lock, or on the streaming thread if that draws;
-   * or on the OpenGL thread while that thread waits for it. */
-  StripScene scene;
-  GstBuffer *drawn = nullptr; /* whose strips the scene has, if it may be drawn again */
+  GstGLContext *context = nullptr; /* of the renderer, while it has objects */
+  Renderer renderer;
+  rangecast::SurfaceScene scene;
   rangecast::ViewFit fit;
   std::array<rangecast::RangeImage, rangecast::kMaxViews> visible; /* selected by view-mask */
-  Renderer renderer;
   StatsText stats_text;
   rangecast::StatsPanel stats_panel;
   GstClockTime first_running = GST_CLOCK_TIME_NONE; /* of the first picture: auto-orbit's begin */
-  GError *gl_error = nullptr;                       /* why OpenGL cannot be used */
-  GError *output_error = nullptr;                   /* why pictures of that size cannot be drawn */
-  bool no_context = false;
-  bool gl_error_posted = false; /* negotiation is tried again, the error is not posted again */
-  StreamGap gap;                /* to be sent between pictures, as far as these do not fill it */
 
-  OutputTask task;
-  StatsReporter reporter; /* has locks of its own */
+  /* Of the same, if the output has a frame rate of its own: stream positions. */
+  GstBuffer *frame_set = nullptr;          /* the newest one */
+  bool is_built = false;                   /* the scene has its strips */
+  GstClockTime end = 0;                    /* of the frame set */
+  GstClockTime follows = 0;                /* the next frame set, if it has no time */
+  GstClockTime next = GST_CLOCK_TIME_NONE; /* of the next picture */
+  int slow_pictures = 0; /* the last ones that took longer than a period and `overrun` */
+  bool segment_sent = false;
+  std::atomic<bool> discont = true; /* there is no picture right before the next one */
 };
 
+G_DECLARE_FINAL_TYPE (GstStripRender, gst_strip_render, GST, STRIP_RENDER, GstAggregator)
+
 struct _GstStripRender {
-  GstGLBaseFilter parent;
+  GstAggregator parent;
   GstStripRenderPrivate *priv;
 };
 
-/** @name scheduling.cpp: GstBaseTransform's functions, which decide when a frame set is drawn @{ */
-GstFlowReturn gst_strip_render_submit_input_buffer (
-    GstBaseTransform *base, gboolean is_discont, GstBuffer *in);
-GstFlowReturn gst_strip_render_generate_output (GstBaseTransform *base, GstBuffer **out);
-gboolean gst_strip_render_sink_event (GstBaseTransform *base, GstEvent *event);
-gboolean gst_strip_render_query (
-    GstBaseTransform *base, GstPadDirection direction, GstQuery *query);
+/** @name scheduling.cpp: which frame set is drawn when. On the aggregator's thread unless they say
+ * otherwise @{ */
+GstFlowReturn gst_strip_render_aggregate (GstAggregator *aggregator, gboolean timeout);
+GstClockTime gst_strip_render_get_next_time (GstAggregator *aggregator);
+/** Pushes the pictures that the newest frame set still has to show, and forgets it. */
+void strip_drain (GstStripRender *self);
+/** Live, a frame set that is late when the next one arrives is dropped: GstAggregator keeps one
+ * while another is drawn, which would add a period or two of latency where drawing cannot keep up.
+ * The streaming thread. */
+void strip_drop_late (GstStripRender *self);
+/** Forgets the stream. */
+void strip_reset_stream (GstStripRender *self);
+/** Reports latency that follows from the rate. Any thread, without locks. */
+void strip_update_latency (GstStripRender *self);
 /** A QOS or LATENCY event from downstream. Any thread. */
 void strip_handle_timing_event (GstStripRender *self, GstEvent *event);
-
-/** Selects one picture per frame set or a frame rate of its own, from caps and properties. With
- *  both stream locks. */
-void strip_select_mode (GstStripRender *self);
-/** Forgets the stream. With both stream locks, or while stopped. */
-void strip_reset_stream (GstStripRender *self);
 
 /** Running time of a stream position, or GST_CLOCK_TIME_NONE outside of the segment. */
 GstClockTime strip_running_time (GstStripRender *self, GstClockTime pts);
 /** Stream time of a stream position, or GST_CLOCK_TIME_NONE outside of the segment. */
 GstClockTime strip_stream_time (GstStripRender *self, GstClockTime pts);
-/** The clock's running time, or GST_CLOCK_TIME_NONE without a clock. Any thread. */
-GstClockTime strip_running_now (GstStripRender *self);
 /** @} */
 
 /** frame.cpp: draws a frame set into a buffer, as it is to be seen at that buffer's PTS. Posts
- *  errors. With the source pad's stream lock, or on the streaming thread if that draws.
- *  @param keep  more pictures may be drawn of it: its strips stay */
+ *  errors. On the aggregator's thread.
+ *  @param repeated  the last picture showed the same frame set: its strips are kept */
 GstFlowReturn strip_draw_frame (
-    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool keep);
+    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool repeated);

@@ -9,20 +9,19 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 udpsrc port=5004
- * caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
- * rtpneighbourcodeguard ! rtpjitterbuffer ! rtpneighbourcodedepay ! neighbourcodedec !
- * rangealign ! striprender ! glimagesink
+ * gst-launch-1.0 udpsrc port=5004 \
+ *   caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" ! \
+ *   rtpneighbourcodeguard ! rtpjitterbuffer ! rtpneighbourcodedepay ! neighbourcodedec ! \
+ *   rangealign ! striprender ! glimagesink
  * ]|
  *
  * Since: 0.1
  */
-#include "gstrtpneighbourcodedepay.h"
+#include <gst/rtp/gstrtpbasedepayload.h>
 
 #include <gst/rtp/rtp.h>
 
 #include <algorithm>
-#include <cstring>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
@@ -33,9 +32,9 @@
 #include <span>
 #include <vector>
 
-#include "common/properties.hpp"
-#include "common/recycledmemories.hpp"
-#include "common/statsreporter.hpp"
+#include "common/accessunitwriter.hpp"
+#include "common/capsadvice.hpp"
+#include "common/elementproperties.hpp"
 
 using rangecast::Status;
 using rangecast::StatusCode;
@@ -46,96 +45,11 @@ using rangecast::UnitType;
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_depay_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_depay_debug
 
-enum { PROP_0, PROP_UNIT_STATS, PROP_STATS_INTERVAL };
-
 namespace {
 /* Since start; units without rig views. */
 struct Counters {
   guint64 packets = 0, units = 0, bad_units = 0, access_units = 0, unmarked = 0, without_rig = 0,
           lost_packets = 0, bytes = 0;
-};
-
-/* Assembles the units of an access unit, as they arrive, within the limits of one. The memory goes
- * out as a buffer without being copied, and is used again once downstream is done with it. */
-class AccessUnitAssembler {
-public:
-  AccessUnitAssembler () = default;
-  ~AccessUnitAssembler () { reset (); }
-  AccessUnitAssembler (const AccessUnitAssembler &) = delete;
-
-  [[nodiscard]] bool empty () const { return size_ == 0; }
-
-  /* @return false, and the unit is lost, if the access unit would become longer than
-   * kMaxAccessUnitSize or have more than kMaxSlices units, or if memory is short */
-  bool add (std::span<const guint8> unit)
-  {
-    const gsize end = size_ + unit.size ();
-    if (end > rangecast::kMaxAccessUnitSize || units_ == rangecast::kMaxSlices)
-      return false;
-    if (end > map_.size && !grow (end))
-      return false;
-    std::memcpy (map_.data + size_, unit.data (), unit.size ());
-    size_ = end;
-    units_++;
-    return true;
-  }
-  void clear () { size_ = units_ = 0; }
-  /* The access unit, which is not empty; empty afterwards. @return transfer full */
-  GstBuffer *finish ()
-  {
-    /* A single huge access unit does not claim memory for all that follow it. */
-    constexpr gsize kMaxExpected = gsize{1} << 20;
-    expected_ = std::min (size_ + size_ / 8, kMaxExpected);
-    gst_memory_unmap (memory_, &map_);
-    gst_memory_resize (memory_, 0, size_);
-    GstBuffer *buffer = gst_buffer_new ();
-    gst_buffer_append_memory (buffer, memory_);
-    memory_ = nullptr;
-    map_ = {};
-    clear ();
-    return buffer;
-  }
-  /* Discards the units and frees all memory. */
-  void reset ()
-  {
-    clear ();
-    if (memory_) {
-      gst_memory_unmap (memory_, &map_);
-      gst_memory_unref (memory_);
-    }
-    memory_ = nullptr;
-    map_ = {};
-    memories_.drop ();
-  }
-
-private:
-  bool grow (gsize needed)
-  {
-    GstMemory *larger = memories_.acquire (std::min<gsize> (
-        std::max ({needed, 2 * map_.size, expected_}), rangecast::kMaxAccessUnitSize));
-    if (!larger)
-      return false;
-    GstMapInfo map;
-    gst_memory_resize (larger, 0, larger->maxsize);
-    if (!gst_memory_map (larger, &map, GST_MAP_WRITE)) {
-      gst_memory_unref (larger);
-      return false;
-    }
-    if (memory_) {
-      std::memcpy (map.data, map_.data, size_);
-      gst_memory_unmap (memory_, &map_);
-      gst_memory_unref (memory_);
-    }
-    memory_ = larger;
-    map_ = map;
-    return true;
-  }
-
-  RecycledMemories memories_;
-  GstMemory *memory_ = nullptr; /* mapped, or nullptr */
-  GstMapInfo map_{};
-  gsize size_ = 0, units_ = 0; /* bytes and units so far */
-  gsize expected_ = 0;         /* size of the next access unit, a guess */
 };
 
 } // namespace
@@ -156,12 +70,17 @@ struct GstRtpNeighbourCodeDepayPrivate {
   std::optional<guint8> payload_type; /* of the last undamaged packet */
 
   /* the access unit that is being assembled; streaming thread only */
-  AccessUnitAssembler access_unit; /* its units so far */
+  std::vector<guint8> slices; /* so far */
+  gsize n_slices = 0;         /* how many they are */
+  AccessUnitWriter writer;
   rangecast::KeyCheck key_check;
   bool has_gap = false;  /* packets were lost before or between its units */
   guint32 timestamp = 0; /* RTP time */
   GstClockTime pts = GST_CLOCK_TIME_NONE, capture_time = GST_CLOCK_TIME_NONE;
 };
+
+G_DECLARE_FINAL_TYPE (GstRtpNeighbourCodeDepay, gst_rtp_neighbour_code_depay, GST,
+    RTP_NEIGHBOUR_CODE_DEPAY, GstRTPBaseDepayload)
 
 struct _GstRtpNeighbourCodeDepay {
   GstRTPBaseDepayload parent;
@@ -175,16 +94,20 @@ static GstStaticPadTemplate sink_template =
 static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
         GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-            ", version = (int) 3, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
+            ", version = (int) 4, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS));
 
 G_DEFINE_TYPE (GstRtpNeighbourCodeDepay, gst_rtp_neighbour_code_depay, GST_TYPE_RTP_BASE_DEPAYLOAD)
 GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodedepay, "rtpneighbourcodedepay", GST_RANK_SECONDARY,
-    GST_TYPE_RTP_NEIGHBOUR_CODE_DEPAY)
+    gst_rtp_neighbour_code_depay_get_type ())
 
 static void
 reset_access_unit (GstRtpNeighbourCodeDepayPrivate *priv)
 {
-  priv->access_unit.clear ();
+  constexpr gsize kMaxKept = gsize{1} << 20; /* one huge access unit keeps none of its memory */
+  priv->slices.clear ();
+  if (priv->slices.capacity () > kMaxKept)
+    priv->slices.shrink_to_fit ();
+  priv->n_slices = 0;
   priv->key_check.reset ();
   priv->has_gap = false;
   priv->pts = priv->capture_time = GST_CLOCK_TIME_NONE;
@@ -199,9 +122,12 @@ set_source_caps (GstRTPBaseDepayload *base, const rangecast::StreamInfo &stream)
   const auto info = gstrange::make_info (stream.rig, stream.fps_n, stream.fps_d);
   GstCaps *caps = gstrange::make_neighbour_code_caps (info, "access-unit");
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
-  gst_pad_set_caps (GST_RTP_BASE_DEPAYLOAD_SRCPAD (base), caps);
+  GstPad *src = GST_RTP_BASE_DEPAYLOAD_SRCPAD (base);
+  priv->have_caps = require_downstream (GST_ELEMENT (base), src);
+  if (priv->have_caps)
+    gst_pad_set_caps (src, caps);
   gst_caps_unref (caps);
-  priv->have_caps = true;
+  priv->writer.set_rig (info);
   priv->rig_views = stream.rig.views.size ();
   priv->view_bits = view_bits (stream.rig);
   priv->reporter.set_views (stream.rig);
@@ -237,9 +163,9 @@ gst_rtp_neighbour_code_depay_set_caps (GstRTPBaseDepayload *base, GstCaps *caps)
   const gchar *version = gst_structure_get_string (structure, "version");
   base->clock_rate = 90000;
   reset_access_unit (priv);
-  if (version && g_strcmp0 (version, "3") != 0) {
+  if (version && g_strcmp0 (version, "4") != 0) {
     gst_range_flow_return (GST_ELEMENT (base),
-        {StatusCode::kUnsupported, std::string ("RTP caps: version ") + version + ", expected 3"});
+        {StatusCode::kUnsupported, std::string ("RTP caps: needs version 4, got ") + version});
     return FALSE;
   }
   if (!gst_structure_has_field_typed (structure, "rig", G_TYPE_STRING))
@@ -296,6 +222,7 @@ handle_rig_view (GstRtpNeighbourCodeDepay *self, std::span<const guint8> unit)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
   const Status status = priv->collector.add (unit);
+  priv->writer.repeat_rig (); /* who begins to record where no key frame sets come needs it, too */
   if (status.code () == StatusCode::kBadSize && !priv->warned_of_size) {
     priv->warned_of_size = true; /* once: nothing can be decoded without the rig */
     gst_range_post_warning (GST_ELEMENT (self), status);
@@ -303,31 +230,27 @@ handle_rig_view (GstRtpNeighbourCodeDepay *self, std::span<const guint8> unit)
   return status.ok ();
 }
 
-/* Whether a slice is of a view that is not in the rig of this stream: behind rangemux it would be
- * drawn over the view of another host. */
+/* Adds a slice to the access unit. @return false if it is dropped */
 static bool
-is_foreign (const GstRtpNeighbourCodeDepayPrivate *priv, std::span<const guint8> unit)
-{
-  constexpr std::size_t kViewId = 4;
-  return priv->view_bits != 0 && unit.size () > kViewId && unit[kViewId] < rangecast::kMaxViews &&
-         !(priv->view_bits >> unit[kViewId] & 1);
-}
-
-/* Adds a unit to the access unit. @return false if it is dropped */
-static bool
-add_unit (GstRtpNeighbourCodeDepay *self, std::span<const guint8> unit, bool is_slice)
+add_slice (GstRtpNeighbourCodeDepay *self, std::span<const guint8> unit)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
-  if (is_slice && is_foreign (priv, unit)) {
+  rangecast::SliceHeader slice;
+  const bool is_readable = rangecast::read_slice_header (unit, slice).ok ();
+  /* Behind rangemux such a slice would be drawn over the view of another host. */
+  if (is_readable && priv->view_bits != 0 && !(priv->view_bits >> slice.view_id & 1)) {
     GST_DEBUG_OBJECT (self, "dropping a slice of a view that is not in the rig");
     return false;
   }
-  if (!priv->access_unit.add (unit)) {
-    GST_DEBUG_OBJECT (self, "dropping a unit: the access unit is too long");
+  std::vector<guint8> &slices = priv->slices;
+  if (slices.size () + unit.size () > priv->writer.max_size () ||
+      priv->n_slices == rangecast::kMaxSlices) {
+    GST_DEBUG_OBJECT (self, "dropping a slice: the access unit is too long");
     return false;
   }
-  rangecast::SliceHeader slice;
-  if (!is_slice || !rangecast::read_slice_header (unit, slice).ok ())
+  slices.insert (slices.end (), unit.begin (), unit.end ());
+  priv->n_slices++;
+  if (!is_readable)
     return true;
   priv->key_check.add (slice);
   /* The earliest, because the views of a frame set may differ by parts of a frame. */
@@ -346,7 +269,7 @@ handle_units (GstRtpNeighbourCodeDepay *self, std::span<const guint8> payload)
   while (const auto unit = reader.next (header)) {
     if (header.type == static_cast<guint8> (UnitType::kRigView))
       bad += !handle_rig_view (self, *unit);
-    else if (add_unit (self, *unit, header.type == static_cast<guint8> (UnitType::kSlice)))
+    else if (header.type == static_cast<guint8> (UnitType::kSlice) && add_slice (self, *unit))
       good++;
     else
       bad++;
@@ -384,15 +307,20 @@ finish_access_unit (GstRtpNeighbourCodeDepay *self, bool has_end)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
   GstBuffer *buffer = nullptr;
-  if (!priv->access_unit.empty () && !priv->have_caps) {
+  if (!priv->slices.empty () && !priv->have_caps) {
     GST_DEBUG_OBJECT (self, "dropping an access unit: the rig is not known yet");
     std::lock_guard guard (priv->lock);
     priv->counters.without_rig++;
-  } else if (!priv->access_unit.empty ()) {
-    buffer = priv->access_unit.finish ();
+  } else if (!priv->slices.empty ()) {
+    const bool key = is_key_unit (priv, has_end);
+    const Status status = priv->writer.begin (key, priv->slices.size ());
+    if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
+      return nullptr;
+    priv->writer.add (priv->slices);
+    buffer =
+        priv->writer.finish (byte_stream_time (GST_RTP_BASE_DEPAYLOAD (self)->segment, priv->pts));
     GST_BUFFER_PTS (buffer) = priv->pts;
-    if (!is_key_unit (priv, has_end))
-      GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
+    set_key (buffer, key);
     if (GST_CLOCK_TIME_IS_VALID (priv->capture_time))
       gst_range_buffer_set_capture_time (buffer, priv->capture_time);
     GST_LOG_OBJECT (self, "%s%" GST_PTR_FORMAT, priv->has_gap ? "incomplete: " : "", buffer);
@@ -412,7 +340,7 @@ static void
 push_unmarked (GstRtpNeighbourCodeDepay *self)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = self->priv;
-  if (priv->access_unit.empty ())
+  if (priv->slices.empty ())
     return;
   GST_DEBUG_OBJECT (self, "the last packet of an access unit is missing");
   {
@@ -438,7 +366,7 @@ gst_rtp_neighbour_code_depay_process (GstRTPBaseDepayload *base, GstRTPBuffer *r
   if (timestamp != priv->timestamp)
     push_unmarked (self);
   priv->has_gap = priv->has_gap || after_gap;
-  if (priv->access_unit.empty ()) {
+  if (priv->slices.empty ()) {
     priv->timestamp = timestamp;
     priv->pts = GST_BUFFER_PTS (rtp->buffer);
   }
@@ -494,7 +422,7 @@ gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange t
   if (transition == GST_STATE_CHANGE_PAUSED_TO_READY) {
     priv->reporter.stop ();
     reset_access_unit (priv);
-    priv->access_unit.reset ();
+    priv->writer.drop ();
     priv->collector.reset ();
     priv->used_generation = 0;
     priv->have_caps = priv->warned_of_size = false;
@@ -507,42 +435,15 @@ gst_rtp_neighbour_code_depay_change_state (GstElement *element, GstStateChange t
   return result;
 }
 
-static void
-gst_rtp_neighbour_code_depay_set_property (
-    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+static GstStructure *
+make_stats (const GstRtpNeighbourCodeDepayPrivate *priv)
 {
-  if (id == PROP_STATS_INTERVAL)
-    GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv->reporter.set_interval (g_value_get_uint (value));
-  else
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_rtp_neighbour_code_depay_get_property (
-    GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv;
-  if (id == PROP_STATS_INTERVAL)
-    return g_value_set_uint (value, priv->reporter.interval ());
-  if (id != PROP_UNIT_STATS) {
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    return;
-  }
-  std::lock_guard guard (priv->lock);
   const Counters &c = priv->counters;
-  g_value_take_boxed (value,
-      gst_structure_new ("application/x-rtpneighbourcodedepay-stats", "packets", G_TYPE_UINT64,
-          c.packets, "units", G_TYPE_UINT64, c.units, "bad-units", G_TYPE_UINT64, c.bad_units,
-          "access-units", G_TYPE_UINT64, c.access_units, "unmarked", G_TYPE_UINT64, c.unmarked,
-          "without-rig", G_TYPE_UINT64, c.without_rig, "lost-packets", G_TYPE_UINT64,
-          c.lost_packets, "bytes", G_TYPE_UINT64, c.bytes, nullptr));
-}
-
-static void
-gst_rtp_neighbour_code_depay_finalize (GObject *object)
-{
-  delete GST_RTP_NEIGHBOUR_CODE_DEPAY (object)->priv;
-  G_OBJECT_CLASS (gst_rtp_neighbour_code_depay_parent_class)->finalize (object);
+  return gst_structure_new ("application/x-rtpneighbourcodedepay-stats", "packets", G_TYPE_UINT64,
+      c.packets, "units", G_TYPE_UINT64, c.units, "bad-units", G_TYPE_UINT64, c.bad_units,
+      "access-units", G_TYPE_UINT64, c.access_units, "unmarked", G_TYPE_UINT64, c.unmarked,
+      "without-rig", G_TYPE_UINT64, c.without_rig, "lost-packets", G_TYPE_UINT64, c.lost_packets,
+      "bytes", G_TYPE_UINT64, c.bytes, nullptr);
 }
 
 static void
@@ -558,16 +459,11 @@ gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto depayload_class = GST_RTP_BASE_DEPAYLOAD_CLASS (klass);
 
-  object_class->set_property = gst_rtp_neighbour_code_depay_set_property;
-  object_class->get_property = gst_rtp_neighbour_code_depay_get_property;
-  object_class->finalize = gst_rtp_neighbour_code_depay_finalize;
-
-  g_object_class_install_property (object_class, PROP_UNIT_STATS,
-      g_param_spec_boxed ("unit-stats", "Unit statistics",
-          "Counters since the element was started: packets, units, bad-units, access-units, "
-          "unmarked, without-rig, lost-packets, bytes",
-          GST_TYPE_STRUCTURE, kReadOnly));
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+  object_class->finalize = delete_private<GstRtpNeighbourCodeDepay>;
+  install_properties<GstRtpNeighbourCodeDepay, nullptr, make_stats> (object_class,
+      "Counters since the element was started: packets, units, bad-units, access-units, "
+      "unmarked, without-rig, lost-packets, bytes",
+      "unit-stats");
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

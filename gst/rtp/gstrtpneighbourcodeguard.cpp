@@ -3,7 +3,7 @@
  * SECTION:element-rtpneighbourcodeguard
  * @title: rtpneighbourcodeguard
  *
- * Passes the RTP packets of one sender of coded frame sets (or of another payload, such as speech,
+ * Passes the RTP packets of one sender of coded frame sets (or of another payload, such as audio,
  * whose encoding-name is in the caps) and drops all others at its port. It accepts the address and
  * SSRC of the first three consecutive packets, until they are silent for half a second. Place it
  * between udpsrc (or srtpdec) and rtpjitterbuffer, which accepts any RTP packet. It is no
@@ -11,15 +11,15 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 udpsrc port=5004
- * caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" !
- * rtpneighbourcodeguard ! rtpjitterbuffer ! rtpneighbourcodedepay ! neighbourcodedec !
- * rangealign ! striprender ! glimagesink
+ * gst-launch-1.0 udpsrc port=5004 \
+ *   caps="application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE" ! \
+ *   rtpneighbourcodeguard ! rtpjitterbuffer ! rtpneighbourcodedepay ! neighbourcodedec ! \
+ *   rangealign ! striprender ! glimagesink
  * ]|
  *
  * Since: 0.1
  */
-#include "gstrtpneighbourcodeguard.h"
+#include <gst/gst.h>
 
 #include <gst/net/gstnet.h>
 #include <gst/rtp/rtp.h>
@@ -32,12 +32,10 @@
 #include <string>
 #include <utility>
 
-#include "common/properties.hpp"
+#include "common/elementproperties.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_guard_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_guard_debug
-
-enum : guint { PROP_STATS = 1 };
 
 namespace {
 
@@ -98,6 +96,9 @@ struct GstRtpNeighbourCodeGuardPrivate {
   bool any_payload = false; /* the caps name another encoding, whose packets are not examined */
 };
 
+G_DECLARE_FINAL_TYPE (GstRtpNeighbourCodeGuard, gst_rtp_neighbour_code_guard, GST,
+    RTP_NEIGHBOUR_CODE_GUARD, GstElement)
+
 struct _GstRtpNeighbourCodeGuard {
   GstElement parent;
   GstPad *sinkpad, *srcpad;
@@ -111,7 +112,7 @@ static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
 
 G_DEFINE_TYPE (GstRtpNeighbourCodeGuard, gst_rtp_neighbour_code_guard, GST_TYPE_ELEMENT);
 GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodeguard, "rtpneighbourcodeguard", GST_RANK_NONE,
-    GST_TYPE_RTP_NEIGHBOUR_CODE_GUARD)
+    gst_rtp_neighbour_code_guard_get_type ())
 
 /* ---- packets ---- */
 
@@ -312,15 +313,11 @@ warn_of_invalid (GstRtpNeighbourCodeGuard *self, GstClockTime now)
       now < priv->invalid_since + kInvalidTime)
     return;
   priv->warned_of_invalid = true;
-  if (priv->any_payload)
-    GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-        ("%u packets that are not RTP, and no valid one", priv->invalid), (nullptr));
-  else
-    GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
-        ("%u invalid packets and no valid one: the sender uses another codec or version (this is "
-         "version %d of the neighbour code), or encrypts (set --key)",
-            priv->invalid, rangecast::kBitstreamVersion),
-        (nullptr));
+  GST_ELEMENT_WARNING (self, STREAM, WRONG_TYPE,
+      ("%u invalid packets and no valid one: the sender uses another codec or version (this is "
+       "version %d of the neighbour code), or encrypts (set --key)",
+          priv->invalid, rangecast::kBitstreamVersion),
+      (nullptr));
 }
 
 /* ---- chain ---- */
@@ -448,19 +445,12 @@ gst_rtp_neighbour_code_guard_change_state (GstElement *element, GstStateChange t
   return result;
 }
 
-static void
-gst_rtp_neighbour_code_guard_get_property (
-    GObject *object, guint id, GValue *value, GParamSpec *pspec)
+static GstStructure *
+make_stats (const GstRtpNeighbourCodeGuardPrivate *priv)
 {
-  if (id != PROP_STATS) {
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    return;
-  }
-  GstRtpNeighbourCodeGuardPrivate *priv = GST_RTP_NEIGHBOUR_CODE_GUARD (object)->priv;
-  std::lock_guard guard (priv->lock);
-  g_value_take_boxed (value, gst_structure_new ("application/x-rtpneighbourcodeguard-stats",
-                                 "passed", G_TYPE_UINT64, priv->passed, "foreign", G_TYPE_UINT64,
-                                 priv->foreign, "senders", G_TYPE_UINT64, priv->senders, nullptr));
+  return gst_structure_new ("application/x-rtpneighbourcodeguard-stats", "passed", G_TYPE_UINT64,
+      priv->passed, "foreign", G_TYPE_UINT64, priv->foreign, "senders", G_TYPE_UINT64,
+      priv->senders, nullptr);
 }
 
 static void
@@ -496,10 +486,9 @@ gst_rtp_neighbour_code_guard_class_init (GstRtpNeighbourCodeGuardClass *klass)
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
 
-  object_class->get_property = gst_rtp_neighbour_code_guard_get_property;
   object_class->finalize = gst_rtp_neighbour_code_guard_finalize;
 
-  install_stats (object_class, PROP_STATS,
+  install_properties<GstRtpNeighbourCodeGuard, nullptr, make_stats> (object_class,
       "Counters since the element was started: passed and foreign packets, and senders");
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);

@@ -9,13 +9,13 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 avatartestsrc is-live=true num-buffers=100 ! neighbourcodeenc !
- * rtpneighbourcodepay ! udpsink host=127.0.0.1 port=5004
+ * gst-launch-1.0 avatartestsrc is-live=true num-buffers=100 ! neighbourcodeenc ! \
+ *   rtpneighbourcodepay ! udpsink host=127.0.0.1 port=5004
  * ]|
  *
  * Since: 0.1
  */
-#include "gstrtpneighbourcodepay.h"
+#include <gst/rtp/gstrtpbasepayload.h>
 
 #include <gst/rtp/rtp.h>
 #include <gst/video/video.h>
@@ -31,8 +31,7 @@
 #include <vector>
 
 #include "common/codedunits.hpp"
-#include "common/properties.hpp"
-#include "common/statsreporter.hpp"
+#include "common/elementproperties.hpp"
 
 using rangecast::Status;
 using rangecast::UnitHeader;
@@ -40,8 +39,6 @@ using rangecast::UnitType;
 
 GST_DEBUG_CATEGORY_STATIC (gst_rtp_neighbour_code_pay_debug);
 #define GST_CAT_DEFAULT gst_rtp_neighbour_code_pay_debug
-
-enum : guint { PROP_STATS_INTERVAL = 1, PROP_SETTINGS };
 
 namespace {
 
@@ -66,9 +63,10 @@ struct GstRtpNeighbourCodePayPrivate {
   bool by_slices = false;                         /* alignment of the input */
   bool within_frame_set = false;                  /* more slices of it may follow */
   GstClockTime pts = GST_CLOCK_TIME_NONE;         /* of the last slice */
-  gsize header_size = 0;                          /* of a packet, bytes */
-  GstCaps *header_caps = nullptr;                 /* source caps for which that is the size */
 };
+
+G_DECLARE_FINAL_TYPE (GstRtpNeighbourCodePay, gst_rtp_neighbour_code_pay, GST,
+    RTP_NEIGHBOUR_CODE_PAY, GstRTPBasePayload)
 
 struct _GstRtpNeighbourCodePay {
   GstRTPBasePayload parent;
@@ -84,8 +82,8 @@ static GstStaticPadTemplate src_template =
                          "encoding-name = (string) X-NEIGHBOUR-CODE"));
 
 G_DEFINE_TYPE (GstRtpNeighbourCodePay, gst_rtp_neighbour_code_pay, GST_TYPE_RTP_BASE_PAYLOAD)
-GST_ELEMENT_REGISTER_DEFINE (
-    rtpneighbourcodepay, "rtpneighbourcodepay", GST_RANK_SECONDARY, GST_TYPE_RTP_NEIGHBOUR_CODE_PAY)
+GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodepay, "rtpneighbourcodepay", GST_RANK_SECONDARY,
+    gst_rtp_neighbour_code_pay_get_type ())
 
 /* ---- caps ---- */
 
@@ -98,7 +96,7 @@ set_output_caps (GstRTPBasePayload *base, const gstrange::RangeInfo &info)
   gchar *rig = g_base64_encode (blob.data (), blob.size ());
   const std::string rate = std::to_string (info.fps_n) + "/" + std::to_string (info.fps_d);
   gst_rtp_base_payload_set_options (base, "video", TRUE, "X-NEIGHBOUR-CODE", 90000);
-  const gboolean set = gst_rtp_base_payload_set_outcaps (base, "version", G_TYPE_STRING, "3",
+  const gboolean set = gst_rtp_base_payload_set_outcaps (base, "version", G_TYPE_STRING, "4",
       "views", G_TYPE_STRING, std::to_string (info.views ()).c_str (), "width", G_TYPE_STRING,
       std::to_string (info.width).c_str (), "height", G_TYPE_STRING,
       std::to_string (info.height).c_str (), "framerate", G_TYPE_STRING, rate.c_str (), "rig",
@@ -137,14 +135,7 @@ gst_rtp_neighbour_code_pay_set_caps (GstRTPBasePayload *base, GstCaps *caps)
 
 namespace {
 
-/* Other units belong to files. */
-bool
-is_sent (const UnitHeader &header)
-{
-  return header.type == guint8 (UnitType::kSlice) || header.type == guint8 (UnitType::kRigView);
-}
-
-/* Makes packets of an access unit that share its memory. */
+/* Makes packets of the units of one type, which share their memory. */
 struct Packer {
   GstRTPBasePayload *base;
   GstBufferList *packets;
@@ -162,18 +153,18 @@ struct Packer {
   }
 
   /* @return the first unit that is too long for a packet, if any */
-  std::optional<UnitHeader> pack (GstBuffer *buffer)
+  std::optional<UnitHeader> pack (GstBuffer *buffer, UnitType type)
   {
     gsize begin = 0, end = 0; /* of the units for the next packet */
     std::optional<UnitHeader> too_long;
-    Status damage; /* what follows it is left out */
+    Status damage; /* what follows it is skipped */
     const auto flush = [&] {
       if (end > begin)
         add (buffer, begin, end - begin);
       begin = end;
     };
     const auto handle = [&] (gsize offset, std::span<const guint8> unit, const UnitHeader &header) {
-      if (!is_sent (header))
+      if (header.type != guint8 (type))
         return true;
       if (unit.size () > room) {
         too_long = header;
@@ -201,44 +192,21 @@ struct Packer {
 
 } // namespace
 
-/* Maximum size of an extension in the header, bytes; 0 if there is no element for it, so that the
- * base class does not write it either. */
+/* Size of the fixed header and of the negotiated extensions, which the base class adds to the
+ * packets later: one of at most 12 bytes each, as those for time and for transport-wide feedback.
+ */
 static gsize
-extension_size (const char *uri, const GstBuffer *buffer)
+header_size (GstRtpNeighbourCodePay *self)
 {
-  GstRTPHeaderExtension *extension = gst_rtp_header_extension_create_from_uri (uri);
-  if (!extension)
-    return 0;
-  const gsize size = 2 + gst_rtp_header_extension_get_max_size (extension, buffer);
-  gst_object_unref (extension);
-  return size;
-}
-
-/* The size of the fixed header and of the negotiated extensions, which the base class adds to the
- * packets later. */
-static gsize
-find_header_size (GstRtpNeighbourCodePay *self, const GstBuffer *buffer)
-{
-  GstRtpNeighbourCodePayPrivate *priv = self->priv;
-  GstCaps *caps = gst_pad_get_current_caps (GST_RTP_BASE_PAYLOAD_SRCPAD (self));
-  if (caps && caps == priv->header_caps) {
-    gst_caps_unref (caps);
-    return priv->header_size;
-  }
-  const GstStructure *structure = caps ? gst_caps_get_structure (caps, 0) : nullptr;
   gsize extensions = 0;
-  for (int i = 0; structure && i < gst_structure_n_fields (structure); i++) {
-    const char *name = gst_structure_nth_field_name (structure, guint (i));
-    const GValue *value = gst_structure_get_value (structure, name);
-    if (!g_str_has_prefix (name, "extmap-"))
-      continue;
-    if (GST_VALUE_HOLDS_ARRAY (value) && gst_value_array_get_size (value) > 1)
-      value = gst_value_array_get_value (value, 1); /* direction, URI, attributes */
-    if (G_VALUE_HOLDS_STRING (value))
-      extensions += extension_size (g_value_get_string (value), buffer);
+  if (GstCaps *caps = gst_pad_get_current_caps (GST_RTP_BASE_PAYLOAD_SRCPAD (self))) {
+    const GstStructure *structure = gst_caps_get_structure (caps, 0);
+    for (int i = 0; i < gst_structure_n_fields (structure); i++)
+      extensions +=
+          g_str_has_prefix (gst_structure_nth_field_name (structure, guint (i)), "extmap-");
+    gst_caps_unref (caps);
   }
-  gst_caps_take (&priv->header_caps, caps);
-  return gst_rtp_buffer_calc_header_len (0) + (extensions > 0 ? 4 + (extensions + 3) / 4 * 4 : 0);
+  return gst_rtp_buffer_calc_header_len (0) + (extensions > 0 ? 4 + 12 * extensions : 0);
 }
 
 /* Whether a buffer begins a frame set. The end of one without MARKER is known only afterwards; its
@@ -295,13 +263,14 @@ refuse_long_unit (GstRTPBasePayload *base, const UnitHeader &unit, guint mtu, gs
                : "config-interval=0, where receivers have the rig from caps or SDP";
   GST_ELEMENT_ERROR (base, LIBRARY, SETTINGS,
       ("A %s of %u bytes does not fit into RTP packets of mtu=%u; set mtu=%zu or more, or %s",
-          is_slice ? "slice" : "rig view", guint (unit.size), mtu,
-          unit.size + GST_RTP_NEIGHBOUR_CODE_PAY (base)->priv->header_size, other.c_str ()),
+          is_slice ? "slice" : "rig view", guint (unit.size), mtu, unit.size + mtu - room,
+          other.c_str ()),
       (nullptr));
   return GST_FLOW_ERROR;
 }
 
-/* Makes packets of the rig, if it is due, and of a frame set or some of its slices. */
+/* Makes packets of the rig, if it is due, and of the slices of a frame set, or some of them. The
+ * rig units of the frame set itself come too often, or not when they are due. */
 static std::optional<UnitHeader>
 pack_all (GstRtpNeighbourCodePay *self, Packer &packer, GstBuffer *buffer, bool with_rig)
 {
@@ -309,10 +278,10 @@ pack_all (GstRtpNeighbourCodePay *self, Packer &packer, GstBuffer *buffer, bool 
   if (with_rig) {
     GstBuffer *rig =
         gst_buffer_new_memdup (self->priv->rig_units.data (), self->priv->rig_units.size ());
-    too_long = packer.pack (rig);
+    too_long = packer.pack (rig, UnitType::kRigView);
     gst_buffer_unref (rig);
   }
-  return too_long ? too_long : packer.pack (buffer);
+  return too_long ? too_long : packer.pack (buffer, UnitType::kSlice);
 }
 
 static GstFlowReturn
@@ -320,7 +289,7 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
 {
   auto self = GST_RTP_NEIGHBOUR_CODE_PAY (base);
   const guint mtu = GST_RTP_BASE_PAYLOAD_MTU (base);
-  const gsize header = self->priv->header_size = find_header_size (self, buffer);
+  const gsize header = header_size (self);
   Packer packer = {base, gst_buffer_list_new (), mtu > header ? mtu - header : 0,
       GST_BUFFER_PTS (buffer), GST_BUFFER_DTS (buffer)};
   const GstClockTime running =
@@ -413,38 +382,6 @@ pay_properties ()
 }
 
 static void
-gst_rtp_neighbour_code_pay_set_property (
-    GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
-  if (id == PROP_STATS_INTERVAL) /* without our lock: the reporter sets a timer */
-    return priv->reporter.set_interval (g_value_get_uint (value));
-  std::lock_guard guard (priv->lock);
-  if (!pay_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_rtp_neighbour_code_pay_get_property (
-    GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  GstRtpNeighbourCodePayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (id == PROP_STATS_INTERVAL)
-    g_value_set_uint (value, priv->reporter.interval ());
-  else if (!pay_properties ().get (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_rtp_neighbour_code_pay_finalize (GObject *object)
-{
-  gst_clear_caps (&GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv->header_caps);
-  delete GST_RTP_NEIGHBOUR_CODE_PAY (object)->priv;
-  G_OBJECT_CLASS (gst_rtp_neighbour_code_pay_parent_class)->finalize (object);
-}
-
-static void
 gst_rtp_neighbour_code_pay_init (GstRtpNeighbourCodePay *self)
 {
   self->priv = new GstRtpNeighbourCodePayPrivate;
@@ -457,12 +394,8 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto payload_class = GST_RTP_BASE_PAYLOAD_CLASS (klass);
 
-  object_class->set_property = gst_rtp_neighbour_code_pay_set_property;
-  object_class->get_property = gst_rtp_neighbour_code_pay_get_property;
-  object_class->finalize = gst_rtp_neighbour_code_pay_finalize;
-
-  pay_properties ().install (object_class, PROP_SETTINGS);
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
+  object_class->finalize = delete_private<GstRtpNeighbourCodePay>;
+  install_properties<GstRtpNeighbourCodePay, pay_properties> (object_class);
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);

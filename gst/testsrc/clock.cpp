@@ -10,18 +10,9 @@ FrameClock::start ()
   index_ = 0;
   frame_ = 0;
   since_ = 0;
-  position_ = GST_CLOCK_TIME_NONE;
   last_tick_.reset ();
   discont_ = true;
   paused_since_tick_ = interrupted_ = false;
-}
-
-void
-FrameClock::seek (GstClockTime position)
-{
-  std::lock_guard guard (lock_);
-  position_ = position; /* the rate may not be known yet: next() does the rest */
-  discont_ = true;
 }
 
 bool
@@ -42,13 +33,6 @@ FrameTime
 FrameClock::next ()
 {
   std::lock_guard guard (lock_);
-  if (GST_CLOCK_TIME_IS_VALID (position_)) {
-    index_ = gst_util_uint64_scale (
-        position_, guint64 (rate_.frames), GST_SECOND * guint64 (rate_.seconds));
-    frame_ = static_cast<std::int64_t> (index_);
-    since_ = 0;
-    position_ = GST_CLOCK_TIME_NONE;
-  }
   FrameTime frame;
   frame.pts = frame.capture_time = since_ + time_of (frame_);
   frame.duration = since_ + time_of (frame_ + 1) - frame.pts;
@@ -129,23 +113,9 @@ FrameClock::interrupt ()
   clock_wait_.interrupt ();
 }
 
-void
-FrameClock::resume ()
-{
-  std::lock_guard guard (lock_);
-  interrupted_ = false;
-}
-
 GstClockTime
 FrameClock::period ()
 {
   std::lock_guard guard (lock_);
   return rate_.valid () ? time_of (1) : 0;
-}
-
-guint64
-FrameClock::skipped ()
-{
-  std::lock_guard guard (lock_);
-  return skipped_;
 }

@@ -3,6 +3,7 @@
 
 #include <gst/gst.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <mutex>
 #include <optional>
@@ -13,7 +14,7 @@
 /** When a frame is captured. */
 struct FrameTime {
   GstClockTime pts, duration, capture_time;
-  guint64 index; ///< frames before it: in the stream, or (not live, after a seek) from time 0
+  guint64 index; ///< frames before it
   guint64 tick;  ///< number of the frame period that begins at capture_time, at the present rate
   bool discont;
 };
@@ -26,8 +27,6 @@ public:
 
   /** Begins a stream at time 0. */
   void start ();
-  /** next() goes on with the frame that is shown at this time. */
-  void seek (GstClockTime position);
   /** Time goes on where the old rate left it. @return whether the rate has changed */
   bool set_rate (int fps_n, int fps_d);
   /** Gives up the clock that wait() used. */
@@ -45,13 +44,12 @@ public:
   void set_playing (bool playing);
   /** The thread pauses: ticks from now to the next frame do not count as skipped. */
   void pause ();
-  /** Ends wait(), and all later ones until resume(). */
+  /** Ends wait(), and all later ones until start(). */
   void interrupt ();
-  void resume ();
   /** Nanoseconds; 0 while the rate is not known. */
   GstClockTime period ();
   /** Ticks that passed without a frame while the element played. */
-  guint64 skipped ();
+  [[nodiscard]] guint64 skipped () const { return skipped_; }
 
 private:
   [[nodiscard]] std::int64_t next_tick (GstClockTime now, GstClockTime base) const;
@@ -64,13 +62,12 @@ private:
   std::condition_variable changed_;
   ClockWait clock_wait_;
   bool playing_ = false, interrupted_ = false, paused_since_tick_ = false;
-  guint64 skipped_ = 0;
+  std::atomic<guint64> skipped_ = 0;
   rangecast::TickRate rate_;
   guint64 index_ = 0;
   bool discont_ = true;
 
   std::int64_t frame_ = 0; ///< not live: the next one has PTS since_ + time_of (frame_)
   GstClockTime since_ = 0; ///< not live: when the rate changed
-  GstClockTime position_ = GST_CLOCK_TIME_NONE; ///< not live: where to seek to
-  std::optional<std::int64_t> last_tick_;       ///< live
+  std::optional<std::int64_t> last_tick_; ///< live
 };

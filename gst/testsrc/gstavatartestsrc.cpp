@@ -4,7 +4,7 @@
  * @title: avatartestsrc
  *
  * Renders a moving head and shoulders in a textured room, as seen by a rig of stereo cameras. The
- * figure is built in, with accessories (#GstAvatarTestSrc:dress), or a glTF or OBJ model
+ * figure is built in, or a glTF or OBJ model
  * (#GstAvatarTestSrc:location, #GstAvatarTestSrc:model-top).
  *
  * Request pads `left`, `right` and `third` output the cameras of one view, `src` outputs exact
@@ -12,7 +12,7 @@
  * may be requested and released in any state.
  *
  * The same properties, size and time give the same images in every process. Live, frames are at
- * multiples of the frame period on the pipeline clock. Not live, the source can be sought in TIME.
+ * multiples of the frame period on the pipeline clock.
  *
  * ## Example launch lines
  * |[
@@ -24,27 +24,28 @@
  *
  * Since: 0.1
  */
-#include "gstavatartestsrc.h"
+#include <gst/gst.h>
 
 #include <gst/video/video.h>
 
 #include <gstrange/gstrange.h>
 #include <mutex>
 
+#include "common/elementproperties.hpp"
 #include "settings.hpp"
 #include "stream.hpp"
 
 GST_DEBUG_CATEGORY (gst_avatar_test_src_debug); /* for stream.cpp, too */
 
-enum : guint { PROP_STATS = 1, PROP_SETTINGS };
-
 struct GstAvatarTestSrcPrivate {
-  std::mutex lock; /* guards settings */
+  std::mutex lock; /* guards settings; taken before those of the stream */
   AvatarSettings settings;
   AvatarStream stream;
 
   explicit GstAvatarTestSrcPrivate (GstElement *element) : stream (element) {}
 };
+
+G_DECLARE_FINAL_TYPE (GstAvatarTestSrc, gst_avatar_test_src, GST, AVATAR_TEST_SRC, GstElement)
 
 struct _GstAvatarTestSrc {
   GstElement parent;
@@ -54,7 +55,7 @@ struct _GstAvatarTestSrc {
 #define SIZE_CAPS                                                                                  \
   "width = (int) [ 16, 4096 ], height = (int) [ 16, 4096 ], "                                      \
   "framerate = (fraction) [ 1/1000, 1000/1 ]"
-#define RAW_CAPS "video/x-raw, format = (string) { RGBx, BGRx, RGB, BGR, GRAY8 }, " SIZE_CAPS
+#define RAW_CAPS "video/x-raw, format = (string) RGBx, " SIZE_CAPS
 #define AVATAR_RANGE_CAPS                                                                          \
   GST_RANGE_MEDIA_TYPE ", format = (string) Z16_RGBx, views = (int) [ 1, 64 ], " SIZE_CAPS
 
@@ -69,30 +70,20 @@ static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
 
 G_DEFINE_TYPE (GstAvatarTestSrc, gst_avatar_test_src, GST_TYPE_ELEMENT)
 GST_ELEMENT_REGISTER_DEFINE (
-    avatartestsrc, "avatartestsrc", GST_RANK_NONE, GST_TYPE_AVATAR_TEST_SRC)
+    avatartestsrc, "avatartestsrc", GST_RANK_NONE, gst_avatar_test_src_get_type ())
 
 /* ---- queries and events ---- */
 
 static gboolean
 gst_avatar_test_src_query (GstPad *pad, GstObject *parent, GstQuery *query)
 {
+  if (GST_QUERY_TYPE (query) != GST_QUERY_LATENCY)
+    return gst_pad_query_default (pad, parent, query);
+  /* a frame is sent when it is captured, and lasts one period */
   AvatarStream &stream = GST_AVATAR_TEST_SRC (parent)->priv->stream;
-  switch (GST_QUERY_TYPE (query)) {
-    case GST_QUERY_LATENCY: { /* a frame is sent when it is captured, and lasts one period */
-      const bool live = stream.is_live ();
-      gst_query_set_latency (query, live, live ? stream.period () : 0, GST_CLOCK_TIME_NONE);
-      return TRUE;
-    }
-    case GST_QUERY_SEEKING: {
-      GstFormat format;
-      gst_query_parse_seeking (query, &format, nullptr, nullptr, nullptr);
-      const bool seekable = format == GST_FORMAT_TIME && !stream.is_live ();
-      gst_query_set_seeking (query, format, seekable, 0, -1);
-      return TRUE;
-    }
-    default:
-      return gst_pad_query_default (pad, parent, query);
-  }
+  const bool live = stream.is_live ();
+  gst_query_set_latency (query, live, live ? stream.period () : 0, GST_CLOCK_TIME_NONE);
+  return TRUE;
 }
 
 static gboolean
@@ -100,9 +91,6 @@ gst_avatar_test_src_event (GstPad *, GstObject *parent, GstEvent *event)
 {
   bool handled = false;
   switch (GST_EVENT_TYPE (event)) {
-    case GST_EVENT_SEEK:
-      handled = GST_AVATAR_TEST_SRC (parent)->priv->stream.seek (event);
-      break;
     case GST_EVENT_RECONFIGURE: /* GstPad has marked the pad; the task may be paused */
       GST_AVATAR_TEST_SRC (parent)->priv->stream.pad_linked ();
       handled = true;
@@ -121,23 +109,10 @@ gst_avatar_test_src_event (GstPad *, GstObject *parent, GstEvent *event)
 static gboolean
 gst_avatar_test_src_send_event (GstElement *element, GstEvent *event)
 {
-  AvatarStream &stream = GST_AVATAR_TEST_SRC (element)->priv->stream;
-  bool handled;
-  switch (GST_EVENT_TYPE (event)) {
-    case GST_EVENT_EOS:
-      handled = stream.end ();
-      break;
-    case GST_EVENT_FLUSH_START:
-      handled = stream.flush_start (event);
-      break;
-    case GST_EVENT_FLUSH_STOP:
-      handled = stream.flush_stop (event);
-      break;
-    default:
-      return GST_ELEMENT_CLASS (gst_avatar_test_src_parent_class)->send_event (element, event);
-  }
+  if (GST_EVENT_TYPE (event) != GST_EVENT_EOS)
+    return GST_ELEMENT_CLASS (gst_avatar_test_src_parent_class)->send_event (element, event);
   gst_event_unref (event);
-  return handled;
+  return GST_AVATAR_TEST_SRC (element)->priv->stream.end ();
 }
 
 /* ---- request pads ---- */
@@ -207,35 +182,11 @@ gst_avatar_test_src_change_state (GstElement *element, GstStateChange transition
   return to_paused && stream.is_live () ? GST_STATE_CHANGE_NO_PREROLL : result;
 }
 
-static void
-gst_avatar_test_src_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
+static GstStructure *
+make_stats (GstAvatarTestSrcPrivate *priv)
 {
-  auto priv = GST_AVATAR_TEST_SRC (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (!avatar_properties ().set (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_avatar_test_src_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  auto priv = GST_AVATAR_TEST_SRC (object)->priv;
-  if (id == PROP_STATS) {
-    g_value_take_boxed (value,
-        gst_structure_new ("application/x-avatartestsrc-stats", "frames", G_TYPE_UINT64,
-            priv->stream.frames (), "skipped", G_TYPE_UINT64, priv->stream.skipped (), nullptr));
-    return;
-  }
-  std::lock_guard guard (priv->lock);
-  if (!avatar_properties ().get (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static void
-gst_avatar_test_src_finalize (GObject *object)
-{
-  delete GST_AVATAR_TEST_SRC (object)->priv;
-  G_OBJECT_CLASS (gst_avatar_test_src_parent_class)->finalize (object);
+  return gst_structure_new ("application/x-avatartestsrc-stats", "frames", G_TYPE_UINT64,
+      priv->stream.frames (), "skipped", G_TYPE_UINT64, priv->stream.skipped (), nullptr);
 }
 
 static void
@@ -250,11 +201,9 @@ gst_avatar_test_src_class_init (GstAvatarTestSrcClass *klass)
 {
   auto object_class = G_OBJECT_CLASS (klass);
   auto element_class = GST_ELEMENT_CLASS (klass);
-  object_class->set_property = gst_avatar_test_src_set_property;
-  object_class->get_property = gst_avatar_test_src_get_property;
-  object_class->finalize = gst_avatar_test_src_finalize;
-  avatar_properties ().install (object_class, PROP_SETTINGS);
-  install_stats (object_class, PROP_STATS, "Counters since the element was started");
+  object_class->finalize = delete_private<GstAvatarTestSrc>;
+  install_properties<GstAvatarTestSrc, avatar_properties, make_stats> (
+      object_class, "Counters since the element was started");
 
   for (GstStaticPadTemplate *pad_template :
       {&src_template, &left_template, &right_template, &third_template})

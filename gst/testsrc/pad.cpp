@@ -4,22 +4,7 @@
 #include <gst/video/gstvideopool.h>
 
 #include <gstrange/gstrangebufferpool.h>
-
-namespace {
-
-/* Raw video goes into any pool of the peer, range images only into pools that know their layout. */
-GstBufferPool *
-pool_of_peer (GstQuery *query, bool range)
-{
-  GstBufferPool *pool = nullptr;
-  if (gst_query_get_n_allocation_pools (query) > 0)
-    gst_query_parse_nth_allocation_pool (query, 0, &pool, nullptr, nullptr, nullptr);
-  if (pool && range && !GST_IS_RANGE_BUFFER_POOL (pool))
-    gst_clear_object (&pool);
-  return pool;
-}
-
-} // namespace
+#include <utility>
 
 AvatarPad::AvatarPad (GstPad *pad, AvatarPadKind kind)
     : pad_ (GST_PAD (gst_object_ref (pad))), kind_ (kind)
@@ -51,45 +36,25 @@ AvatarPad::peer_caps () const
   return peer;
 }
 
-bool
-AvatarPad::configure (GstBufferPool *pool, GstQuery *query, GstCaps *caps, guint size)
-{
-  guint min_size = 0, min = 0, max = 0;
-  GstAllocator *allocator = nullptr;
-  GstAllocationParams params;
-  gst_allocation_params_init (&params);
-  if (gst_query_get_n_allocation_pools (query) > 0)
-    gst_query_parse_nth_allocation_pool (query, 0, nullptr, &min_size, &min, &max);
-  if (gst_query_get_n_allocation_params (query) > 0)
-    gst_query_parse_nth_allocation_param (query, 0, &allocator, &params);
-  size = MAX (size, min_size);
-  GstStructure *config = gst_buffer_pool_get_config (pool);
-  gst_buffer_pool_config_set_params (config, caps, size, min, max);
-  gst_buffer_pool_config_set_allocator (config, allocator, &params);
-  if (gst_query_find_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr))
-    gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_VIDEO_META);
-  gst_clear_object (&allocator);
-  if (gst_buffer_pool_set_config (pool, config))
-    return true;
-  /* the pool has replaced what it cannot do; accept it if size and counts suffice */
-  config = gst_buffer_pool_get_config (pool);
-  if (gst_buffer_pool_config_validate_params (config, caps, size, min, max))
-    return gst_buffer_pool_set_config (pool, config);
-  gst_structure_free (config);
-  return false;
-}
-
+/* The peer's allocator; a pool of its own, since a peer's may have fewer buffers than are held. */
 GstBufferPool *
 AvatarPad::make_pool (GstCaps *caps, GstQuery *query)
 {
   const bool range = kind_ == AvatarPadKind::kRange;
-  const guint size = range ? 0 : static_cast<guint> (GST_VIDEO_INFO_SIZE (&video_));
-  GstBufferPool *pool = pool_of_peer (query, range);
-  if (pool && configure (pool, query, caps, size) && gst_buffer_pool_set_active (pool, TRUE))
-    return pool;
-  gst_clear_object (&pool);
-  pool = range ? gst_range_buffer_pool_new () : gst_video_buffer_pool_new ();
-  if (configure (pool, query, caps, size) && gst_buffer_pool_set_active (pool, TRUE))
+  GstBufferPool *pool = range ? gst_range_buffer_pool_new () : gst_video_buffer_pool_new ();
+  GstAllocator *allocator = nullptr;
+  GstAllocationParams params;
+  gst_allocation_params_init (&params);
+  if (gst_query_get_n_allocation_params (query) > 0)
+    gst_query_parse_nth_allocation_param (query, 0, &allocator, &params);
+  GstStructure *config = gst_buffer_pool_get_config (pool);
+  gst_buffer_pool_config_set_params (
+      config, caps, range ? 0 : static_cast<guint> (GST_VIDEO_INFO_SIZE (&video_)), 0, 0);
+  gst_buffer_pool_config_set_allocator (config, allocator, &params);
+  if (gst_query_find_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr))
+    gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_VIDEO_META);
+  gst_clear_object (&allocator);
+  if (gst_buffer_pool_set_config (pool, config) && gst_buffer_pool_set_active (pool, TRUE))
     return pool;
   gst_object_unref (pool);
   return nullptr;
@@ -98,17 +63,10 @@ AvatarPad::make_pool (GstCaps *caps, GstQuery *query)
 void
 AvatarPad::set_pool (GstBufferPool *pool)
 {
-  GstBufferPool *old;
-  {
-    std::lock_guard guard (lock_);
-    old = pool_;
-    pool_ = pool;
-    if (pool && flushing_)
-      gst_buffer_pool_set_flushing (pool, TRUE);
-  }
-  if (old && old != pool)
-    gst_buffer_pool_set_active (old, FALSE);
-  gst_clear_object (&old);
+  if (pool_)
+    gst_buffer_pool_set_active (pool_, FALSE);
+  gst_clear_object (&pool_);
+  pool_ = pool;
 }
 
 bool
@@ -215,9 +173,8 @@ AvatarPad::push (GstBuffer *buffer)
 void
 AvatarPad::push_stream_start (GstElement *element, guint group_id)
 {
-  if (!needs_start_)
+  if (!std::exchange (needs_start_, false))
     return;
-  needs_start_ = false;
   gchar *id = gst_pad_create_stream_id (pad_, element, GST_PAD_NAME (pad_));
   GstEvent *event = gst_event_new_stream_start (id);
   gst_event_set_group_id (event, group_id);
@@ -226,51 +183,30 @@ AvatarPad::push_stream_start (GstElement *element, guint group_id)
 }
 
 void
-AvatarPad::push_segment (const GstSegment &segment, guint32 seqnum)
+AvatarPad::push_segment ()
 {
-  if (!needs_segment_)
+  if (!std::exchange (needs_segment_, false))
     return;
-  needs_segment_ = false;
-  GstEvent *event = gst_event_new_segment (&segment);
-  gst_event_set_seqnum (event, seqnum);
-  gst_pad_push_event (pad_, event);
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  gst_pad_push_event (pad_, gst_event_new_segment (&segment));
 }
 
 void
-AvatarPad::push_end (GstEvent *event)
+AvatarPad::push_eos ()
 {
-  if (ended_ || !gst_pad_is_linked (pad_)) { /* a pad that is linked later gets it then */
-    gst_event_unref (event);
+  if (ended_ || !gst_pad_is_linked (pad_)) /* a pad that is linked later gets it then */
     return;
-  }
   ended_ = true;
-  gst_pad_push_event (pad_, event);
+  gst_pad_push_event (pad_, gst_event_new_eos ());
 }
 
 /* ---- state ---- */
 
 void
-AvatarPad::restart ()
-{
-  needs_segment_ = discont_ = true;
-  peer_ended_ = ended_ = false;
-}
-
-void
 AvatarPad::stop ()
 {
   set_pool (nullptr);
-  restart ();
-  needs_start_ = true;
-  negotiated_ = false;
-  set_flushing (false);
-}
-
-void
-AvatarPad::set_flushing (bool flushing)
-{
-  std::lock_guard guard (lock_);
-  flushing_ = flushing;
-  if (pool_)
-    gst_buffer_pool_set_flushing (pool_, flushing);
+  needs_start_ = needs_segment_ = discont_ = true;
+  negotiated_ = peer_ended_ = ended_ = false;
 }

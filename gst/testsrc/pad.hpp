@@ -4,13 +4,12 @@
 #include <gst/video/video.h>
 
 #include <memory>
-#include <mutex>
 #include <vector>
 
 enum class AvatarPadKind { kLeft, kRight, kThird, kRange };
 
-/** One request pad of avatartestsrc and its stream. For the streaming thread, or while it is
- *  paused; set_flushing(), pad() and kind() for any thread. */
+/** One request pad of avatartestsrc and its stream. For the streaming thread, or while it does not
+ *  run; pad() and kind() for any thread. */
 class AvatarPad {
 public:
   AvatarPad (GstPad *pad, AvatarPadKind kind);
@@ -36,21 +35,15 @@ public:
   GstFlowReturn acquire (GstBuffer **buffer);
   GstFlowReturn push (GstBuffer *buffer);
 
-  /** Each does nothing if the stream has had it. push_end() takes the event. */
+  /** Each does nothing if the stream has had it. */
   void push_stream_start (GstElement *element, guint group_id);
-  void push_segment (const GstSegment &segment, guint32 seqnum);
-  void push_end (GstEvent *event);
+  void push_segment ();
+  void push_eos ();
 
-  /** The stream goes on with a new segment. */
-  void restart ();
   /** The stream has ended. */
   void stop ();
 
-  /** Any thread. While true, acquire() does not wait for a buffer to come back. */
-  void set_flushing (bool flushing);
-
 private:
-  bool configure (GstBufferPool *pool, GstQuery *query, GstCaps *caps, guint size);
   GstBufferPool *make_pool (GstCaps *caps, GstQuery *query);
   void set_pool (GstBufferPool *pool);
 
@@ -60,9 +53,7 @@ private:
        peer_ended_ = false, ended_ = false;
   GstVideoInfo video_{};
 
-  std::mutex lock_; /* guards pool_, which only the streaming thread writes, and flushing_ */
   GstBufferPool *pool_ = nullptr;
-  bool flushing_ = false;
 };
 
 using AvatarPads = std::vector<std::shared_ptr<AvatarPad>>;

@@ -9,7 +9,6 @@
 #include <new>
 #include <rangecast/rigfile/rig_file.hpp>
 
-using rangecast::PixelFormat;
 using rangecast::Rgbx;
 using rangecast::Roi;
 using rangecast::Scene;
@@ -38,7 +37,7 @@ AvatarPainter::set_size (int width, int height)
   rangecast::SceneSettings &s = settings_.scene;
   if (settings_.view_id >= s.views)
     return {StatusCode::kBadValue, "view-id " + std::to_string (settings_.view_id) +
-                                       ": expected less than views, " + std::to_string (s.views)};
+                                       " must be less than views, " + std::to_string (s.views)};
   if (scene_ && s.width == width && s.height == height)
     return {};
   s.width = width;
@@ -47,7 +46,6 @@ AvatarPainter::set_size (int width, int height)
   scene_.reset (); /* a model and its rooms are large: not two at a time */
   if (Status status = Scene::create (s, scene_); !status.ok ())
     return status;
-  scratch_.resize (static_cast<std::size_t> (width) * static_cast<std::size_t> (height));
   return settings_.rig_export.empty () ? Status ()
                                        : rangecast::save_rig (settings_.rig_export, scene_->rig ());
 }
@@ -72,23 +70,6 @@ AvatarPainter::make_raw_caps (int fps_n, int fps_d) const
 
 namespace {
 
-PixelFormat
-pixel_format (const GstVideoInfo &info)
-{
-  switch (GST_VIDEO_INFO_FORMAT (&info)) {
-    case GST_VIDEO_FORMAT_BGRx:
-      return PixelFormat::kBgrx;
-    case GST_VIDEO_FORMAT_RGB:
-      return PixelFormat::kRgb;
-    case GST_VIDEO_FORMAT_BGR:
-      return PixelFormat::kBgr;
-    case GST_VIDEO_FORMAT_GRAY8:
-      return PixelFormat::kGray;
-    default:
-      return PixelFormat::kRgbx;
-  }
-}
-
 double
 seconds (GstClockTime time)
 {
@@ -104,10 +85,10 @@ AvatarPainter::make_loop (SceneCamera camera)
   const int width = settings_.scene.width, height = settings_.scene.height;
   const std::size_t pixels = std::size_t (width) * std::size_t (height);
   if (settings_.loop_frames > kMaxPixels / pixels)
-    return {StatusCode::kBadValue,
-        "loop-frames " + std::to_string (settings_.loop_frames) + ": expected at most " +
-            std::to_string (kMaxPixels / pixels) + " pictures of " + std::to_string (width) + "x" +
-            std::to_string (height) + ", which take 1 GiB per camera"};
+    return {StatusCode::kBadValue, "loop-frames " + std::to_string (settings_.loop_frames) +
+                                       " is more than " + std::to_string (kMaxPixels / pixels) +
+                                       " pictures of " + std::to_string (width) + "x" +
+                                       std::to_string (height) + ", which take 1 GiB per camera"};
   try {
     Loop &loop = loops_[int (camera)];
     loop.drawn.assign (settings_.loop_frames, false);
@@ -165,18 +146,11 @@ AvatarPainter::draw_raw (
   GstVideoFrame frame;
   if (!gst_video_frame_map (&frame, &video, buffer, GST_MAP_WRITE))
     return {StatusCode::kNoSpace, "cannot map an output buffer"};
-  auto pixels = static_cast<std::uint8_t *> (GST_VIDEO_FRAME_PLANE_DATA (&frame, 0));
-  const int stride = GST_VIDEO_FRAME_PLANE_STRIDE (&frame, 0);
-  const int width = settings_.scene.width;
-  const PixelFormat format = pixel_format (video);
-  const bool direct = format == PixelFormat::kRgbx;
   const rangecast::ImageView<Rgbx> picture{
-      direct ? reinterpret_cast<Rgbx *> (pixels) : scratch_.data (), width, settings_.scene.height,
-      direct ? stride : static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
+      static_cast<Rgbx *> (GST_VIDEO_FRAME_PLANE_DATA (&frame, 0)), settings_.scene.width,
+      settings_.scene.height, GST_VIDEO_FRAME_PLANE_STRIDE (&frame, 0)};
   const double period_s = double (GST_VIDEO_INFO_FPS_D (&video)) / GST_VIDEO_INFO_FPS_N (&video);
   const Status status = render (camera, time, period_s, picture);
-  if (status.ok () && !direct)
-    rangecast::convert_pixels (picture, format, pixels, stride);
   gst_video_frame_unmap (&frame);
   return status;
 }

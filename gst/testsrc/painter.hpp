@@ -20,7 +20,7 @@ public:
   /** Draws looped pictures again, for a new frame rate. */
   void clear_loops ();
 
-  /** Fixed except for the pixel format of raw video. Transfer full. */
+  /** Fixed except for the format of raw video, which its pads' templates have. Transfer full. */
   [[nodiscard]] GstCaps *make_range_caps (int fps_n, int fps_d) const;
   [[nodiscard]] GstCaps *make_raw_caps (int fps_n, int fps_d) const;
 
@@ -48,6 +48,5 @@ private:
 
   AvatarSettings settings_;
   std::unique_ptr<rangecast::Scene> scene_;
-  std::vector<rangecast::Rgbx> scratch_; ///< a picture before it gets its pixel format
-  Loop loops_[3];                        ///< by camera
+  Loop loops_[3]; ///< by camera
 };

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "settings.hpp"
 
-#define TYPE_AVATAR_DRESS (avatar_dress_get_type ())
 static GType
 avatar_dress_get_type ()
 {
@@ -67,9 +66,9 @@ avatar_properties ()
           "File to write the calibration of all cameras to, YAML or JSON", kMutableReady),
       P::boolean<&S::person_only> ("range-person-only", "Crop to person",
           "Crop range images to the bounding box of the figures", kMutableReady),
-      P::flag_set<&S::scene, &Scene::dress> ("dress", "Accessories",
+      P::enumeration<&S::scene, &Scene::dress> ("dress", "Accessories",
           "Accessories of the built-in figure that add surfaces in front of one another",
-          TYPE_AVATAR_DRESS, kMutableReady),
+          avatar_dress_get_type (), kMutableReady),
   };
   return table;
 }

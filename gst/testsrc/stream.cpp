@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* In the order of a frame: pads, the task, negotiation, pushing, the end; then flushes and seeks,
- * and state changes. */
+/* In the order of a frame: pads, the task, negotiation, pushing, the end; then state changes. */
 #include "stream.hpp"
 
 #include "common/capsadvice.hpp"
@@ -35,13 +34,6 @@ AvatarStream::add_pad (GstPad *pad, AvatarPadKind kind)
   std::lock_guard guard (lock_);
   pads_.push_back (std::make_shared<AvatarPad> (pad, kind));
   gst_flow_combiner_add_pad (combiner_, pad);
-  /* links made with GST_PAD_LINK_CHECK_NO_RECONFIGURE send no RECONFIGURE event */
-  g_signal_connect (pad, "linked",
-      G_CALLBACK (+[] (GstPad *linked, GstPad *, AvatarStream *stream) {
-        gst_pad_mark_reconfigure (linked);
-        stream->pad_linked ();
-      }),
-      this);
   start_task ();
 }
 
@@ -52,8 +44,6 @@ AvatarStream::remove_pad (GstPad *pad)
   const auto found = std::ranges::find_if (pads_, [&] (const auto &p) { return p->pad () == pad; });
   if (found == pads_.end ())
     return;
-  g_signal_handlers_disconnect_by_data (pad, this);
-  (*found)->set_flushing (true);
   pads_.erase (found);
   gst_flow_combiner_remove_pad (combiner_, pad);
 }
@@ -86,7 +76,7 @@ bool
 AvatarStream::must_pause () const
 {
   const bool over = eos_wanted_ || ended_;
-  return !running_ || holds_ > 0 || pads_.empty () || (!over && !any_linked ());
+  return !running_ || pads_.empty () || (!over && !any_linked ());
 }
 
 void
@@ -118,7 +108,7 @@ AvatarStream::loop (gpointer stream)
   {
     std::lock_guard guard (self->lock_);
     if (self->must_pause ()) {
-      GST_DEBUG_OBJECT (self->element_, "pausing: no linked pad, a flush or a seek");
+      GST_DEBUG_OBJECT (self->element_, "pausing: no linked pad");
       self->pause_task (); /* whatever changes that starts it again */
       self->clock_.pause ();
       return;
@@ -126,7 +116,7 @@ AvatarStream::loop (gpointer stream)
     pads = self->pads_;
     over = self->eos_wanted_ || self->ended_;
   }
-  over |= self->num_buffers_ >= 0 && self->sent_ >= static_cast<guint64> (self->num_buffers_);
+  over |= self->num_buffers_ >= 0 && self->frames_ >= static_cast<guint64> (self->num_buffers_);
   const GstFlowReturn flow = over ? GST_FLOW_EOS : self->output_frame (pads);
   if (flow != GST_FLOW_OK && flow != kAgain)
     self->end_stream (pads, flow);
@@ -160,8 +150,6 @@ AvatarStream::output_frame (const AvatarPads &pads)
     flow = negotiate (pads);
   if (flow != GST_FLOW_OK)
     return flow;
-  if (GST_CLOCK_TIME_IS_VALID (segment_.stop) && time.pts >= segment_.stop)
-    return GST_FLOW_EOS;
   flow = push_frame (pads, time);
   if (flow == GST_FLOW_NOT_LINKED || flow == GST_FLOW_NOT_NEGOTIATED) {
     bool linked;
@@ -171,19 +159,10 @@ AvatarStream::output_frame (const AvatarPads &pads)
     }
     if (!linked || any_needs_negotiation (pads))
       return kAgain;
-    if (flow == GST_FLOW_NOT_LINKED || renegotiated_)
-      return flow;
-    for (const auto &pad : pads) /* a new peer may have had no time to send RECONFIGURE */
-      gst_pad_mark_reconfigure (pad->pad ());
-    renegotiated_ = true;
-    return kAgain;
+    return flow;
   }
   if (flow != GST_FLOW_OK)
     return flow;
-  renegotiated_ = false;
-  segment_.position = time.pts + time.duration;
-  sent_++;
-  std::lock_guard guard (lock_);
   frames_++;
   return flow;
 }
@@ -207,7 +186,7 @@ AvatarStream::negotiate (const AvatarPads &pads)
         return GST_FLOW_ERROR;
     GST_ELEMENT_ERROR (element_, CORE, NEGOTIATION,
         ("the peers of the pads have no size and frame rate in common (16 to 4096 pixels, 1/1000 "
-         "to 1000 frames per second)"),
+         "to 1000 frames per second); for other formats than RGBx add videoconvert"),
         (nullptr));
     return GST_FLOW_ERROR;
   }
@@ -254,7 +233,7 @@ AvatarStream::negotiate_pad (AvatarPad &pad, const AvatarFormat &format)
   GST_ELEMENT_ERROR (element_, CORE, NEGOTIATION,
       ("pad %s: the peer accepts %s", GST_PAD_NAME (pad.pad ()),
           is_range ? "no video/x-range with as many views as property views says"
-                   : "none of the formats { RGBx, BGRx, RGB, BGR, GRAY8 }"),
+                   : "no RGBx of this size and frame rate"),
       (nullptr));
   return GST_FLOW_ERROR;
 }
@@ -306,7 +285,7 @@ AvatarStream::push_picture (AvatarPad &pad, const FrameTime &time)
   if (time.discont)
     GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
   gst_range_buffer_set_capture_time (buffer, time.capture_time);
-  pad.push_segment (segment_, segment_seqnum_);
+  pad.push_segment ();
   return pad.push (buffer);
 }
 
@@ -314,35 +293,23 @@ void
 AvatarStream::end_stream (const AvatarPads &pads, GstFlowReturn flow)
 {
   GST_INFO_OBJECT (element_, "pausing: %s", gst_flow_get_name (flow));
-  bool again;
   {
     std::lock_guard guard (lock_);
     pause_task ();
-    again = ended_;
     ended_ = flow != GST_FLOW_FLUSHING;
   }
   if (flow == GST_FLOW_FLUSHING)
     return;
   if (flow == GST_FLOW_NOT_LINKED || flow == GST_FLOW_NOT_NEGOTIATED)
     GST_ELEMENT_FLOW_ERROR (element_, flow);
-  const bool segment_seek = (segment_.flags & GST_SEGMENT_FLAG_SEGMENT) != 0;
-  if (segment_seek && !again) {
-    GstMessage *message =
-        gst_message_new_segment_done (GST_OBJECT (element_), GST_FORMAT_TIME, segment_.position);
-    gst_message_set_seqnum (message, segment_seqnum_);
-    gst_element_post_message (element_, message);
-  }
   for (const auto &pad : pads) {
-    GstEvent *event = segment_seek ? gst_event_new_segment_done (GST_FORMAT_TIME, segment_.position)
-                                   : gst_event_new_eos ();
-    gst_event_set_seqnum (event, segment_seqnum_);
     pad->push_stream_start (element_, group_id_);
-    pad->push_segment (segment_, segment_seqnum_);
-    pad->push_end (event);
+    pad->push_segment ();
+    pad->push_eos ();
   }
 }
 
-/* ---- EOS, flushes and seeks ---- */
+/* ---- EOS ---- */
 
 bool
 AvatarStream::end ()
@@ -355,125 +322,6 @@ AvatarStream::end ()
   return running_;
 }
 
-AvatarPads
-AvatarStream::pads ()
-{
-  std::lock_guard guard (lock_);
-  return pads_;
-}
-
-/* Pauses the task soon; lock task_lock_ to know that it is paused. */
-void
-AvatarStream::hold_task ()
-{
-  std::lock_guard guard (lock_);
-  holds_++;
-  pause_task ();
-  clock_.interrupt ();
-}
-
-/* Lets the task go on in a new segment. */
-void
-AvatarStream::release_task (guint32 seqnum)
-{
-  std::lock_guard guard (lock_);
-  segment_seqnum_ = seqnum;
-  eos_wanted_ = ended_ = false;
-  for (const auto &pad : pads_)
-    pad->restart ();
-  gst_flow_combiner_reset (combiner_);
-  if (--holds_ > 0 || !running_)
-    return;
-  clock_.resume ();
-  start_task ();
-}
-
-void
-AvatarStream::push_flush (bool start, guint32 seqnum, bool reset_time)
-{
-  for (const auto &pad : pads ()) {
-    GstEvent *event = start ? gst_event_new_flush_start () : gst_event_new_flush_stop (reset_time);
-    gst_event_set_seqnum (event, seqnum);
-    gst_pad_push_event (pad->pad (), event);
-    pad->set_flushing (start);
-  }
-}
-
-bool
-AvatarStream::flush_start (GstEvent *event)
-{
-  {
-    std::lock_guard guard (lock_);
-    if (!running_ || app_flush_)
-      return false;
-    app_flush_ = true;
-  }
-  hold_task ();
-  push_flush (true, gst_event_get_seqnum (event), false);
-  return true;
-}
-
-bool
-AvatarStream::flush_stop (GstEvent *event)
-{
-  gboolean reset_time = TRUE;
-  gst_event_parse_flush_stop (event, &reset_time);
-  {
-    std::lock_guard guard (lock_);
-    if (!app_flush_)
-      return false;
-    app_flush_ = false;
-  }
-  g_rec_mutex_lock (&task_lock_);
-  push_flush (false, gst_event_get_seqnum (event), reset_time);
-  if (reset_time && !is_live_) { /* running time starts again, with the next frame */
-    segment_.start = segment_.time = segment_.position;
-    segment_.base = segment_.offset = 0;
-  }
-  clock_.seek (segment_.position);
-  release_task (gst_event_get_seqnum (event));
-  g_rec_mutex_unlock (&task_lock_);
-  return true;
-}
-
-bool
-AvatarStream::seek (GstEvent *event)
-{
-  gdouble rate;
-  GstFormat format;
-  GstSeekFlags flags;
-  GstSeekType start_type, stop_type;
-  gint64 start, stop;
-  gst_event_parse_seek (event, &rate, &format, &flags, &start_type, &start, &stop_type, &stop);
-  const guint32 seqnum = gst_event_get_seqnum (event);
-  {
-    std::lock_guard guard (lock_);
-    if (!running_ || is_live_ || format != GST_FORMAT_TIME || rate <= 0 ||
-        (flags & GST_SEEK_FLAG_INSTANT_RATE_CHANGE) != 0)
-      return false;
-    if (last_seek_ == seqnum) /* every sink of a pipeline sends the same seek upstream */
-      return true;
-    last_seek_ = seqnum;
-  }
-  const bool flush = (flags & GST_SEEK_FLAG_FLUSH) != 0;
-  hold_task ();
-  if (flush)
-    push_flush (true, seqnum, false);
-  g_rec_mutex_lock (&task_lock_);
-  if (flush)
-    push_flush (false, seqnum, true);
-  GstSegment segment = segment_;
-  const bool done = gst_segment_do_seek (
-      &segment, rate, format, flags, start_type, start, stop_type, stop, nullptr);
-  if (done) {
-    segment_ = segment;
-    clock_.seek (segment.position);
-  }
-  release_task (seqnum);
-  g_rec_mutex_unlock (&task_lock_);
-  return done;
-}
-
 /* ---- state changes ---- */
 
 bool
@@ -482,21 +330,16 @@ AvatarStream::start (const AvatarSettings &settings)
   bool has_pads;
   {
     std::lock_guard guard (lock_);
-    is_live_ = settings.is_live;
-    frames_ = 0;
     eos_wanted_ = ended_ = false;
-    last_seek_ = GST_SEQNUM_INVALID;
     gst_flow_combiner_reset (combiner_);
     has_pads = !pads_.empty ();
   }
   clock_.start ();
   painter_.start (settings);
+  is_live_ = settings.is_live;
   num_buffers_ = settings.num_buffers;
-  sent_ = 0;
-  renegotiated_ = false;
+  frames_ = 0;
   group_id_ = gst_util_group_id_next ();
-  segment_seqnum_ = gst_util_seqnum_next ();
-  gst_segment_init (&segment_, GST_FORMAT_TIME);
   /* without a pad there is nothing to stream, but the rig file is written */
   return has_pads || settings.rig_export.empty () ||
          gst_range_flow_return (element_, painter_.set_size (320, 240)) == GST_FLOW_OK;
@@ -518,41 +361,23 @@ AvatarStream::request_stop ()
   if (task_)
     gst_task_stop (task_);
   clock_.interrupt ();
-  for (const auto &pad : pads_)
-    pad->set_flushing (true);
 }
 
 void
 AvatarStream::stop ()
 {
   GstTask *task;
+  AvatarPads pads;
   {
     std::lock_guard guard (lock_);
     task = std::exchange (task_, nullptr);
-    holds_ -= app_flush_;
-    app_flush_ = false;
+    pads = pads_;
   }
   if (task)
     gst_task_join (task);
   gst_clear_object (&task);
-  g_rec_mutex_lock (&task_lock_); /* a seek may be in progress */
   clock_.stop ();
   painter_.start ({});
-  for (const auto &pad : pads ())
+  for (const auto &pad : pads)
     pad->stop ();
-  g_rec_mutex_unlock (&task_lock_);
-}
-
-bool
-AvatarStream::is_live ()
-{
-  std::lock_guard guard (lock_);
-  return is_live_;
-}
-
-guint64
-AvatarStream::frames ()
-{
-  std::lock_guard guard (lock_);
-  return frames_;
 }

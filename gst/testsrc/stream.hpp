@@ -3,6 +3,7 @@
 
 #include <gst/base/gstflowcombiner.h>
 
+#include <atomic>
 #include <mutex>
 
 #include "clock.hpp"
@@ -12,12 +13,10 @@
 
 /** The thread that feeds all pads of avatartestsrc: negotiates one size and frame rate with their
  *  peers, waits until the next frame is due, draws and pushes. It runs from READY to PAUSED and
- *  back while a pad is linked; flushes and seeks pause it.
+ *  back while a pad is linked.
  *
- *  Locks, in this order: task_lock_, lock_, those of FrameClock and AvatarPad. The thread holds
- *  task_lock_ for a whole frame, as it would hold a pad's stream lock. No other lock is held while
- *  pushing, querying, posting or waiting; lock_ and AvatarPad's are held while a pool, which may be
- *  downstream's, is set flushing. */
+ *  Locks, in this order: lock_, that of FrameClock. None is held while pushing, querying, posting
+ *  or waiting. */
 class AvatarStream {
 public:
   /** @param element  owns this, and outlives it */
@@ -45,16 +44,13 @@ public:
   /** Call while the pad is active: the thread ignores the flow of a pad that was removed. */
   void remove_pad (GstPad *pad);
   void pad_linked ();
-  /** For events of the application. @return false: not in this state */
+  /** For EOS of the application. @return false: not in this state */
   bool end ();
-  bool flush_start (GstEvent *event);
-  bool flush_stop (GstEvent *event);
-  bool seek (GstEvent *event);
 
-  bool is_live ();
+  [[nodiscard]] bool is_live () const { return is_live_; }
   GstClockTime period () { return clock_.period (); }
   guint64 skipped () { return clock_.skipped (); }
-  guint64 frames ();
+  [[nodiscard]] guint64 frames () const { return frames_; }
 
 private:
   static void loop (gpointer stream);
@@ -72,33 +68,21 @@ private:
   void start_task ();
   void pause_task ();
 
-  AvatarPads pads ();
-  void hold_task ();
-  void release_task (guint32 seqnum); /* with task_lock_ */
-  void push_flush (bool start, guint32 seqnum, bool reset_time);
-
   GstElement *element_;
   FrameClock clock_;
+  std::atomic<bool> is_live_ = false; ///< of this run
+  std::atomic<guint64> frames_ = 0;
 
   std::mutex lock_; /* guards what follows, down to the blank line */
   AvatarPads pads_;
   GstFlowCombiner *combiner_ = gst_flow_combiner_new ();
-  guint64 frames_ = 0;
   GstTask *task_ = nullptr; ///< made when the first pad is linked
   bool running_ = false;    ///< between run() and request_stop()
-  int holds_ = 0;           ///< flushes and seeks in progress, which keep the task paused
-  bool app_flush_ = false;  ///< one of them is the application's own
   bool eos_wanted_ = false, ended_ = false;
-  guint32 last_seek_ = GST_SEQNUM_INVALID;
-  bool is_live_ = false; ///< of this run; the thread reads it without the lock
 
-  /* The thread's, or with task_lock_. */
+  /* The thread's, or while it does not run. */
   GRecMutex task_lock_;
   int num_buffers_ = -1;
   AvatarPainter painter_;
-  GstSegment segment_;
-  guint32 segment_seqnum_ = 0;
   guint group_id_ = 0;
-  guint64 sent_ = 0;
-  bool renegotiated_ = false; /* because a peer refused a frame; none has been sent since */
 };

@@ -19,21 +19,52 @@ constexpr gint64 kMaxSilence_us = 60 * G_USEC_PER_SEC;
 constexpr gint64 kMaxSpeechWait_us = G_USEC_PER_SEC;
 /** Bytes in flight to a client, unless one frame set has more: a second at 32 Mbit/s. */
 constexpr gsize kMaxInFlightBytes = 4 << 20;
+/** Payload of a control frame, bytes (RFC 6455). */
+constexpr gsize kMaxControl = 125;
+
+constexpr const char *kClient = "client"; /* data of the extension */
+
+GBytes *
+filter_frame (SoupWebsocketExtension *self, guint8 *header, GBytes *payload, GError **)
+{
+  auto client = static_cast<Client *> (g_object_get_data (G_OBJECT (self), kClient));
+  if (client && client->takes_frame (*header, g_bytes_get_size (payload)))
+    return payload;
+  g_bytes_unref (payload);
+  return g_bytes_new (nullptr, 0);
+}
 
 } // namespace
 
-Client::Client (
-    Server &server, SoupWebsocketConnection *socket, WebLimitedInput *input, std::string address)
+/* libsoup 3.2 limits the size of a frame, but neither the fragments of a message nor the number of
+ * pings, which it answers. An extension sees each frame. */
+GList *
+client_extensions ()
+{
+  const GClassInitFunc init = [] (gpointer klass, gpointer) {
+    SOUP_WEBSOCKET_EXTENSION_CLASS (klass)->process_incoming_message = filter_frame;
+  };
+  static const GType type = g_type_register_static_simple (SOUP_TYPE_WEBSOCKET_EXTENSION,
+      "GstRangeWebSinkFrameFilter", sizeof (SoupWebsocketExtensionClass), init,
+      sizeof (SoupWebsocketExtension), nullptr, GTypeFlags (0));
+  return g_list_append (nullptr, g_object_new (type, nullptr));
+}
+
+Client::Client (Server &server, SoupWebsocketConnection *socket, GSocket *tcp, std::string address)
     : server_ (server), log_ (server.element ()),
       socket_ (SOUP_WEBSOCKET_CONNECTION (g_object_ref (socket))),
-      input_ (WEB_LIMITED_INPUT (g_object_ref (input))), label_ (std::move (address)),
+      tcp_ (G_SOCKET (g_object_ref (tcp))), label_ (std::move (address)),
       opened_us_ (g_get_monotonic_time ())
 {
+  extension_ = static_cast<GObject *> (soup_websocket_connection_get_extensions (socket_)->data);
+  g_object_set_data (extension_, kClient, this);
   soup_websocket_connection_set_keepalive_interval (socket_, 20);
   g_signal_connect (socket_, "message", G_CALLBACK (on_message), this);
   const auto failed = [] (SoupWebsocketConnection *, GError *error, gpointer self) {
     auto client = static_cast<Client *> (self);
     GST_WARNING_OBJECT (client->log_, "%s: %s", client->label_.c_str (), error->message);
+    if (std::exchange (client->closing_, true)) /* libsoup keeps all that follows a bad frame */
+      g_socket_shutdown (client->tcp_, TRUE, TRUE, nullptr);
   };
   g_signal_connect (socket_, "error", GCallback (+failed), this);
   g_signal_connect (socket_, "closed", G_CALLBACK (on_closed), this);
@@ -41,9 +72,10 @@ Client::Client (
 
 Client::~Client ()
 {
+  g_object_set_data (extension_, kClient, nullptr);
   g_signal_handlers_disconnect_by_data (socket_, this);
   g_object_unref (socket_);
-  g_object_unref (input_);
+  g_object_unref (tcp_);
 }
 
 /* ---- the connection ---- */
@@ -52,21 +84,36 @@ void
 Client::on_message (SoupWebsocketConnection *, gint type, GBytes *message, gpointer self)
 {
   auto client = static_cast<Client *> (self);
-  web_limited_input_restart (client->input_);
   if (client->closing_)
     return;
   gsize size = 0;
   const auto text = static_cast<const char *> (g_bytes_get_data (message, &size));
   if (type != SOUP_WEBSOCKET_DATA_TEXT)
-    client->refuse (kCloseUnsupported, "expected text messages");
-  else if (size > kMaxMessage)
-    client->refuse (
-        kCloseTooBig, "a message of more than " + std::to_string (kMaxMessage) + " bytes");
-  else if (client->is_too_fast ())
-    client->refuse (
-        kCloseLimit, "at most " + std::to_string (kMaxMessageRate) + " messages a second");
+    client->refuse (kCloseUnsupported, "only text messages are accepted");
   else
     client->handle ({text, size});
+}
+
+bool
+Client::takes_frame (guint8 header, gsize size)
+{
+  const bool is_control = header & 0x08, is_last = header & 0x80;
+  const gsize bytes = is_control ? size : message_bytes_ += size;
+  const gint64 now = g_get_monotonic_time ();
+  if (closing_)
+    return is_control;
+  if (now - rate_since_us_ >= G_USEC_PER_SEC) {
+    rate_since_us_ = now;
+    frames_in_second_ = 0;
+  }
+  if (bytes > (is_control ? kMaxControl : kMaxMessage))
+    refuse (kCloseTooBig, "a message of more than " + std::to_string (kMaxMessage) +
+                              " bytes, or a control frame of more than 125");
+  else if (++frames_in_second_ > kMaxFrameRate)
+    refuse (kCloseLimit, "at most " + std::to_string (kMaxFrameRate) + " messages a second");
+  if (!is_control && is_last)
+    message_bytes_ = 0;
+  return is_control || !closing_;
 }
 
 void
@@ -117,7 +164,7 @@ Client::send_binary (guint8 *message, gsize size)
 }
 
 void
-Client::check_silence ()
+Client::check ()
 {
   const gint64 now = g_get_monotonic_time ();
   if (closing_)
@@ -128,17 +175,6 @@ Client::check_silence ()
     refuse (kCloseTimeout, "no acknowledgement for 60 s");
 }
 
-bool
-Client::is_too_fast ()
-{
-  const gint64 now = g_get_monotonic_time ();
-  if (now - rate_since_us_ >= G_USEC_PER_SEC) {
-    rate_since_us_ = now;
-    messages_in_second_ = 0;
-  }
-  return ++messages_in_second_ > kMaxMessageRate;
-}
-
 /* ---- messages ---- */
 
 void
@@ -147,7 +183,7 @@ Client::handle (std::string_view text)
   const auto message = JsonMessage::parse (text);
   const auto type = message ? message->text ("type") : std::nullopt;
   if (!type)
-    return refuse (kCloseBadMessage, "expected a JSON object with a string 'type'");
+    return refuse (kCloseBadMessage, "not a JSON object with a string 'type'");
   if (!admitted_)
     return enter (*message);
   if (*type == "ack")
@@ -158,7 +194,7 @@ Client::handle (std::string_view text)
     const auto time = message->number ("time");
     constexpr double kMax = 9007199254740992; /* 2^53; json-glib wraps larger ones round */
     if (!time || !(std::abs (*time) <= kMax))
-      return refuse (kCloseBadMessage, "ping: time: expected a number, at most 2^53");
+      return refuse (kCloseBadMessage, "ping: time must be a number, at most 2^53");
     gchar number[G_ASCII_DTOSTR_BUF_SIZE];
     g_ascii_dtostr (number, sizeof number, *time);
     send_text (std::string ("{\"type\":\"pong\",\"time\":") + number +
@@ -175,7 +211,7 @@ Client::enter (const JsonMessage &message)
   if (!hello)
     return refuse (kCloseBadMessage, error);
   if (hello->version != kProtocolVersion)
-    return refuse (kCloseVersion, "expected version " + std::to_string (kProtocolVersion));
+    return refuse (kCloseVersion, "this server has version " + std::to_string (kProtocolVersion));
   if (!server_.admit (hello->token, user))
     return refuse (kCloseUnauthorized, "wrong or missing token");
   hello_ = *hello;
@@ -191,10 +227,10 @@ Client::acknowledge (const JsonMessage &message)
 {
   const auto number = message.number ("frameSet");
   if (!number || !(*number >= 0 && *number <= G_MAXUINT32 && std::floor (*number) == *number))
-    return refuse (kCloseBadMessage, "ack: frameSet: expected a number of a frame set");
+    return refuse (kCloseBadMessage, "ack: frameSet must be the number of a frame set");
   const auto acknowledged = static_cast<guint32> (*number);
   if (sent_ == 0 || gint32 (acknowledged - last_) > 0)
-    return refuse (kCloseBadMessage, "ack: frameSet: expected one that was sent");
+    return refuse (kCloseBadMessage, "ack: frameSet was not sent");
   while (!in_flight_.empty () && gint32 (acknowledged - in_flight_.front ().number) >= 0) {
     in_flight_bytes_ -= in_flight_.front ().bytes;
     in_flight_.pop_front ();
@@ -228,11 +264,9 @@ Client::send (const FrameSet &frame_set)
   last_us_ = now;
   gsize size = 0;
   const gconstpointer units = g_bytes_get_data (frame_set.units.get (), &size);
-  const bool new_rig = rig_units_ != frame_set.rig_units;
-  const gsize rig_size = new_rig ? frame_set.rig_units->size () : 0;
-  const gsize whole = MessageHeader::kSize + rig_size + size;
+  const gsize whole = MessageHeader::kSize + size;
   if (!has_room (whole)) {
-    GST_DEBUG_OBJECT (log_, "%s: leaving out frame set %u", label_.c_str (), frame_set.number);
+    GST_DEBUG_OBJECT (log_, "%s: skipping frame set %u", label_.c_str (), frame_set.number);
     needs_key_ = true;
     return;
   }
@@ -241,7 +275,7 @@ Client::send (const FrameSet &frame_set)
 
   MessageHeader header;
   header.key = frame_set.key;
-  header.discontinuity = needs_key_ || new_rig;
+  header.discontinuity = needs_key_;
   header.frame_set = frame_set.number;
   header.dropped = frame_set.number - first_ - sent_;
   header.sent_us = guint64 (now);
@@ -249,15 +283,13 @@ Client::send (const FrameSet &frame_set)
     header.delay_us = guint32 (std::clamp<gint64> (now - frame_set.captured_us, 0, G_MAXINT32));
   const auto message = static_cast<guint8 *> (g_malloc (whole));
   header.write (message);
-  std::memcpy (message + MessageHeader::kSize, frame_set.rig_units->data (), rig_size);
   if (size > 0) /* else there are no bytes to point to */
-    std::memcpy (message + MessageHeader::kSize + rig_size, units, size);
+    std::memcpy (message + MessageHeader::kSize, units, size);
   send_binary (message, whole);
   if (!unacknowledged_since_us_)
     unacknowledged_since_us_ = now;
   in_flight_.push_back ({frame_set.number, whole});
   in_flight_bytes_ += whole;
-  rig_units_ = frame_set.rig_units;
   needs_key_ = false;
   sent_++;
 }
@@ -294,7 +326,6 @@ Client::set_audio (bool available)
 void
 Client::end ()
 {
-  rig_units_.reset ();
   needs_key_ = true;
   send_text ("{\"type\":\"end\"}");
 }

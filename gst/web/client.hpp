@@ -8,7 +8,6 @@
 #include <memory>
 #include <string>
 
-#include "limitedinput.h"
 #include "protocol.hpp"
 
 /** The debug category of rangewebsink, for all its files. */
@@ -27,9 +26,8 @@ using BytesPtr = std::unique_ptr<GBytes, BytesUnref>;
 /** A coded frame set on its way to all clients. */
 struct FrameSet {
   BytesPtr units;
-  std::shared_ptr<const std::string> rig_units; ///< of the rig that it belongs to
-  bool key;                                     ///< refers to no earlier frame set
-  bool discontinuity;                           ///< does not continue the ones before
+  bool key;           ///< refers to no earlier frame set, and holds the rig
+  bool discontinuity; ///< does not continue the ones before
   guint32 number;
   gint64 captured_us; ///< on g_get_monotonic_time(); -1: unknown
 };
@@ -41,11 +39,13 @@ struct AudioPacket {
   gint64 captured_us; ///< on g_get_monotonic_time()
 };
 
+/** For soup_websocket_connection_new(): lets a Client see each frame. Transfer full. */
+GList *client_extensions ();
+
 /** A browser's WebSocket. The server's thread only. */
 class Client {
 public:
-  Client (
-      Server &server, SoupWebsocketConnection *socket, WebLimitedInput *input, std::string address);
+  Client (Server &server, SoupWebsocketConnection *socket, GSocket *tcp, std::string address);
   ~Client ();
   Client (const Client &) = delete;
   Client &operator= (const Client &) = delete;
@@ -61,8 +61,10 @@ public:
   /** Sends a text message, if the client was admitted. */
   void send_text (const std::string &json);
   void close (gushort code, const std::string &reason);
+  /** For each frame, before libsoup keeps or answers it. @return false: drop its payload */
+  bool takes_frame (guint8 header, gsize size);
   /** Closes a client that has been silent for too long. */
-  void check_silence ();
+  void check ();
 
   [[nodiscard]] bool is_admitted () const { return admitted_; }
   [[nodiscard]] bool wants_stats () const { return admitted_ && hello_.stats; }
@@ -79,7 +81,6 @@ private:
   void handle (std::string_view text);
   void enter (const JsonMessage &message);
   void acknowledge (const JsonMessage &message);
-  [[nodiscard]] bool is_too_fast ();
   [[nodiscard]] bool can_receive () const;
   [[nodiscard]] bool has_room (gsize bytes) const;
   void send_binary (guint8 *message, gsize size);
@@ -88,12 +89,14 @@ private:
   Server &server_;
   GstObject *log_;
   SoupWebsocketConnection *socket_;
-  WebLimitedInput *input_; /* of the socket */
-  std::string label_;      /* address and user, for the log */
+  GSocket *tcp_;
+  GObject *extension_; /* of the socket */
+  std::string label_;  /* address and user, for the log */
   Hello hello_;
   bool admitted_ = false, closing_ = false;
   gint64 opened_us_, rate_since_us_ = 0;
-  guint messages_in_second_ = 0;
+  guint frames_in_second_ = 0;
+  gsize message_bytes_ = 0; /* so far, of the message that has begun */
 
   /* frame sets */
   bool any_ = false;                   /* the counts below have begun */
@@ -105,7 +108,6 @@ private:
   gint64 unacknowledged_since_us_ = 0; /* 0: all is acknowledged */
   gsize in_flight_bytes_ = 0;
   std::deque<InFlight> in_flight_;
-  std::shared_ptr<const std::string> rig_units_; /* that the client has */
 };
 
 } // namespace web

@@ -10,20 +10,20 @@
  * By default only this machine can connect. An @address that others can reach needs a @token, a
  * @token-file, or @anonymous=true; use @certificate there, too.
  *
- * Speech (Opus) that comes to the request pad `audio` is heard in sync with the picture.
+ * Audio (Opus) that comes to the request pad `audio` is played in sync with the video.
  *
  * When it listens, it posts an element message `rangewebsink-address` with the field `url`
  * (string), the address of the page.
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 avatartestsrc is-live=true ! video/x-range,framerate=15/1 ! neighbourcodeenc !
- * rangewebsink port=8080
+ * gst-launch-1.0 avatartestsrc is-live=true ! video/x-range,framerate=15/1 ! neighbourcodeenc ! \
+ *   rangewebsink port=8080
  * ]|
  *
  * Since: 0.1
  */
-#include "gstrangewebsink.h"
+#include <gst/base/gstbasesink.h>
 
 #include <gst/video/video.h>
 
@@ -32,7 +32,6 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <memory>
 #include <mutex>
-#include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -58,7 +57,10 @@ struct GstRangeWebSinkPrivate {
 
   /* streaming thread only */
   GstClockTime last_pts = GST_CLOCK_TIME_NONE;
+  bool new_caps = false; /* since the last frame set */
 };
+
+G_DECLARE_FINAL_TYPE (GstRangeWebSink, gst_range_web_sink, GST, RANGE_WEB_SINK, GstBaseSink)
 
 struct _GstRangeWebSink {
   GstBaseSink parent;
@@ -68,14 +70,15 @@ struct _GstRangeWebSink {
 static GstStaticPadTemplate sink_template =
     GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
         GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-            ", version = (int) 3, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS_));
+            ", version = (int) 4, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS));
 
 static GstStaticPadTemplate audio_template = GST_STATIC_PAD_TEMPLATE ("audio", GST_PAD_SINK,
     GST_PAD_REQUEST, GST_STATIC_CAPS ("audio/x-opus, channel-mapping-family = (int) 0"));
 
 G_DEFINE_TYPE_WITH_CODE (GstRangeWebSink, gst_range_web_sink, GST_TYPE_BASE_SINK,
     GST_DEBUG_CATEGORY_INIT (gst_range_web_sink_debug, "rangewebsink", 0, "Range web sink"))
-GST_ELEMENT_REGISTER_DEFINE (rangewebsink, "rangewebsink", GST_RANK_NONE, GST_TYPE_RANGE_WEB_SINK)
+GST_ELEMENT_REGISTER_DEFINE (
+    rangewebsink, "rangewebsink", GST_RANK_NONE, gst_range_web_sink_get_type ())
 
 static std::shared_ptr<web::Server>
 current_server (GstRangeWebSinkPrivate *priv)
@@ -95,9 +98,7 @@ gst_range_web_sink_set_caps (GstBaseSink *base, GstCaps *caps)
     return FALSE;
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
   priv->reporter.set_views (info.rig);
-  std::vector<guint8> rig;
-  rangecast::write_rig_units ({info.rig, info.fps_n, info.fps_d}, rig);
-  current_server (priv)->set_rig (std::string (rig.begin (), rig.end ()));
+  priv->new_caps = true;
   return TRUE;
 }
 
@@ -122,6 +123,8 @@ static bool
 is_discontinuity (GstRangeWebSinkPrivate *priv, GstBuffer *buffer)
 {
   const GstClockTime last = std::exchange (priv->last_pts, GST_BUFFER_PTS (buffer));
+  if (std::exchange (priv->new_caps, false))
+    return true;
   if (!GST_BUFFER_IS_DISCONT (buffer))
     return false;
   return !GST_BUFFER_PTS_IS_VALID (buffer) || !GST_CLOCK_TIME_IS_VALID (last) ||
@@ -173,7 +176,7 @@ gst_range_web_sink_audio_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
   GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (parent)->priv;
   if (priv->audio_segment.format != GST_FORMAT_TIME) {
     GST_ELEMENT_ERROR (parent, STREAM, FORMAT,
-        ("audio: expected a segment of time, got %s",
+        ("audio needs a segment in time format, got %s",
             gst_format_get_name (priv->audio_segment.format)),
         (nullptr));
     gst_buffer_unref (buffer);
@@ -406,13 +409,6 @@ web_properties ()
 }
 
 static void
-gst_range_web_sink_finalize (GObject *object)
-{
-  delete GST_RANGE_WEB_SINK (object)->priv;
-  G_OBJECT_CLASS (gst_range_web_sink_parent_class)->finalize (object);
-}
-
-static void
 gst_range_web_sink_init (GstRangeWebSink *self)
 {
   self->priv = new GstRangeWebSinkPrivate;
@@ -425,17 +421,10 @@ gst_range_web_sink_class_init (GstRangeWebSinkClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto base_class = GST_BASE_SINK_CLASS (klass);
 
-  object_class->finalize = GST_DEBUG_FUNCPTR (gst_range_web_sink_finalize);
-  /* As install_properties() does; but the base class has a property `stats`. */
-  object_class->set_property = properties::set_property<GstRangeWebSink, web_properties>;
-  object_class->get_property =
-      properties::get_property<GstRangeWebSink, web_properties, make_stats>;
-  g_object_class_install_property (object_class, properties::kStatsId,
-      g_param_spec_boxed ("server-stats", "Server statistics",
-          "clients (uint), connections, refused, frame-sets, key-requests, bytes (guint64)",
-          GST_TYPE_STRUCTURE, kReadOnly));
-  StatsReporter::install (object_class, properties::kStatsIntervalId);
-  web_properties ().install (object_class, properties::kFirstSettingId);
+  object_class->finalize = delete_private<GstRangeWebSink>;
+  install_properties<GstRangeWebSink, web_properties, make_stats> (object_class,
+      "clients (uint), connections, refused, frame-sets, key-requests, bytes (guint64)",
+      "server-stats");
 
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &audio_template);

@@ -4,7 +4,9 @@
  *
  * Coded frame sets to browsers.
  */
-#include "gstrangewebsink.h"
+#include <gst/gst.h>
+
+GST_ELEMENT_REGISTER_DECLARE (rangewebsink)
 
 static gboolean
 plugin_init (GstPlugin *plugin)

@@ -16,14 +16,11 @@ inline constexpr int kProtocolVersion = 1;
 inline constexpr const char *kSubprotocol = "rangecast.v1";
 /** Maximum size of a client's message, bytes. */
 inline constexpr gsize kMaxMessage = 16384;
-/** Maximum number of bytes from a client without a whole message. */
-inline constexpr gsize kMaxUnfinished = 65536;
-/** Maximum number of a client's messages in a second. */
-inline constexpr guint kMaxMessageRate = 200;
+/** Maximum number of a client's WebSocket frames in a second. */
+inline constexpr guint kMaxFrameRate = 200;
 
 /** Reasons for which the server closes a WebSocket. */
 enum CloseCode : gushort {
-  kCloseNormal = 1000,
   kCloseGoingAway = 1001,
   kCloseUnsupported = 1003,
   kCloseTooBig = 1009,
@@ -47,7 +44,6 @@ public:
   [[nodiscard]] std::optional<std::string> text (const char *name) const;
   /** Finite: 1e999 is no number. */
   [[nodiscard]] std::optional<double> number (const char *name) const;
-  [[nodiscard]] bool has (const char *name) const;
   [[nodiscard]] JsonObject *object () const { return json_node_get_object (root_.get ()); }
 
 private:

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "server.hpp"
 
+#include <linux/tcp.h>
 #include <netinet/in.h>
-#include <netinet/tcp.h>
 
 #include <algorithm>
 #include <array>
@@ -376,25 +376,21 @@ Server::answer (SoupServerMessage *message, const std::string &path)
 
 /* ---- clients ---- */
 
-/* What soup_server_add_websocket_handler() does, but with an input whose size is limited. */
+/* What soup_server_add_websocket_handler() does, but only where the subprotocol is offered and no
+ * handler has refused the request. */
 void
 Server::upgrade (SoupServerMessage *message)
 {
   const char *protocols[] = {kSubprotocol, nullptr};
-  /* libsoup upgrades also without any */
   const char *offered = request_header (message, "Sec-WebSocket-Protocol");
   if (!offered || !soup_header_contains (offered, kSubprotocol))
-    soup_server_message_set_status (message, SOUP_STATUS_BAD_REQUEST, nullptr);
-  else if (soup_websocket_server_process_handshake (
-               message, nullptr, const_cast<char **> (protocols), nullptr, nullptr)) {
-    const auto complete = [] (SoupServerMessage *upgraded, gpointer self) {
-      static_cast<Server *> (self)->accept (upgraded);
-    };
+    return soup_server_message_set_status (message, SOUP_STATUS_BAD_REQUEST, nullptr);
+  const auto complete = [] (SoupServerMessage *upgraded, gpointer self) {
+    static_cast<Server *> (self)->accept (upgraded);
+  };
+  if (soup_websocket_server_process_handshake (
+          message, nullptr, const_cast<char **> (protocols), nullptr, nullptr))
     g_signal_connect (message, "wrote-informational", GCallback (+complete), this);
-    return;
-  }
-  GST_INFO_OBJECT (element_, "%s: not a WebSocket of %s",
-      soup_server_message_get_remote_host (message), kSubprotocol);
 }
 
 /* Clients that were not admitted do not block others. */
@@ -415,29 +411,17 @@ Server::accept (SoupServerMessage *message)
 {
   const char *host = soup_server_message_get_remote_host (message);
   const std::string address = host ? host : "unknown address";
-  g_autoptr (GUri) uri = g_uri_ref (soup_server_message_get_uri (message));
-  GSocket *tcp = soup_server_message_get_socket (message);
+  g_autoptr (GSocket) tcp = G_SOCKET (g_object_ref (soup_server_message_get_socket (message)));
   /* Who acknowledges but reads nothing must not let libsoup's queue grow. */
   g_socket_set_option (tcp, IPPROTO_TCP, TCP_USER_TIMEOUT, kMaxUnread_ms, nullptr);
   std::erase_if (sockets_, [] (const auto &one) { return g_socket_is_closed (one.get ()); });
   sockets_.emplace_back (G_SOCKET (g_object_ref (tcp)));
-  g_autoptr (GIOStream) connection = soup_server_message_steal_connection (message);
-  g_autoptr (WebLimitedInput) input =
-      web_limited_input_new (g_io_stream_get_input_stream (connection), kMaxUnfinished);
-  g_autoptr (GIOStream) stream =
-      g_simple_io_stream_new (G_INPUT_STREAM (input), g_io_stream_get_output_stream (connection));
-  /* Closing this stream does not close the connection. */
-  const auto close = [] (gpointer socket) {
-    g_socket_close (G_SOCKET (socket), nullptr);
-    g_object_unref (socket);
-  };
-  g_object_set_data_full (
-      G_OBJECT (stream), "connection", g_object_ref (connection), g_object_unref);
-  g_object_set_data_full (G_OBJECT (stream), "socket", g_object_ref (tcp), close);
+  g_autoptr (GUri) uri = g_uri_ref (soup_server_message_get_uri (message));
+  g_autoptr (GIOStream) stream = soup_server_message_steal_connection (message);
   g_object_set_data_full (G_OBJECT (stream), "count", new std::shared_ptr<int> (streams_),
       [] (gpointer count) { delete static_cast<std::shared_ptr<int> *> (count); });
   g_autoptr (SoupWebsocketConnection) socket = soup_websocket_connection_new (
-      stream, uri, SOUP_WEBSOCKET_CONNECTION_SERVER, nullptr, kSubprotocol, nullptr);
+      stream, uri, SOUP_WEBSOCKET_CONNECTION_SERVER, nullptr, kSubprotocol, client_extensions ());
   counters_.connections++;
   if (clients_.size () >= settings_.max_clients)
     drop_waiting_client ();
@@ -449,7 +433,7 @@ Server::accept (SoupServerMessage *message)
         ("at most " + std::to_string (settings_.max_clients) + " viewers").c_str ());
   }
   GST_DEBUG_OBJECT (element_, "%s connected", address.c_str ());
-  clients_.push_back (std::make_unique<Client> (*this, socket, input, address));
+  clients_.push_back (std::make_unique<Client> (*this, socket, tcp, address));
   counters_.clients++;
 }
 
@@ -508,12 +492,6 @@ Server::request_key (Client &client)
 /* ---- the stream ---- */
 
 void
-Server::set_rig (std::string rig_units)
-{
-  rig_units_ = std::make_shared<const std::string> (std::move (rig_units));
-}
-
-void
 Server::push (BytesPtr units, bool key, bool discontinuity, gint64 captured_us)
 {
   const auto number = guint32 (counters_.frame_sets++);
@@ -524,8 +502,8 @@ Server::push (BytesPtr units, bool key, bool discontinuity, gint64 captured_us)
     return;
   }
   waiting_frame_sets_++;
-  const auto frame_set = std::make_shared<const FrameSet> (
-      std::move (units), rig_units_, key, discontinuity, number, captured_us);
+  const auto frame_set =
+      std::make_shared<const FrameSet> (std::move (units), key, discontinuity, number, captured_us);
   post ([this, frame_set, flushes] {
     waiting_frame_sets_--;
     if (flushes == flushes_)
@@ -598,7 +576,7 @@ Server::tick ()
   for_each_client ([&] (Client &client) {
     if (!message.empty () && client.wants_stats ())
       client.send_text (message);
-    client.check_silence ();
+    client.check ();
   });
 }
 

@@ -61,7 +61,6 @@ public:
 
   /** @name The stream: the streaming threads of the sink pad and of the audio pad. What is pushed
    *  does not wait for the server's thread; if too much waits there, it is dropped. @{ */
-  void set_rig (std::string rig_units);
   /** @param captured_us, discontinuity  see FrameSet */
   void push (BytesPtr units, bool key, bool discontinuity, gint64 captured_us);
   /** @param captured_us  on g_get_monotonic_time() */
@@ -128,7 +127,6 @@ private:
   guint n_reports_ = 0;
 
   /* streaming threads: of the sink pad, of the audio pad */
-  std::shared_ptr<const std::string> rig_units_;
   guint flushes_before_ = 0; /* the last frame set */
   guint32 next_audio_ = 0;
 

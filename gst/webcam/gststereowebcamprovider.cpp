@@ -14,7 +14,7 @@
  *
  * Since: 0.1
  */
-#include "gststereowebcamprovider.h"
+#include <gst/gst.h>
 
 #include <algorithm>
 #include <mutex>
@@ -24,6 +24,8 @@ GST_DEBUG_CATEGORY_STATIC (gst_stereo_webcam_provider_debug);
 #define GST_CAT_DEFAULT gst_stereo_webcam_provider_debug
 
 /* ---- a webcam ---- */
+
+G_DECLARE_FINAL_TYPE (GstStereoWebcam, gst_stereo_webcam, GST, STEREO_WEBCAM, GstDevice)
 
 struct _GstStereoWebcam {
   GstDevice parent;
@@ -97,9 +99,9 @@ make_stereo_webcam (GstDevice *camera)
   gst_structure_set (properties, "stereo.packing", G_TYPE_STRING, "side-by-side", nullptr);
   gchar *camera_name = gst_device_get_display_name (camera);
   gchar *name = g_strdup_printf ("%s (stereo, side by side)", camera_name);
-  auto device =
-      static_cast<GstStereoWebcam *> (g_object_new (GST_TYPE_STEREO_WEBCAM, "display-name", name,
-          "device-class", "Source/Video/Stereo", "caps", caps, "properties", properties, nullptr));
+  auto device = static_cast<GstStereoWebcam *> (
+      g_object_new (gst_stereo_webcam_get_type (), "display-name", name, "device-class",
+          "Source/Video/Stereo", "caps", caps, "properties", properties, nullptr));
   device->camera = GST_DEVICE (gst_object_ref (camera));
   g_free (name);
   g_free (camera_name);
@@ -110,6 +112,9 @@ make_stereo_webcam (GstDevice *camera)
 
 /* ---- the provider ---- */
 
+G_DECLARE_FINAL_TYPE (GstStereoWebcamProvider, gst_stereo_webcam_provider, GST,
+    STEREO_WEBCAM_PROVIDER, GstDeviceProvider)
+
 struct _GstStereoWebcamProvider {
   GstDeviceProvider parent;
   GstDeviceProvider *cameras; /* started; null while stopped, or where there is none */
@@ -119,8 +124,8 @@ struct _GstStereoWebcamProvider {
 };
 
 G_DEFINE_TYPE (GstStereoWebcamProvider, gst_stereo_webcam_provider, GST_TYPE_DEVICE_PROVIDER)
-GST_DEVICE_PROVIDER_REGISTER_DEFINE (
-    stereowebcamprovider, "stereowebcamprovider", GST_RANK_PRIMARY, GST_TYPE_STEREO_WEBCAM_PROVIDER)
+GST_DEVICE_PROVIDER_REGISTER_DEFINE (stereowebcamprovider, "stereowebcamprovider", GST_RANK_PRIMARY,
+    gst_stereo_webcam_provider_get_type ())
 
 /* Returns: (transfer full) (nullable) */
 static GstDeviceProvider *
@@ -189,26 +194,15 @@ static void
 on_camera_message (GstBus *, GstMessage *message, gpointer data)
 {
   auto self = GST_STEREO_WEBCAM_PROVIDER (data);
-  GstDevice *camera = nullptr, *before = nullptr;
-  switch (GST_MESSAGE_TYPE (message)) {
-    case GST_MESSAGE_DEVICE_ADDED:
-      gst_message_parse_device_added (message, &camera);
-      add_camera (self, camera);
-      break;
-    case GST_MESSAGE_DEVICE_REMOVED:
-      gst_message_parse_device_removed (message, &camera);
-      remove_camera (self, camera);
-      break;
-    case GST_MESSAGE_DEVICE_CHANGED:
-      gst_message_parse_device_changed (message, &camera, &before);
-      remove_camera (self, before);
-      add_camera (self, camera);
-      break;
-    default:
-      break;
+  GstDevice *camera = nullptr;
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_DEVICE_ADDED) {
+    gst_message_parse_device_added (message, &camera);
+    add_camera (self, camera);
+  } else if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_DEVICE_REMOVED) {
+    gst_message_parse_device_removed (message, &camera);
+    remove_camera (self, camera);
   }
   gst_clear_object (&camera);
-  gst_clear_object (&before);
 }
 
 static void

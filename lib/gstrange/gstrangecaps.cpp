@@ -30,7 +30,7 @@ camera_of (const View &view)
 {
   GstRangeCamera camera{guint (view.id), view.width, view.height, view.intrinsics.fx,
       view.intrinsics.fy, view.intrinsics.cx, view.intrinsics.cy, {}, view.depth_unit_m,
-      view.near_m, view.far_m};
+      view.near_m, view.far_m, {}};
   const auto &[rotation, translation] = view.world_from_view;
   const double t[] = {translation.x, translation.y, translation.z};
   for (int row = 0; row < 3; row++) {
@@ -54,8 +54,8 @@ view_of (const GstRangeCamera &camera)
   view.world_from_view = {
       {m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, {m[3], m[7], m[11]}};
   view.depth_unit_m = camera.depth_unit;
-  view.near_m = camera.near;
-  view.far_m = camera.far;
+  view.near_m = camera.min_depth;
+  view.far_m = camera.max_depth;
   return view;
 }
 
@@ -150,7 +150,7 @@ gst_range_caps_new (
 {
   if (n_cameras == 0 || fps_n < 0 || fps_d < 1) {
     g_set_error (error, GST_LIBRARY_ERROR, GST_LIBRARY_ERROR_SETTINGS,
-        "expected at least one camera and a frame rate from 0/1, got %u and %d/%d", n_cameras,
+        "needs at least one camera and a frame rate of at least 0/1, got %u and %d/%d", n_cameras,
         fps_n, fps_d);
     return nullptr;
   }

@@ -8,7 +8,12 @@ G_BEGIN_DECLS
 #define GST_RANGE_MEDIA_TYPE "video/x-range"
 #define GST_NEIGHBOUR_CODE_MEDIA_TYPE "video/x-neighbour-code"
 
-#define GST_RANGE_SIZE_CAPS_                                                                       \
+/**
+ * GST_RANGE_SIZE_CAPS:
+ *
+ * Fields that raw and coded frame sets have in common, for pad templates.
+ */
+#define GST_RANGE_SIZE_CAPS                                                                        \
   "width = (int) [ 1, 16384 ], height = (int) [ 1, 16384 ], "                                      \
   "framerate = (fraction) [ 0/1, 2147483647/1 ], views = (int) [ 1, 64 ]"
 
@@ -18,25 +23,25 @@ G_BEGIN_DECLS
  * Raw frame sets. Fixed caps also have rig = (buffer), the binary form of the rig, with one range
  * view for each view-id that can occur.
  */
-#define GST_RANGE_CAPS GST_RANGE_MEDIA_TYPE ", format = (string) Z16_RGBx, " GST_RANGE_SIZE_CAPS_
+#define GST_RANGE_CAPS GST_RANGE_MEDIA_TYPE ", format = (string) Z16_RGBx, " GST_RANGE_SIZE_CAPS
 
 /**
  * GST_NEIGHBOUR_CODE_CAPS:
  *
- * Coded frame sets between elements. Fixed caps also have rig = (buffer).
+ * Coded frame sets in buffers of access units or slices. Fixed caps also have rig = (buffer). Key
+ * access units hold the rig, too: buffers from one on, written one after another, are a recording.
  */
 #define GST_NEIGHBOUR_CODE_CAPS                                                                    \
   GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                                    \
-  ", version = (int) 3, "                                                                          \
-  "alignment = (string) { access-unit, slice }, " GST_RANGE_SIZE_CAPS_
+  ", version = (int) 4, "                                                                          \
+  "alignment = (string) { access-unit, slice }, " GST_RANGE_SIZE_CAPS
 
 /**
  * GST_NEIGHBOUR_CODE_STREAM_CAPS:
  *
- * Coded frame sets in files: an unframed byte stream that contains the rig.
+ * The same in any buffers, as those of a file.
  */
-#define GST_NEIGHBOUR_CODE_STREAM_CAPS                                                             \
-  GST_NEIGHBOUR_CODE_MEDIA_TYPE ", version = (int) 3, alignment = (string) byte-stream"
+#define GST_NEIGHBOUR_CODE_STREAM_CAPS GST_NEIGHBOUR_CODE_MEDIA_TYPE ", version = (int) 4"
 
 /**
  * GstRangeCamera:
@@ -49,8 +54,8 @@ G_BEGIN_DECLS
  * @cy: principal point, pixels
  * @world_from_view: rows of the 3x4 matrix [R | t]; X_world = R * X_view + t, metres
  * @depth_unit: metres per depth step
- * @near: nearest depth of interest, metres
- * @far: farthest depth of interest, metres
+ * @min_depth: nearest depth of interest, metres
+ * @max_depth: farthest depth of interest, metres
  *
  * Calibration of one view. Pixel (u, v) with depth d is the point
  * z = d * depth_unit, X_view = ((u - cx) / fx * z, (v - cy) / fy * z, z): x right, y down, z
@@ -62,7 +67,10 @@ typedef struct {
   gdouble fx, fy, cx, cy;
   gdouble world_from_view[12];
   gdouble depth_unit;
-  gdouble near, far;
+  gdouble min_depth, max_depth;
+
+  /*< private >*/
+  gpointer _gst_reserved[GST_PADDING];
 } GstRangeCamera;
 
 #define GST_TYPE_RANGE_CAMERA (gst_range_camera_get_type ())

@@ -106,7 +106,7 @@ RangeFrameMap::RangeFrameMap (GstBuffer *buffer, GstMapFlags flags)
     }
     if (seen[meta->view_id]) {
       status_ = {StatusCode::kBadData, "range buffer: view " + std::to_string (meta->view_id) +
-                                           " is there twice; expected one GstRangeMeta a view"};
+                                           " has more than one GstRangeMeta"};
       gst_range_view_unmap (&maps_[count_]);
       unmap ();
       return;
@@ -119,7 +119,7 @@ RangeFrameMap::RangeFrameMap (GstBuffer *buffer, GstMapFlags flags)
   if (count_ == 0 && gst_buffer_get_size (buffer) > 0)
     status_ = {
         StatusCode::kBadData, "range buffer: " + std::to_string (gst_buffer_get_size (buffer)) +
-                                  " bytes without a GstRangeMeta; expected one for each view"};
+                                  " bytes without a GstRangeMeta; each view needs one"};
 }
 
 RangeFrameMap::~RangeFrameMap ()

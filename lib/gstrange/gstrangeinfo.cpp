@@ -53,8 +53,7 @@ parse_caps (const GstCaps *caps, RangeInfo &info)
   for (const View &view : parsed.rig.views) {
     const std::string name = "caps: rig: view " + std::to_string (view.id);
     if (!view.is_range_view ())
-      return {StatusCode::kBadValue, name + " is not rectified: expected neither distortion nor "
-                                            "partner cameras"};
+      return {StatusCode::kBadValue, name + " has distortion or partner cameras; rectify it"};
     if (view.width > parsed.width || view.height > parsed.height)
       return {StatusCode::kBadValue, name + " is larger than the caps' width and height"};
   }
@@ -141,7 +140,7 @@ GstCaps *
 make_neighbour_code_caps (const RangeInfo &info, const char *alignment)
 {
   return with_common_fields (gst_caps_new_simple (GST_NEIGHBOUR_CODE_MEDIA_TYPE, "version",
-                                 G_TYPE_INT, 3, "alignment", G_TYPE_STRING, alignment, nullptr),
+                                 G_TYPE_INT, 4, "alignment", G_TYPE_STRING, alignment, nullptr),
       info);
 }
 
@@ -151,7 +150,7 @@ recode_caps (const GstCaps *caps, bool coded, GstCaps *filter)
   static GstStaticCaps media[] = {
       GST_STATIC_CAPS (GST_RANGE_MEDIA_TYPE ", format = (string) Z16_RGBx"),
       GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-          ", version = (int) 3, alignment = (string) { access-unit, slice }")};
+          ", version = (int) 4, alignment = (string) { access-unit, slice }")};
   GstCaps *form = gst_static_caps_get (&media[coded]);
   GstCaps *other = gst_caps_new_empty ();
   for (guint i = 0; i < gst_caps_get_size (caps); i++) {

@@ -49,7 +49,7 @@ GstCaps *with_rig (const GstCaps *caps, const rangecast::Rig &rig);
 GstCaps *make_neighbour_code_caps (const RangeInfo &info, const char *alignment);
 
 /** transform_caps() of encoder and decoder: the same fields as video/x-range or, if `coded`, as
- *  video/x-neighbour-code with any alignment but byte-stream. Returns: (transfer full) */
+ *  video/x-neighbour-code. Returns: (transfer full) */
 GstCaps *recode_caps (const GstCaps *caps, bool coded, GstCaps *filter);
 
 } // namespace gstrange

@@ -36,6 +36,9 @@ typedef struct {
   gsize colour_offset;
   guint colour_stride;
   GstClockTime capture_time;
+
+  /*< private >*/
+  gpointer _gst_reserved[GST_PADDING];
 } GstRangeMeta;
 
 GST_RANGE_API GType gst_range_meta_api_get_type (void);
@@ -77,6 +80,7 @@ typedef struct {
   /*< private >*/
   GstBuffer *buffer;
   GstMapInfo map;
+  gpointer _gst_reserved[GST_PADDING];
 } GstRangeView;
 
 GST_RANGE_API gboolean gst_range_view_map (

@@ -21,7 +21,7 @@ try:
 except (ImportError, ValueError) as error:  # ValueError: no typelib
     sys.exit(
         f"frame_source.py: {error}; needs PyGObject, NumPy and the typelib GstRange-1.0: run ./setup.sh, "
-        "then this in the shell of `meson devenv -C build`, with Debian's /usr/bin/python3"
+        "then `source pipelines/env.sh`, and this with Debian's /usr/bin/python3"
     )
 
 WIDTH, HEIGHT = 320, 240
@@ -32,7 +32,7 @@ def cameras():
     """One for each view. Here: 1 m before the origin of the world, which it looks at."""
     pose = [[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 1]]  # world_from_view: x right, y down, z forward to y up
     intrinsics = [[300, 0, 159.5], [0, 300, 119.5], [0, 0, 1]]
-    return [GstRange.new_camera(0, WIDTH, HEIGHT, intrinsics, pose, depth_unit=UNIT, near=0.5, far=1.5)]
+    return [GstRange.new_camera(0, WIDTH, HEIGHT, intrinsics, pose, depth_unit=UNIT, min_depth=0.5, max_depth=1.5)]
 
 
 def capture(number):
@@ -53,7 +53,7 @@ def main():
     parser.add_argument("--live", action="store_true", help="time stamps of arrival instead of N / FPS")
     options = parser.parse_args()
     if options.fps <= 0 and not options.live:
-        parser.error("--fps: expected more than 0, or --live")
+        parser.error("--fps must be more than 0 without --live")
 
     Gst.init(None)
     pipeline = Gst.parse_launch(f"appsrc name=source format=time ! {options.sink}")

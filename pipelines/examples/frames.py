@@ -20,7 +20,7 @@ try:
 except (ImportError, ValueError) as error:  # ValueError: no typelib
     sys.exit(
         f"frames.py: {error}; needs PyGObject, NumPy and the typelib GstRange-1.0: run ./setup.sh, "
-        "then this in the shell of `meson devenv -C build`, with Debian's /usr/bin/python3"
+        "then `source pipelines/env.sh`, and this with Debian's /usr/bin/python3"
     )
 
 
@@ -54,9 +54,9 @@ def main():
     parser.add_argument("--save", metavar="FILE.ply|FILE.npy")
     options = parser.parse_args()
     if options.frames < 1:
-        parser.error(f"--frames {options.frames}: expected 1 or more")
+        parser.error(f"--frames must be 1 or more, got {options.frames}")
     if options.save and not options.save.endswith((".ply", ".npy")):
-        parser.error(f"--save {options.save}: expected a name that ends in .ply or .npy")
+        parser.error(f"--save {options.save}: use a name that ends in .ply or .npy")
 
     Gst.init(None)
     pipeline = Gst.parse_launch(f"{options.source} ! video/x-range ! appsink name=frames sync=false max-buffers=2")

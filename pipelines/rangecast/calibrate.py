@@ -1,41 +1,38 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""calibrate: pictures of a chessboard or ChArUco board, from files or live, to a rig file."""
+"""calibrate: images of a chessboard or ChArUco board, from files or live, to a rig file."""
 
-import atexit
 import queue
 import re
-import shutil
 import signal
 import struct
 import subprocess
 import sys
-import tempfile
 import threading
 from pathlib import Path
 
 from . import options
+from .images import make_folder, play_images, read_images
 from .launch import Launch, fail_unless, has_element
 
 SOURCE_HELP = """Each --left, --side-by-side or --top-bottom begins a view: 0, 1, ... WHAT is one of
-  'left%%02d.jpg'  numbered pictures (.jpg, .png, .bmp); only numbers that all cameras have are used
-  'left*.png'     pictures in order; all cameras must have the same number of them
+  'left%02d.jpg'  numbered images (.jpg, .png, .tif, .pgm, ...); only numbers that all cameras have are used
+  'left*.png'     images in order; all cameras must have the same number of them
   left.mp4        a video
   'v4l2src device=/dev/video0 ! image/jpeg ! jpegdec'   a live camera, in gst-launch-1.0 syntax"""
-TYPES = {".jpg": "jpeg", ".jpeg": "jpeg", ".png": "png", ".bmp": "bmp"}
 FIELD = re.compile(r'([a-z-]+)=\((?:string|int|uint|double|boolean|uint64|guint64)\)("[^"]*"|[^,;>]*)')
 
 
 def add_calibrate(parser):
     cameras = parser.add_argument_group("cameras", SOURCE_HELP)
     for name, text in (("--left", "the camera of a view, or the left one of its stereo pair"), ("--right", "the right camera of that pair"),
-                       ("--third", "the third camera of that view"), ("--side-by-side", "a stereo camera that packs both pictures into one"),
+                       ("--third", "the third camera of that view"), ("--side-by-side", "a stereo camera that packs both images into one"),
                        ("--top-bottom", "the same, packed top and bottom")):  # fmt: skip
         cameras.add_argument(name, action=Camera, metavar="WHAT", help=text)
-    parser.add_argument("--out", type=options.output_file, required=True, metavar="FILE", help="rig file to write: .yaml or .json")
+    options.add(parser, "--out")
     board = parser.add_argument_group("the board")
     board.add_argument("--board", choices=("chessboard", "charuco"), help="default chessboard")
-    board.add_argument("--columns", type=options.number(3, 64), metavar="N", help="inner corners in a row, one less than squares (default 9)")
-    board.add_argument("--rows", type=options.number(3, 64), metavar="N", help="inner corners in a column (default 6)")
+    board.add_argument("--columns", type=options.number(3, 32), metavar="N", help="inner corners in a row, one less than squares (default 9)")
+    board.add_argument("--rows", type=options.number(3, 32), metavar="N", help="inner corners in a column (default 6)")
     board.add_argument("--square", type=options.metres, metavar="M", help="side length of a square, metres (default 0.025)")
     board.add_argument("--marker", type=options.metres, metavar="M", help="charuco: side length of a marker (default: 3/4 of a square)")
     board.add_argument("--dictionary", metavar="NAME", help="charuco: marker dictionary (default 4x4-50)")
@@ -46,7 +43,7 @@ def add_calibrate(parser):
     result.add_argument("--min-frames", type=options.number(3, 1000), metavar="N", help="frames in which each camera must see the board (default 8)")
     result.add_argument("--stills", metavar="DIR", help="write a PNG of each frame that was searched, with the corners found")
     options.add(result, "--window")
-    result.add_argument("--auto-finish", action="store_true", help="finish when the board has been seen in all parts of the pictures")
+    result.add_argument("--auto-finish", action="store_true", help="finish when the board has been seen in all parts of the images")
     parser.set_defaults(build=build_calibrate, run=run_calibrate, cameras=[])
 
 
@@ -61,62 +58,28 @@ class Camera(options.argparse.Action):
             view += 1
         if view < 0:
             parser.error(f"{name} belongs after the --left of its view")
+        if any(one[:2] == (view, role) for one in cameras):
+            parser.error(f"{name} is given twice for view {view}")
         cameras.append((view, role, value))
-
-
-def list_pictures(pattern):
-    """{key: file} of a pattern: the number of a picture, or its place in the order."""
-    path = Path(pattern)
-    numbered = re.fullmatch(r"([^%]*)%0?\d*d([^%]*)", path.name)
-    if numbered:
-        found = {}
-        for file in path.parent.iterdir():
-            match = re.fullmatch(re.escape(numbered[1]) + r"(\d+)" + re.escape(numbered[2]), file.name)
-            if match and file.name == path.name % int(match[1]):
-                found[int(match[1])] = file
-        return found
-    natural = lambda file: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", file.name)]
-    return dict(enumerate(sorted(path.parent.glob(path.name), key=natural)))
 
 
 def is_source(what):
     return not Path(what).exists() and ("!" in what or has_element(what.split(" ")[0]))
 
 
-def is_pattern(what):
-    return not Path(what).exists() and not is_source(what) and re.search(r"[%*?\[]", what) is not None
-
-
-def read_pictures(cameras):
-    """[{key: file}] of the cameras that are pictures, with the keys that all have; None for others."""
-    lists = [list_pictures(what) if is_pattern(what) else None for _, _, what in cameras]
-    sets = [set(found) for found in lists if found is not None]
-    for (_, _, what), found in zip(cameras, lists):
-        fail_unless(found is None or found, f"no pictures '{what}'")
-        fail_unless(found is None or "%" in what or set(found) == sets[0],
-                    f"'{what}': {len(found or ())} pictures, but the first camera has {len(sets[0]) if sets else 0}")  # fmt: skip
-    common = sorted(set.intersection(*sets)) if sets else []
-    fail_unless(not sets or common, "the cameras have no picture number in common")
-    return [found and {key: found[key] for key in common} for found in lists]
-
-
-def describe(folder, number, what, pictures):
-    """The elements that play a camera. Files get links: multifilesrc stops at a gap, and gst-launch-1.0 knows special characters."""
+def describe(folder, number, what, images):
+    """The elements that play a camera."""
     if is_source(what):
         return [*options.elements(what), *"! videoconvert ! queue leaky=downstream max-size-buffers=2".split()]
-    if pictures:
-        kind = TYPES.get(Path(what).suffix.lower())
-        fail_unless(kind, f"'{what}' is not .jpg, .png or .bmp pictures")
-        for i, file in enumerate(pictures.values()):
-            (folder / f"{number}-{i:05d}").symlink_to(file.resolve())
-        return ["multifilesrc", f"location={folder}/{number}-%05d", f"caps=image/{kind},framerate=1/1", *"! decodebin ! videoconvert ! queue".split()]
-    fail_unless(Path(what).is_file(), f"no file, pictures or source '{what}'")
+    if images:
+        return [*play_images(folder, number, images.values()), *"! videoconvert ! queue".split()]
+    fail_unless(Path(what).is_file(), f"no file, images or source '{what}'")
     (folder / f"{number}-film").symlink_to(Path(what).resolve())
     return ["filesrc", f"location={folder}/{number}-film", *"! decodebin ! videoconvert ! queue".split()]
 
 
 def size_of(folder, source):
-    """Width and height of the first picture, from the header of a PNG."""
+    """Width and height of the first image, from the header of a PNG."""
     first = folder / "first.png"
     first.unlink(missing_ok=True)
     command = ["gst-launch-1.0", "-q", *source, *"! videoconvert ! pngenc snapshot=true compression-level=1 ! filesink".split(), f"location={first}"]
@@ -126,16 +89,14 @@ def size_of(folder, source):
         said = ""
     head = first.read_bytes()[:24] if first.exists() else b""
     error = re.search(r"^(?:ERROR: from element \S+|WARNING: erroneous pipeline): (.*)", said, re.M)
-    fail_unless(len(head) == 24, f"no picture comes from '{' '.join(source)}'" + (f": {error[1]}" if error else ""))
+    fail_unless(len(head) == 24, f"no image comes from '{' '.join(source)}'" + (f": {error[1]}" if error else ""))
     return struct.unpack(">II", head[16:24])
 
 
 def build_calibrate(args):
     fail_unless(args.cameras, "needs --left, --side-by-side or --top-bottom")
     fail_unless(has_element("rigcalibrate"), "no element rigcalibrate: run setup.sh")
-    folder = Path(tempfile.mkdtemp(prefix="rangecast-"))
-    if not args.print:  # the printed string needs it
-        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    folder = make_folder(args.print)
     launch = Launch("rigcalibrate", "name=c", f"location={args.out}")
     for name in ("board", "columns", "rows", "square", "marker", "dictionary", "distortion", "world", "near", "far", "min_frames"):
         value = getattr(args, name)
@@ -151,8 +112,9 @@ def build_calibrate(args):
         sources.extend([*source, "!", f"c.sink_{pads}"])
         pads += 1
 
-    for number, ((view, role, what), pictures) in enumerate(zip(args.cameras, read_pictures(args.cameras))):
-        source = describe(folder, number, what, pictures)
+    patterns = [None if is_source(what) else what for _, _, what in args.cameras]
+    for number, ((view, role, what), images) in enumerate(zip(args.cameras, read_images(patterns))):
+        source = describe(folder, number, what, images)
         if role in ("left", "right", "third"):
             add_pad(view, role, source)
             continue
@@ -223,10 +185,15 @@ def lines_of(child):
 
 
 def run_calibrate(args, launch):
-    """Runs it with gst-launch-1.0 -m, whose lines are rigcalibrate's messages. Ctrl-C ends the stream, which calibrates."""
+    """Runs it with gst-launch-1.0 -m, whose lines are rigcalibrate's messages. Ctrl-C ends the stream, which calibrates; a second one ends that."""
     command = ["gst-launch-1.0", "-e", "-m", *launch.words]
     child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True)
-    signal.signal(signal.SIGINT, lambda *_: child.send_signal(signal.SIGINT))
+
+    def interrupt(*_):
+        child.send_signal(signal.SIGINT)
+        signal.signal(signal.SIGINT, lambda *_: (child.kill(), sys.exit(130)))
+
+    signal.signal(signal.SIGINT, interrupt)
     signal.signal(signal.SIGTERM, lambda *_: (child.kill(), sys.exit(143)))
     result = error = False
     for line in lines_of(child):
@@ -240,7 +207,7 @@ def run_calibrate(args, launch):
         elif complaint and not error:
             print(f"rangecast calibrate: {complaint[2]}", file=sys.stderr)
             error = complaint[1] != "WARNING"
-            if error:  # before the first picture gst-launch-1.0 may wait forever after it
+            if error:  # before the first image gst-launch-1.0 may wait forever after it
                 child.kill()
     child.wait()
     if not result and not error:

@@ -14,42 +14,39 @@ from .processes import Processes
 def add_call(parser):
     parser.add_argument("--peer", required=True, metavar="HOST", help="the other end: name or address")
     options.add(parser, "--rig", required=True)
-    parser.add_argument("--port", type=options.number(1, 65000), metavar="PORT", default=5400,
-                        help="the same at both ends (default 5400); this machine also uses PORT + 2, + 3 (speech), + 10 and one more for each view")  # fmt: skip
+    options.add(parser, "--base-port", default=5400,
+                help="the same at both ends (default 5400); UDP ports PORT, + 2, + 3 (audio), + 10 and one more for each view")  # fmt: skip
     options.add(parser, "--microphone", default="autoaudiosrc")
     options.add(parser, "--speaker", "--key", "--threads")
     parser.add_argument("--no-echo-cancel", action="store_true", help="for headphones: do not filter the microphone (webrtcdsp)")
-    parser.add_argument("--out", metavar="DIR", help="write a video with speech to DIR/avatar.webm")
+    options.add(parser, "--video")
     parser.add_argument("--no-window", action="store_true", help="show nothing")
-    parser.add_argument("--fec-percent", type=options.number(1, 100), metavar="N", help="send that much more, from which the other end restores lost packets")
+    options.add(parser, "--fec-percent", help="redundant packets, from which the other end restores lost ones")
     add_camera_options(parser)
-    parser.set_defaults(main=call, input="cameras")
+    parser.set_defaults(run_hosts=call, input="cameras")
 
 
-def call(args, parse):
+def call(args, host):
     views = options.count_views(args.rig)
     fail_unless(views > 0, f"--rig: '{args.rig}' has no views: it is no rig file")
-    host, port = options.address(f"{args.peer}:{args.port}")
-
-    def launch(*words):
-        parsed = parse([str(word) for word in words])
-        return parsed.build(parsed)
-
+    peer, port = options.address(f"{args.peer}:{args.base_port}")
     key = ["--key", args.key] if args.key else []
     fec = ["--fec-percent", args.fec_percent] if args.fec_percent else []
     viewer = ["view", "--listen", port, "--audio-port", port + 2, "--speaker", " ".join(args.speaker), *key, *(["--fec"] if fec else [])]
     viewer += [] if args.no_window else ["--window"]
-    viewer += ["--out", args.out] if args.out else []
+    viewer += ["--video", args.video] if args.video else []
     if args.microphone != ["none"]:
-        viewer += ["--microphone", " ".join(args.microphone), "--talk-to", f"{host}:{port + 2}", *([] if args.no_echo_cancel else ["--echo-cancel"])]
-    with Processes() as processes:
-        viewing = processes.start("the viewer", launch(*viewer))
-        processes.start("the parent", launch("parent", "--views", views, "--listen", port + 10, "--to", f"{host}:{port}", *fec, *key))
+        viewer += ["--microphone", " ".join(args.microphone), "--talk-to", f"{peer}:{port + 2}", *([] if args.no_echo_cancel else ["--echo-cancel"])]
+    with Processes(args.print) as processes:
+        viewing = processes.start("the viewer", host(*viewer)[1])
+        processes.start("the parent", host("parent", "--views", views, "--listen", port + 10, "--to", f"{peer}:{port}", *fec, *key)[1])
         for view in range(views):
             camera = ["camera", "--rig", args.rig, "--input", args.input, "--view", view, "--to", f"127.0.0.1:{port + 10 + view}", *key]
             camera += ["--size", "{}x{}".format(*args.size), "--fps", args.fps, "--loop", args.loop, "--learn", args.learn, "--format", args.format]
             camera += ["--depth", " ".join(args.depth), "--encoder", " ".join(args.encoder)]
-            processes.start(f"the camera host of view {view}", launch(*camera))
+            processes.start(f"the camera host of view {view}", host(*camera)[1])
+        if args.print:
+            return 0
         print("type m and Enter to mute or unmute the microphone, q and Enter (or Ctrl-C) to hang up", flush=True)
         threading.Thread(target=read_keys, args=(viewing,), daemon=True).start()
         name, status = processes.wait_for_end()

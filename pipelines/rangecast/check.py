@@ -23,7 +23,7 @@ ELEMENTS = {
     "vp8enc": "videos",
     "rtpulpfecenc": "forward error correction",
     "srtpenc": "encryption",
-    "opusenc": "speech",
+    "opusenc": "audio",
     "webrtcdsp": "echo cancellation",
 }
 SOCKET_BUFFER = 4194304
@@ -31,13 +31,12 @@ SOCKET_BUFFER = 4194304
 
 def add_check(parser):
     parser.add_argument("rig", nargs="?", metavar="RIG", help="print the geometry of this rig file; without it, check this machine")
-    parser.add_argument("--png", metavar="FILE", help="draw the rig from above")
     parser.set_defaults(main=check)
 
 
-def check(args, _parse):
+def check(args):
     if args.rig:
-        os.execvp("rig-check", ["rig-check", args.rig, *(["--png", args.png] if args.png else [])])
+        os.execvp("rig-check", ["rig-check", args.rig])
     findings = [*elements(), opengl(), display(), socket_buffer(), realtime(), ports(), cameras()]
     for good, what, remedy in findings:
         print(f"{'ok     ' if good else 'missing'}  {what}" + ("" if good or not remedy else f": {remedy}"))
@@ -58,14 +57,14 @@ def opengl():
 
 
 def display():
-    return has_display(), "a display", "set DISPLAY or WAYLAND_DISPLAY; without one, write videos (--out, --film)"
+    return has_display(), "a display", "set DISPLAY or WAYLAND_DISPLAY; without one, write videos (--video)"
 
 
 def socket_buffer():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
         udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SOCKET_BUFFER)
         size = udp.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2
-    return size >= SOCKET_BUFFER, f"UDP receive buffers of {size} bytes", f"sysctl -w net.core.rmem_max={SOCKET_BUFFER}, or packets of large frame sets are lost"
+    return size >= SOCKET_BUFFER, f"UDP receive buffers of {size} bytes", f"sysctl -w net.core.rmem_max={SOCKET_BUFFER}, or large frame sets lose packets"
 
 
 def realtime():
@@ -83,7 +82,7 @@ def ports():
                 one.bind(("127.0.0.1", port))
             except OSError:
                 taken.append(str(port))
-    return not taken, "the default ports of demo and serve", f"{', '.join(taken)} in use: see --port"
+    return not taken, "the default ports of demo and serve", f"{', '.join(taken)} in use: see --base-port and --port"
 
 
 def cameras():
@@ -94,4 +93,4 @@ def cameras():
             found += [line.strip() for line in said.splitlines() if line.strip() and "No device" not in line]
         except subprocess.TimeoutExpired:
             pass
-    return bool(found), "cameras" + (": " + ", ".join(found) if found else ""), "none seen; simulated ones: rangecast demo --input cameras"
+    return bool(found), "cameras" + (": " + ", ".join(found) if found else ""), "none seen; the source tree simulates some: ./pipelines/demo.sh --input cameras"

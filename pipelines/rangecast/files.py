@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""record, play and convert: recordings, pictures and point clouds."""
+"""record, play and convert: recordings, images and point clouds."""
 
 import fcntl
 import os
+import re
+import subprocess
 from pathlib import Path
 
 from . import options, transport
-from .hosts import PREPARE, size_caps
+from .hosts import size_caps
+from .images import TYPES, is_pattern, list_images, make_folder, play_images, read_images
 from .launch import Fail, Launch, fail_unless, has_display
 
 GL = "video/x-raw(memory:GLMemory)"
 
 
-def speech_beside(recording):
-    """x.opus beside x.rcnc, and x.opus~ beside x.rcnc~."""
+def audio_file_of(recording):
+    """x.opus next to x.rcnc, and x.opus~ next to x.rcnc~."""
     path = Path(recording.removesuffix("~"))
     return str(path.with_suffix(".opus")) + ("~" if recording.endswith("~") else "")
 
@@ -24,38 +27,40 @@ def speech_beside(recording):
 def add_record(parser):
     parser.add_argument("file", type=options.output_file, metavar="FILE", help="an existing one is renamed to FILE~")
     figure = parser.add_argument_group("the built-in figure, where --listen is not given")
-    options.add(figure, "--size", "--views")
-    options.add(figure, "--frames", default=60)
+    options.add(figure, "--views")
+    options.add(figure, "--size", default=None, help="size of the images (default 320x240)")
+    options.add(figure, "--frames", default=None, help="number of frame sets (default 60)")
     options.add_receiver(parser, listen_required=False)
     parser.set_defaults(build=build_record)
 
 
 def build_record(args):
-    fail_unless(args.listen or not (args.audio_port or args.multicast or args.key or args.feedback_to), "options of RTP need --listen")
-    speech = speech_beside(args.file)
+    transport.check_listen(args)
+    fail_unless(not args.listen or not (args.views or args.size or args.frames), "--views, --size and --frames are for the built-in figure, without --listen")
+    audio = audio_file_of(args.file)
     launch = Launch()
     if args.listen:
         transport.receive_stream(args, launch)
         if args.audio_port:
-            fail_unless(speech != args.file, f"{args.file}: the speech goes to a file of that name: choose one that does not end in .opus")
+            fail_unless(audio != args.file, f"{args.file}: audio goes to a file of that name; choose one that does not end in .opus")
             # Both files begin with the first key frame set.
-            launch.add(*"! neighbourcodeparse ! video/x-neighbour-code,alignment=access-unit ! sync.sink_0".split())
-            launch.add(*"capturesync name=sync start-with=sink_0 sync.src_0".split())
+            # The parser writes the times of capturesync into the file.
+            launch.add(*"! sync.sink_0 capturesync name=sync start-with=sink_0 sync.src_0 ! neighbourcodeparse".split())
     else:
-        launch.add("avatartestsrc", f"views={args.views or 4}", f"num-buffers={args.frames}", "range-person-only=true")
-        launch.add("!", size_caps(args.size, 15, "video/x-range"))
+        launch.add("avatartestsrc", f"views={args.views or 4}", f"num-buffers={args.frames or 60}", "range-person-only=true")
+        launch.add("!", size_caps(args.size or (320, 240), 15, "video/x-range"))
         launch.add(*"! neighbourcodeenc profile=entropy temporal=true key-interval=2000".split())
-    launch.add("!", "neighbourcodeparse", "!", "filesink", "async=false", f"location={args.file}")
+    launch.add("!", "filesink", "async=false", f"location={args.file}")
     launch.option("--drop-empty", args.file)
     if args.audio_port:
-        transport.receive_speech(args, launch)
+        transport.receive_audio(args, launch)
         launch.add("!", "sync.sink_1", "sync.src_1", *transport.HEAR, "!", "audiorate", "skip-to-first=false")
-        launch.add(*"! opusenc audio-type=voice bitrate=32000 ! oggmux ! filesink async=false".split(), f"location={speech}")
-        launch.option("--drop-empty", speech)
+        launch.add(*"! opusenc audio-type=voice bitrate=32000 ! oggmux ! filesink async=false".split(), f"location={audio}")
+        launch.option("--drop-empty", audio)
     if not args.print:
         keep_existing(args.file)
-        if Path(speech).exists() and args.file != speech:
-            os.replace(speech, speech + "~")
+        if Path(audio).exists() and args.file != audio:
+            os.replace(audio, audio + "~")
     return launch
 
 
@@ -80,32 +85,31 @@ def keep_existing(file):
 
 
 def add_play(parser):
-    parser.add_argument("file", type=options.existing_file, metavar="FILE", help="speech recorded with it, x.opus beside x.rcnc, is played, too")
-    parser.add_argument("--film", type=options.output_file, metavar="WEBM", help="write a video instead of opening a window")
+    parser.add_argument("file", type=options.existing_file, metavar="FILE", help="audio recorded with it, x.opus next to x.rcnc, is played, too")
+    options.add(parser, "--video", help="write a video instead of opening a window")
     options.add(parser, "--orbit", default="30")
-    options.add(parser, "--speaker")
-    options.add(parser, "--picture")
+    options.add(parser, "--speaker", "--output-size")
     parser.set_defaults(build=build_play)
 
 
 def build_play(args):
-    speech = speech_beside(args.file)
-    fail_unless(args.film or args.print or has_display(), "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --film")
-    for file in (args.file, speech):
-        fail_unless(not args.film or os.path.realpath(args.film) != os.path.realpath(file), f"--film: '{file}' is what is played")
-    launch = Launch("filesrc", f"location={args.file}", "!", "neighbourcodeparse", "!", "neighbourcodedec", "!", *PREPARE)
-    launch.add("!", "striprender", "fit=true", "background-shade=0.5", f"auto-orbit={args.orbit}", "!", size_caps(args.picture, media=GL))
-    with_speech = speech != args.file and Path(speech).is_file() and args.speaker != ["none"]
-    if args.film:
-        launch.add(*"! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! queue ! webmmux name=film".split())
-        launch.add("!", "filesink", f"location={args.film}")
-        launch.option("--drop-empty", args.film)
+    audio = audio_file_of(args.file)
+    fail_unless(args.video or args.print or has_display(), "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --video")
+    for file in (args.file, audio):
+        fail_unless(not args.video or os.path.realpath(args.video) != os.path.realpath(file), f"--video: '{file}' is what is played")
+    launch = Launch("filesrc", f"location={args.file}", "!", "neighbourcodeparse", "!", "neighbourcodedec", "!", "rangealign")
+    launch.add("!", "striprender", "fit=true", "background-shade=0.5", f"auto-orbit={args.orbit}", "!", size_caps(args.output_size, media=GL))
+    with_audio = audio != args.file and Path(audio).is_file() and args.speaker != ["none"]
+    if args.video:
+        launch.add(*"! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! queue ! webmmux name=video".split())
+        launch.add("!", "filesink", f"location={args.video}")
+        launch.option("--drop-empty", args.video)
     else:
         launch.add("!", "glimagesink")
-    if with_speech:
-        launch.add("filesrc", f"location={speech}", "!", "oggdemux", "!", "opusparse")
-        if args.film:
-            launch.add(*"! queue max-size-time=0 max-size-buffers=0 ! film.".split())
+    if with_audio:
+        launch.add("filesrc", f"location={audio}", "!", "oggdemux", "!", "opusparse")
+        if args.video:
+            launch.add(*"! queue max-size-time=0 max-size-buffers=0 ! video.".split())
         else:
             launch.add(*transport.HEAR, "!", *args.speaker)
     return launch
@@ -113,10 +117,11 @@ def build_play(args):
 
 # ---- convert ----
 
-CONVERT_HELP = """rangecast convert RECORDING OUT.ply             point clouds of a recording; OUT-%%05d.ply for several frame sets
+CONVERT_HELP = """rangecast convert RECORDING OUT.ply             point cloud of its first frame set; OUT-%05d.ply: of all
 rangecast convert LEFT RIGHT OUT.png           a stereo pair, seen from the side; OUT.ply: its points
 rangecast convert LEFT RIGHT OUT-DIR --learn N  the person in two recorded videos, cut out: a PNG for each frame
-rangecast convert --rgbd COLOUR DEPTH OUT      pictures of an RGB-D camera; depth is a 16-bit greyscale PNG; sequences as %%05d.png"""
+rangecast convert --rgbd COLOUR DEPTH OUT      images of an RGB-D camera; depth has 16-bit grey (PNG, PGM, TIFF); sequences as %05d.png or '*.png'
+rangecast convert --rgbd LIST OUT              the same, with the names of an image pair in each line, as in associations.txt of TUM"""
 
 
 def add_convert(parser):
@@ -125,37 +130,48 @@ def add_convert(parser):
     pair = parser.add_argument_group("geometry")
     options.add(pair, "--rig", "--near", "--far", "--turn")
     options.add(pair, "--view", default=0)
-    pair.add_argument("--focal-length", type=float, metavar="PX", help="focal length of rectified pictures, or of the depth camera, pixels")
+    pair.add_argument("--focal-length", type=float, metavar="PX", help="focal length of rectified images, or of the depth images (not the colour ones), in pixels")
     pair.add_argument("--baseline", type=options.metres, metavar="M", help="distance of the cameras, metres")
-    pair.add_argument("--depth-scale", type=options.metres, metavar="M", default="0.001", help="metres per unit of a depth picture (default 0.001)")
+    pair.add_argument("--depth-scale", type=options.metres, metavar="M", default="0.001", help="metres per unit of a depth image (default 0.001)")
     options.add(parser, "--depth")
-    options.add(parser, "--picture", default="960x720")
+    options.add(parser, "--output-size", default="960x720")
     video = parser.add_argument_group("recorded videos")
-    options.add(video, "--learn", "--settle")
-    options.add(video, "--fps", default=None)
-    video.add_argument("--size", type=options.size, metavar="WxH", help="scale the videos to this size, which is that of the rig")
+    options.add(video, "--learn", type=options.number(1, 100000))
+    options.add(video, "--settle")
+    options.add(video, "--fps", default=None, help="reduce the videos to this frame rate")
+    options.add(video, "--size", default=None, help="scale the videos to this size, which is that of the rig")
     video.add_argument("--person", type=options.properties, metavar="WHAT", default=[], help="properties of roiextract, e.g. margin=8")
     parser.set_defaults(build=build_convert)
 
 
 def build_convert(args):
     *inputs, out = args.files
-    fail_unless(len(inputs) == (2 if args.rgbd else len(inputs)) and 1 <= len(inputs) <= 2, "needs RECORDING OUT, LEFT RIGHT OUT or --rgbd COLOUR DEPTH OUT")
+    fail_unless(len(inputs) in (1, 2), "needs RECORDING OUT, LEFT RIGHT OUT, --rgbd COLOUR DEPTH OUT or --rgbd LIST OUT")
+    fail_unless(args.learn or args.settle is None, "--settle needs --learn")
+    fail_unless(not (args.rgbd and args.learn), "--learn is for a stereo pair")
     for file in inputs:
-        fail_unless(options.numbered(file) or Path(file).is_file(), f"no file '{file}'")
-    if args.rgbd:
-        return convert_rgbd(args, *inputs, out)
-    return convert_recording(inputs[0], out) if len(inputs) == 1 else convert_pair(args, *inputs, out)
+        fail_unless((args.rgbd and is_pattern(file)) or Path(file).is_file(), f"no file '{file}'")
+        fail_unless(os.path.realpath(file) != os.path.realpath(out), f"'{out}' is what is converted: choose another name to write")
+    images = args.rgbd or len(inputs) > 1
+    fail_unless(args.learn or out.lower().endswith((".ply", ".pcd", ".png")[: 2 + images]),
+                f"'{out}': needs a name that ends in .ply, .pcd" + " or .png" * images)  # fmt: skip
+    launch = convert_rgbd(args, inputs, out) if args.rgbd else convert_pair(args, *inputs, out) if images else convert_recording(args, *inputs, out)
+    if not args.learn and not options.numbered(out):
+        launch.option("--drop-empty", out)
+    return launch
 
 
-def convert_recording(file, out):
-    launch = Launch("filesrc", f"location={file}", "!", "neighbourcodeparse", "!", "neighbourcodedec", "!", *PREPARE, "!", "cylinderfilter")
-    launch.add("!", "plyenc", "!", "multifilesink" if options.numbered(out) else "filesink", f"location={out}")
+def convert_recording(args, file, out):
+    unused = [args.rig, args.near, args.far, args.focal_length, args.baseline, args.learn, args.fps, args.size, args.depth, args.person]
+    fail_unless(not any(unused), "a recording has its geometry: leave the options of cameras and videos out")
+    launch = Launch("filesrc", f"location={file}", *"! neighbourcodeparse ! neighbourcodedec ! rangealign ! cylinderfilter".split())
+    # eos-after counts the frame set that it does not pass on.
+    launch.add(*("! plyenc ! multifilesink" if options.numbered(out) else "! identity eos-after=2 ! plyenc ! filesink").split(), f"location={out}")
     return launch
 
 
 def draw(args, out, snapshot=False):
-    words = ["striprender", f"azimuth={args.turn}", "!", size_caps(args.picture, media=GL), "!", "gldownload", "!", "videoconvert", "!", "pngenc"]
+    words = ["striprender", f"azimuth={args.turn}", "!", size_caps(args.output_size, media=GL), *"! gldownload ! videoconvert ! pngenc".split()]
     return words + (["snapshot=true"] if snapshot else []) + ["!", "filesink", f"location={out}"]
 
 
@@ -178,36 +194,52 @@ def convert_pair(args, left, right, out):
     launch.add("stereodepth", "name=depth", *calibration, *args.depth)
     if args.learn is None:
         return add_output(args, launch, out)
-    Path(out).mkdir(parents=True, exist_ok=True)
+    if not args.print:
+        Path(out).mkdir(parents=True, exist_ok=True)
     launch.add("!", "roiextract", f"settle-frames={args.settle or 0}", f"background-frames={args.learn}", *args.person)
     launch.add(*"! rangesplit name=person person.colour ! queue ! videoconvert ! pngenc ! multifilesink".split(), f"location={out}/%05d.png")
     return launch
 
 
-def add_output(args, launch, out):
-    launch.add("!", *(draw(args, out, snapshot=True) if out.endswith(".png") else ["plyenc", "!", "multifilesink", f"location={out}"]))
+def add_output(args, launch, out, index=0):
+    points = ["plyenc", "!", "multifilesink", f"location={out}", f"index={index}"]
+    launch.add("!", *(draw(args, out, snapshot=True) if out.lower().endswith(".png") else points))
     return launch
 
 
-def is_depth_picture(file):
-    """A PNG of 16-bit grey: others would give empty point clouds without an error."""
-    head = Path(file).read_bytes()[:26]
-    return head[1:4] == b"PNG" and head[24:26] == b"\x10\x00"
+def is_depth_image(file):
+    """Others than 16-bit grey would give wrong point clouds without an error."""
+    command = ["gst-launch-1.0", "-v", "multifilesrc", f"location={str(file).replace('%', '%%')}", *"num-buffers=1 ! decodebin ! fakesink".split()]
+    said = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False).stdout
+    return re.search(r"fakesink.*format=\(string\)GRAY16_", said) is not None
 
 
-def convert_rgbd(args, colour, depth, out):
-    fail_unless(options.numbered(depth) or is_depth_picture(depth), f"'{depth}' is not a 16-bit greyscale PNG")
-    fail_unless(not options.numbered(colour) or options.numbered(out) or out.endswith(".png"), f"'{out}': sequences need a name such as out-%05d.ply")
+def read_list(file):
+    """Colour and depth images of a list: the paths in each line, in either order."""
+    lines = [line.split() for line in Path(file).read_text(errors="replace").splitlines() if line.strip() and not line.startswith("#")]
+    pairs = [[Path(file).parent / word for word in line if Path(word).suffix.lower() in TYPES] for line in lines]
+    fail_unless(pairs and all(len(pair) == 2 for pair in pairs), f"'{file}' needs the names of a colour and a depth image in each line")
+    for image in (image for pair in pairs for image in pair):
+        fail_unless(image.is_file(), f"'{file}': no file '{image}'")
+    first, second = zip(*pairs)
+    return (second, first) if is_depth_image(first[0]) else (first, second)
 
-    def reader(file):
-        if not options.numbered(file):
-            return ["filesrc", f"location={file}"]
-        media = Path(file).suffix[1:].lower().replace("jpg", "jpeg")
-        return ["multifilesrc", f"location={file}", f"caps=image/{media},framerate=30/1"]
 
-    launch = Launch(*reader(colour), *"! decodebin ! videoconvert ! combine.colour".split())
-    launch.add(*reader(depth), *"! pngdec ! videoconvert ! video/x-raw,format=GRAY16_LE ! combine.depth".split())
+def convert_rgbd(args, inputs, out):
+    start = 0
+    if len(inputs) == 1:
+        colour, depth = read_list(inputs[0])
+    else:
+        colour, depth = [list(found.values()) if found else [one] for one, found in zip(inputs, read_images(inputs))]
+        fail_unless(len(colour) == len(depth), f"{len(colour)} colour images, but {len(depth)} depth images")
+        start = min(list_images(inputs[0])) if options.numbered(inputs[0]) else 0
+    hint = ": EXR would be read as 0 to 1; save whole millimetres as PNG, PGM or TIFF" * (Path(depth[0]).suffix.lower() == ".exr")
+    fail_unless(is_depth_image(depth[0]), f"'{depth[0]}' is not a 16-bit greyscale image" + hint)
+    fail_unless(len(colour) == 1 or options.numbered(out) or out.lower().endswith(".png"), f"'{out}': sequences need a name such as out-%05d.ply")
+    folder = make_folder(args.print)
+    launch = Launch(*play_images(folder, "colour", colour), *"! videoconvert ! queue ! combine.colour".split())
+    launch.add(*play_images(folder, "depth", depth), *"! queue ! combine.depth".split())
     launch.add("rangecombine", "name=combine", f"depth-scale={args.depth_scale}", f"near={args.near or 0.3}", f"far={args.far or 6}")
     if args.focal_length:
         launch.add(f"focal-length={args.focal_length}")
-    return add_output(args, launch, out)
+    return add_output(args, launch, out, start)

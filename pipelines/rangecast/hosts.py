@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The hosts of the main job: camera, parent and view."""
+"""The hosts of a rig: camera, parent and view."""
 
 import re
 from pathlib import Path
@@ -8,8 +8,6 @@ from . import options, transport
 from .launch import Launch, fail_unless, has_display
 
 QUEUE = ["queue", "max-size-buffers=2"]
-# What a viewer does between decoder and renderer.
-PREPARE = ["rangealign"]
 
 
 def size_caps(size, fps=None, media="video/x-raw"):
@@ -18,16 +16,16 @@ def size_caps(size, fps=None, media="video/x-raw"):
 
 # ---- camera ----
 
-INPUT_HELP = """what the pair is:
-avatar (default): the built-in figure; avatar=MODEL: a glTF or OBJ model;
+INPUT_HELP = """what the pair is (default %(default)s):
+avatar: the built-in figure; avatar=MODEL: a glTF or OBJ model;
 range: its exact range images, without cameras and stereo matching;
-DIR: recorded pairs DIR/viewN-left.* and -right.*, videos or pictures viewN-left-%%05d.png from 0, which begin with the empty scene;
-side-by-side=SOURCE, top-bottom=SOURCE: a stereo camera that packs both pictures into one, in gst-launch-1.0 syntax;
+DIR: recorded pairs DIR/viewN-left.* and -right.*, videos or images viewN-left-%%05d.png from 0, which begin with the empty scene;
+side-by-side=SOURCE, top-bottom=SOURCE: a stereo camera that packs both images into one, in gst-launch-1.0 syntax;
 cameras: the machine-vision cameras that the rig names; cameras=LEFT,RIGHT[,THIRD]: by name, serial number or address"""
 
 
 def add_camera_options(parser):
-    parser.add_argument("--input", metavar="WHAT", default="avatar", help=INPUT_HELP)
+    options.add(parser, "--input", help=INPUT_HELP)
     options.add(parser, "--size", "--fps", "--loop", "--depth", "--encoder")
     options.add(parser, "--learn", default=20)
     parser.add_argument("--format", choices=("rgb", "bayer", "grey"), default="rgb", help="pixel format of cameras (default rgb)")
@@ -35,15 +33,13 @@ def add_camera_options(parser):
 
 def add_camera(parser):
     options.add(parser, "--view", "--rig", required=True)
-    parser.add_argument("--to", type=options.addresses, metavar="HOST:PORT", required=True, help="where the parent listens for this host")
+    options.add(parser, "--to", help="where the parent listens for this host")
     add_camera_options(parser)
     options.add(parser, "--views", "--threads")
     parser.add_argument("--trigger", choices=("free-run", "software", "hardware", "action"), default="software",
                         help="how cameras are triggered (default software)")  # fmt: skip
     parser.add_argument("--clock-server", type=options.address, metavar="HOST:PORT",
                         help="trigger by the clock that 'rangecast parent --clock-port' publishes there (default: this machine's)")  # fmt: skip
-    parser.add_argument("--action-send", choices=("yes", "no"),
-                        help="with --trigger action: whether this host sends the commands, which reach all cameras (default: that of view 0)")  # fmt: skip
     parser.add_argument("--reconnect", action="store_true", help="wait for missing or lost cameras instead of ending")
     options.add(parser, "--microphone", "--audio-to", "--clock")
     options.add_sender(parser)
@@ -56,9 +52,9 @@ def recorded_side(folder, view, side, fps):
     films = [path for path in Path(folder).glob(f"view{view}-{side}.*")]
     if films:
         return ["filesrc", f"location={films[0]}", *start]
-    pictures = list(Path(folder).glob(f"view{view}-{side}-00000.*"))
-    fail_unless(pictures, f"--input: no view{view}-{side}.* and no view{view}-{side}-00000.* in '{folder}'")
-    suffix = pictures[0].suffix
+    images = list(Path(folder).glob(f"view{view}-{side}-00000.*"))
+    fail_unless(images, f"--input: no view{view}-{side}.* and no view{view}-{side}-00000.* in '{folder}'")
+    suffix = images[0].suffix
     media = {".jpg": "image/jpeg"}.get(suffix, f"image/{suffix[1:]}")
     return ["multifilesrc", f"location={folder}/view{view}-{side}-%05d{suffix}", f"caps={media},framerate={fps}/1", *start]
 
@@ -66,9 +62,7 @@ def recorded_side(folder, view, side, fps):
 def machine_vision(args):
     names = args.input.partition("=")[2].split(",") if "=" in args.input else []
     fail_unless(not names or (2 <= len(names) <= 3 and all(names)), "--input: cameras= needs LEFT,RIGHT or LEFT,RIGHT,THIRD")
-    sends = args.action_send or ("yes" if args.view == 0 else "no")
-    words = ["stereocamsrc", "name=cameras", f"trigger={args.trigger}", f"reconnect={str(args.reconnect).lower()}",
-             f"action-send={'true' if sends == 'yes' else 'false'}"]  # fmt: skip
+    words = ["stereocamsrc", "name=cameras", f"trigger={args.trigger}", f"reconnect={str(args.reconnect).lower()}"]
     if args.clock_server:
         words.append("clock-server={}:{}".format(*args.clock_server))
     sides = ("left", "right", "third")[: len(names) or 2]
@@ -106,8 +100,9 @@ def camera_source(args):
 
 def build_camera(args):
     in_rig = options.count_views(args.rig)
+    fail_unless(in_rig > 0, f"--rig: '{args.rig}' has no views: it is no rig file")
     fail_unless(not args.views or args.views == in_rig or not args.input.startswith(("avatar", "range")),
-                f"--views is {args.views}, but the rig '{args.rig}' has {in_rig} views")  # fmt: skip
+                f"--views is {args.views}, but the rig '{args.rig}' has {in_rig}")  # fmt: skip
     fail_unless(not args.loop or args.input.startswith("avatar"), "--loop is for --input avatar")
     fail_unless(not args.depth or args.input != "range", "--depth is for cameras: --input range has no stereodepth")
     fail_unless(not args.clock_server or args.input.startswith("cameras"), "--clock-server is for --input cameras")
@@ -127,7 +122,7 @@ def build_camera(args):
     fail_unless(bool(args.microphone) == bool(args.audio_to), "--microphone and --audio-to need each other")
     if args.microphone:
         check_apart(args)
-        transport.send_speech(args, launch, args.microphone, args.audio_to, args.clock)
+        transport.send_audio(args, launch, args.microphone, args.audio_to, args.clock)
     return launch
 
 
@@ -142,12 +137,10 @@ def check_apart(args):
 
 def add_parent(parser):
     options.add(parser, "--views", required=True)
-    parser.add_argument("--listen", type=options.port, metavar="PORT", required=True, help="view i is received at UDP port PORT + i")
-    parser.add_argument("--to", type=options.addresses, metavar="HOST:PORT[,...]", required=True, help="where viewers listen, or a multicast group")
-    options.add(parser, "--jitter")
-    parser.add_argument("--latency", type=options.number(0, 10000), metavar="MS", default=60, help="how long to wait for a late view (default 60)")
+    options.add(parser, "--listen", help="view i is received at UDP port PORT + i")
+    options.add(parser, "--to", "--jitter", "--latency")
     parser.add_argument("--clock-port", type=options.port, metavar="PORT", help="publish the clock at this UDP port, for --clock-server")
-    parser.add_argument("--rig", type=options.existing_file, metavar="FILE", help="refuse cameras that are not in this rig")
+    options.add(parser, "--rig", help="refuse cameras that are not in this rig")
     options.add(parser, "--audio-port", "--audio-to")
     parser.add_argument("--cameras", type=options.addresses, metavar="HOST:PORT[,...]", default=[], help="host and --feedback-port of each camera host")
     parser.add_argument("--camera-fec", action="store_true", help="the camera hosts run with --fec-percent")
@@ -181,7 +174,7 @@ def build_parent(args):
         launch.add("!", "mux.")
     if args.audio_port:
         check_apart(args)
-        transport.pass_speech_on(args, launch)
+        transport.forward_audio(args, launch)
     return launch
 
 
@@ -189,9 +182,7 @@ def build_parent(args):
 
 
 def add_view(parser):
-    parser.add_argument("--out", metavar="DIR", help="write a video to DIR/avatar.webm")
-    options.add(parser, "--window", "--orbit", "--render", "--speaker", "--microphone")
-    options.add(parser, "--picture", dest="picture")
+    options.add(parser, "--video", "--window", "--orbit", "--render", "--speaker", "--microphone", "--output-size")
     parser.add_argument("--talk-to", type=options.addresses, metavar="HOST:PORT", help="where the other end listens for --microphone (a call)")
     options.add(parser, "--clock")
     parser.add_argument("--echo-cancel", action="store_true", help="remove from the microphone what the speaker plays")
@@ -208,25 +199,24 @@ def build_view(args):
     if args.audio_port:
         launch.add(*"! sync.sink_0 capturesync name=sync sync.src_0".split())
     launch.add("!", "queue", "max-size-buffers=4", "leaky=downstream", "!", "neighbourcodedec", "name=decoder")
-    launch.add("!", "queue", "max-size-buffers=1", "leaky=downstream", "!", *PREPARE)
+    launch.add("!", "queue", "max-size-buffers=1", "leaky=downstream", "!", "rangealign")
     launch.add("!", "striprender", "name=view", f"auto-orbit={args.orbit}", *args.render)
-    launch.add("!", size_caps(args.picture, media="video/x-raw(memory:GLMemory)"), "!", "gldownload")
-    launch.add(*"! identity name=rendered ! tee name=picture".split())
-    # Without speech, pictures are shown as soon as they are drawn, else when they are due.
+    launch.add("!", size_caps(args.output_size, media="video/x-raw(memory:GLMemory)"), "!", "gldownload")
+    launch.add(*"! identity name=rendered ! tee name=frames".split())
+    # Without audio, frames are shown as soon as they are drawn, else when they are due.
     sync = f"sync={str(bool(args.audio_port)).lower()}"
-    show = ["picture.", "!", *QUEUE, "leaky=downstream", "!"]
+    show = ["frames.", "!", *QUEUE, "leaky=downstream", "!"]
     launch.add(*show, "fakesink", "name=snapshot", sync, "async=false")
     if args.window:
         fail_unless(has_display() or args.print, "--window: no display: neither DISPLAY nor WAYLAND_DISPLAY is set")
         launch.add(*show, "videoconvert", "!", "autovideosink", sync)
-    if args.out:
-        Path(args.out).mkdir(parents=True, exist_ok=True)
-        launch.add(*"picture. ! queue max-size-buffers=8 leaky=downstream ! videoconvert ! vp8enc deadline=1 cpu-used=8".split())
-        launch.add(*"target-bitrate=2000000 keyframe-max-dist=60 ! webmmux name=film ! filesink".split(), f"location={args.out}/avatar.webm")
-        launch.option("--drop-empty", f"{args.out}/avatar.webm")
+    if args.video:
+        launch.add(*"frames. ! queue max-size-buffers=8 leaky=downstream ! videoconvert ! vp8enc deadline=1 cpu-used=8".split())
+        launch.add(*"target-bitrate=2000000 keyframe-max-dist=60 ! webmmux name=video ! filesink".split(), f"location={args.video}")
+        launch.option("--drop-empty", args.video)
     if args.audio_port:
-        transport.receive_speech(args, launch)
-        # Silence while no speech arrives, for which sinks and the muxer would wait.
+        transport.receive_audio(args, launch)
+        # Silence while no audio arrives, for which sinks and the muxer would wait.
         launch.add("!", "sync.sink_1", "sync.src_1", *transport.HEAR, "!", "mixer.")
         launch.add(*"audiotestsrc is-live=true wave=silence ! audio/x-raw,rate=48000 ! audiomixer name=mixer".split())
         launch.add("!", "tee", "name=said", "allow-not-linked=true")
@@ -235,10 +225,10 @@ def build_view(args):
             if args.echo_cancel:
                 launch.add(*"! audio/x-raw,format=S16LE,rate=48000,channels=1 ! webrtcechoprobe name=heard".split())
             launch.add("!", *args.speaker)
-        if args.out:
-            launch.add(*"said. ! queue ! audioconvert ! opusenc ! queue max-size-time=0 max-size-buffers=0 ! film.".split())
+        if args.video:
+            launch.add(*"said. ! queue ! audioconvert ! opusenc ! queue max-size-time=0 max-size-buffers=0 ! video.".split())
     if args.microphone:
         # The filter finds the delay between speaker and microphone itself.
         filters = ["!", "webrtcdsp", "probe=heard"] if args.echo_cancel and heard else []
-        transport.send_speech(args, launch, args.microphone, args.talk_to, args.clock, [*filters, "!", "volume", "name=microphone"])
+        transport.send_audio(args, launch, args.microphone, args.talk_to, args.clock, [*filters, "!", "volume", "name=microphone"])
     return launch

@@ -47,14 +47,6 @@ def has_element(name):
     return subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False).returncode == 0
 
 
-def link(*parts):
-    """Joins lists of words by '!', leaving out empty ones."""
-    words = []
-    for part in filter(None, parts):
-        words += ["!", *part] if words else part
-    return words
-
-
 class Launch:
     """A launch string with the options of rangecast-run that it needs."""
 
@@ -62,7 +54,6 @@ class Launch:
         self.words = [str(word) for word in words]
         self.options = []
         self.environment = {}
-        self.print_only = False
 
     def add(self, *words):
         self.words += [str(word) for word in words]
@@ -78,13 +69,10 @@ class Launch:
         """For a shell: rangecast-run where options need it, else gst-launch-1.0."""
         words = self.command() if self.options else ["gst-launch-1.0", "-e", *self.words]
         setting = [f"{name}={shlex.quote(value)}" for name, value in self.environment.items()]
-        return " ".join([*setting, *(word if word == "!" else shlex.quote(word) for word in words)]).replace(" ! ", " \\\n  ! ")
+        return " ".join([*setting, *("\\\n  !" if word == "!" else shlex.quote(word) for word in words)])
 
     def run(self):
         """Replaces this process, so that signals reach the pipeline."""
-        if self.print_only:
-            print(self.text())
-            return 0
         os.environ.update(self.environment)
         sys.stdout.flush()
         os.execvp("rangecast-run", self.command())

@@ -31,7 +31,7 @@ def size(text, least=16, most=4096):
     return int(match[1]), int(match[2])
 
 
-def picture(text):
+def any_size(text):
     return size(text, most=8192)
 
 
@@ -132,16 +132,19 @@ def numbered(text):
 
 
 def count_views(rig):
-    """How many views a rig file (YAML or JSON) has."""
-    return len(re.findall(r'^[\s{-]*"?id"? *:', Path(rig).read_text(errors="replace"), re.M))
+    """How many views a rig file (YAML or JSON) has; comments and quoted values do not count."""
+    text = re.sub(r'#.*|"[^"\n]*"(?!\s*:)|\'[^\'\n]*\'', "", Path(rig).read_text(errors="replace"))
+    return len(re.findall(r'(?:^[\s-]*|[{,]\s*)"?id"? *:', text, re.M))
 
 
 # ---- options of several subcommands ----
 
 SHARED = {
-    "--size": dict(type=size, metavar="WxH", default="320x240", help="size of the camera pictures (default 320x240)"),
-    "--picture": dict(type=picture, metavar="WxH", default="640x480", help="size of the rendered picture (default 640x480)"),
-    "--fps": dict(type=number(1, 1000), metavar="N", default=15, help="frame sets per second (default 15)"),
+    "--input": dict(metavar="WHAT", default="avatar"),
+    "--source": dict(type=elements, metavar="SOURCE"),
+    "--size": dict(type=size, metavar="WxH", default="320x240", help="size of the camera images (default %(default)s)"),
+    "--output-size": dict(type=any_size, metavar="WxH", default="640x480", help="size of the rendered frames (default %(default)s)"),
+    "--fps": dict(type=number(1, 1000), metavar="N", default=15, help="frame sets per second (default %(default)s)"),
     "--frames": dict(type=number(1, 1000000), metavar="N", help="end after so many frame sets"),
     "--views": dict(type=number(1, 64), metavar="N", help="number of stereo cameras around the person"),
     "--view": dict(type=number(0, 63), metavar="N", help="view-id in the rig"),
@@ -149,15 +152,22 @@ SHARED = {
     "--learn": dict(type=number(0, 100000), metavar="N", help="frames from which the background is learnt"),
     "--settle": dict(type=number(0, 100000), metavar="N", help="frames to skip before that, while exposure settles"),
     "--loop": dict(type=number(0, 100000), metavar="N", default=0,
-                   help="draw only the first N simulated pictures and repeat them, so that cameras take hardly any CPU time"),
+                   help="draw only the first N simulated images and repeat them, so that cameras take hardly any CPU time"),
     "--depth": dict(type=properties, metavar="WHAT", default=[], help="properties of stereodepth, e.g. 'near=0.4 far=1.5'"),
     "--encoder": dict(type=properties, metavar="WHAT", default=[], help="properties of neighbourcodeenc, e.g. 'profile=entropy temporal=true'"),
     "--render": dict(type=properties, metavar="WHAT", default=[], help="properties of striprender, e.g. 'mode=strips', which is faster"),
-    "--orbit": dict(type=degrees, metavar="DEG", default="0", help="orbit, degrees per second (default 0)"),
+    "--orbit": dict(type=degrees, metavar="DEG", default="0", help="orbit, degrees per second (default %(default)s)"),
     "--near": dict(type=metres, metavar="M", help="nearest depth, metres"),
     "--far": dict(type=metres, metavar="M", help="farthest depth, metres"),
     "--turn": dict(type=degrees, metavar="DEG", default="20", help="azimuth of the rendered view from the camera's (default 20)"),
+    "--base-port": dict(type=number(1024, 65000), metavar="PORT"),
+    "--listen": dict(type=port, metavar="PORT", required=True, help="UDP port of the stream"),
+    "--to": dict(type=addresses, metavar="HOST:PORT[,...]", required=True, help="where viewers listen, or a multicast group"),
     "--jitter": dict(type=number(0, 10000), metavar="MS", default=30, help="jitter buffer (default 30)"),
+    "--latency": dict(type=number(0, 10000), metavar="MS", default=60, help="how long the parent waits for a late view (default 60)"),
+    "--mtu": dict(type=number(256, 65000), metavar="BYTES", help="maximum packet size (default 1400)"),
+    "--fec-percent": dict(type=number(1, 100), metavar="N", help="redundant packets, from which receivers with --fec restore lost ones"),
+    "--rtx": dict(action="store_true"),
     "--key": dict(type=key_file, metavar="FILE", help="encrypt all streams (SRTP) with the key in FILE: 60 hexadecimal digits"),
     "--threads": dict(type=number(1, 1024), metavar="N", help="maximum number of CPU cores for stereo matching"),
     "--window": dict(action="store_true", help="show it in a window"),
@@ -165,13 +175,14 @@ SHARED = {
     "--interface": dict(type=interface, metavar="IF", help="network interface of the multicast group (default: the system's choice)"),
     "--ttl": dict(type=number(0, 255), metavar="N", default=1, help="multicast TTL: routers to pass, plus one (default 1: this network)"),
     "--speaker": dict(type=elements, metavar="SINK", default="autoaudiosink",
-                      help="where speech is heard, in gst-launch-1.0 syntax (default autoaudiosink; none: nowhere)"),
-    "--microphone": dict(type=elements, metavar="SOURCE", help="send speech: a source in gst-launch-1.0 syntax, e.g. pulsesrc"),
-    "--audio-to": dict(type=addresses, metavar="HOST:PORT[,...]", help="where speech goes; RTCP goes to PORT + 1"),
-    "--audio-port": dict(type=even_port, metavar="PORT", help="receive speech at this UDP port; RTCP at PORT + 1"),
+                      help="where audio is played, in gst-launch-1.0 syntax (default %(default)s; none: nowhere)"),
+    "--microphone": dict(type=elements, metavar="SOURCE", help="send audio: a source in gst-launch-1.0 syntax, e.g. pulsesrc"),
+    "--audio-to": dict(type=addresses, metavar="HOST:PORT[,...]", help="where audio goes; RTCP goes to PORT + 1"),
+    "--audio-port": dict(type=even_port, metavar="PORT", help="receive audio at this UDP port; RTCP at PORT + 1"),
     "--clock": dict(type=lambda text: text if text == "system" else ":".join(map(str, address(text))), metavar="CLOCK", default="system",
                     help="HOST:PORT where 'rangecast parent --clock-port' publishes the camera hosts' clock (default: this machine's)"),
-    "--out": dict(metavar="DIR", help="folder to write to"),
+    "--video": dict(type=output_file, metavar="WEBM", help="write a video, with the audio if there is any"),
+    "--out": dict(type=output_file, metavar="FILE", required=True, help="rig file to write: .yaml or .json"),
 }  # fmt: skip
 
 
@@ -184,18 +195,16 @@ def add(parser, *names, **changes):
 def add_sender(parser):
     """How coded frame sets leave a host."""
     rtp = parser.add_argument_group("RTP, to the receivers")
-    rtp.add_argument("--fec-percent", type=number(1, 100), metavar="N", help="redundant packets, from which receivers with --fec restore lost ones")
     rtp.add_argument("--feedback-port", type=port, metavar="PORT", help="UDP port for RTCP: requests for key frame sets and lost packets")
-    rtp.add_argument("--rtx", action="store_true", help="retransmit lost packets; needs --feedback-port")
-    rtp.add_argument("--mtu", type=number(256, 65000), metavar="BYTES", help="maximum packet size (default 1400)")
-    add(rtp, "--key", "--interface", "--ttl")
+    add(rtp, "--rtx", help="retransmit lost packets; needs --feedback-port")
+    add(rtp, "--fec-percent", "--mtu", "--key", "--interface", "--ttl")
 
 
 def add_receiver(parser, listen_required=True):
     """How coded frame sets come to a host."""
     rtp = parser.add_argument_group("RTP, from the sender")
-    rtp.add_argument("--listen", type=port, metavar="PORT", required=listen_required, help="UDP port of the stream")
+    add(rtp, "--listen", required=listen_required)
     rtp.add_argument("--fec", action="store_true", help="restore lost packets; the sender needs --fec-percent")
     rtp.add_argument("--feedback-to", type=address, metavar="HOST:PORT", help="send RTCP there: the sender's host and its --feedback-port")
-    rtp.add_argument("--rtx", action="store_true", help="request lost packets again; needs --feedback-to, and --rtx of the sender")
+    add(rtp, "--rtx", help="request lost packets again; needs --feedback-to, and --rtx of the sender")
     add(rtp, "--jitter", "--key", "--multicast", "--interface", "--audio-port")

@@ -7,33 +7,32 @@ import subprocess
 import sys
 import time
 
-PATIENCE_S = 10  # for a process to end, and a video to be written to its end
-
-
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+PATIENCE_S = 1.9  # for a process to end, and a video to be written to its end: rangecast-run takes 1.8 at most
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 class Processes:
     """Ends all of them when it is left, or by a signal."""
 
-    def __init__(self):
-        self.running = {}
-        self.starting, self.pending = False, 0  # a signal waits until the process that starts is known
+    def __init__(self, print_only=False):
+        self.running, self.print_only = {}, print_only
+        self.held, self.pending = False, 0  # a signal waits until the process that starts is known, or all have ended
 
     def handle(self, number, _):
-        if self.starting:
+        if self.held:
             self.pending = number
         else:
+            self.held = True  # a second one would interrupt __exit__
             sys.exit(128 + number)
 
     def __enter__(self):
         for number in SIGNALS:
-            signal.signal(number, self.handle)
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # nohup
+                signal.signal(number, self.handle)
         return self
 
     def __exit__(self, *_):
-        for number in SIGNALS:
-            signal.signal(number, signal.SIG_IGN)
+        self.held = True
         for how in (signal.SIGTERM, signal.SIGKILL):
             end = time.monotonic() + PATIENCE_S
             for process in self.running.values():
@@ -43,14 +42,20 @@ class Processes:
                 time.sleep(0.05)
 
     def start(self, name, launch, log=None, **options):
-        """In a group of its own: Ctrl-C reaches it once, from here."""
+        if self.print_only:
+            print(launch.text())
+            return None
         if log:
             options |= {"stdout": open(log, "w"), "stderr": subprocess.STDOUT}  # noqa: SIM115
-        self.starting = True
-        self.running[name] = launch.spawn(stdin=subprocess.DEVNULL, start_new_session=True, **options)
-        self.starting = False
+        return self.spawn(name, launch.spawn, **options)
+
+    def spawn(self, name, popen, *command, **options):
+        """In a group of its own: Ctrl-C reaches it once, from here."""
+        self.held = True
+        self.running[name] = popen(*command, stdin=subprocess.DEVNULL, start_new_session=True, **options)
+        self.held = False
         if self.pending:
-            sys.exit(128 + self.pending)
+            self.handle(self.pending, None)
         return self.running[name]
 
     def wait_for_end(self):

@@ -4,24 +4,23 @@
 import os
 import re
 import secrets
-import signal
 import socket
 import ssl
 import subprocess
-import sys
 import tempfile
 
 from . import options, transport
 from .launch import Fail, Launch, fail_unless, has_element
+from .processes import Processes
 
 
 def add_serve(parser):
     parser.add_argument("--file", type=options.existing_file, metavar="RECORDING", help="serve a recording")
     parser.add_argument("--repeat", action="store_true", help="with --file: again and again")
-    parser.add_argument("--source", type=options.elements, metavar="LAUNCH", help="serve what ends with coded frame sets, e.g. '... ! neighbourcodeenc'")
-    parser.add_argument("--address", default="127.0.0.1", metavar="IP", help="address to listen at (default 127.0.0.1: this machine only; 0.0.0.0: all)")
+    options.add(parser, "--source", help="serve what ends with coded frame sets, e.g. '... ! neighbourcodeenc'")
+    parser.add_argument("--address", default="127.0.0.1", metavar="IP", help="address to listen at (default %(default)s: only this machine; 0.0.0.0: all)")
     parser.add_argument("--port", type=options.number(0, 65535), default=8080, metavar="PORT", help="TCP port (default 8080; 0: any)")
-    parser.add_argument("--token", metavar="TEXT", help="what a browser must know; the link has it (default: random, unless only this machine is served)")
+    parser.add_argument("--token", metavar="TEXT", help="password, part of the link (default: random; none if only this machine is served)")
     parser.add_argument("--token-file", type=options.existing_file, metavar="FILE", help="lines 'name token', one for each user")
     parser.add_argument("--anonymous", action="store_true", help="no token: whoever can connect sees the stream")
     parser.add_argument("--certificate", type=options.existing_file, metavar="PEM", help="serve https")
@@ -40,22 +39,18 @@ def is_local(address):
 
 
 def build_serve(args):
-    fail_unless(has_element("rangewebsink"), "no element rangewebsink: run setup.sh")
-    fail_unless(sum(bool(one) for one in (args.listen, args.file, args.source)) <= 1, "--listen, --file and --source exclude each other")
-    fail_unless(args.listen or not (args.audio_port or args.multicast or args.key or args.feedback_to), "options of RTP need --listen")
-    fail_unless(sum(bool(one) for one in (args.token, args.token_file, args.anonymous)) <= 1, "--token, --token-file and --anonymous exclude each other")
-    fail_unless(not args.token or re.fullmatch(r"[A-Za-z0-9._~-]+", args.token), "--token: use letters, digits and . _ ~ -, which a link may have")
+    fail_unless(sum(map(bool, (args.listen, args.file, args.source))) <= 1, "--listen, --file and --source exclude each other")
+    transport.check_listen(args)
+    fail_unless(args.file or not args.repeat, "--repeat needs --file")
+    fail_unless(sum(map(bool, (args.token, args.token_file, args.anonymous))) <= 1, "--token, --token-file and --anonymous exclude each other")
+    fail_unless(not args.token or re.fullmatch(r"[A-Za-z0-9._~-]+", args.token), "--token: use letters, digits, . _ ~ and -")
     fail_unless(not args.private_key or args.certificate, "--private-key needs --certificate")
     if args.certificate:
         try:  # GLib does not compare them, and browsers would only say that they cannot connect
             ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(args.certificate, args.private_key)
-        except ssl.SSLError as error:
-            raise Fail(f"--certificate, --private-key: {error.reason or error}") from None
-    if not (args.token or args.token_file or args.anonymous or is_local(args.address)):
-        args.token = secrets.token_urlsafe(16)
-        descriptor, args.private_tokens = tempfile.mkstemp(prefix="rangecast-")  # others see command lines, but not this file
-        with open(descriptor, "w") as file:
-            file.write(f"viewer {args.token}\n")
+        except OSError as error:
+            reason = getattr(error, "reason", error.strerror)  # an SSLError has none where a file is no PEM
+            raise Fail(f"--certificate, --private-key: {reason or 'no certificate with its key in PEM'}") from None
     launch = Launch()
     if args.listen:
         transport.receive_stream(args, launch)
@@ -68,6 +63,13 @@ def build_serve(args):
     else:
         launch.add(*"avatartestsrc is-live=true views=4 range-person-only=true ! video/x-range,width=320,height=240,framerate=15/1".split())
         launch.add(*"! neighbourcodeenc profile=entropy temporal=true".split())
+    fail_unless(args.print or has_element("rangewebsink"), "no element rangewebsink: run setup.sh")
+    if not (args.token or args.token_file or args.anonymous or is_local(args.address)):
+        args.token = secrets.token_urlsafe(16)
+        if not args.print:  # the printed string has the token itself
+            descriptor, args.private_tokens = tempfile.mkstemp(prefix="rangecast-")  # others see command lines, but not this file
+            with open(descriptor, "w") as file:
+                file.write(f"viewer {args.token}\n")
     # What comes from the network is sent immediately; a recording and the scene in their own time.
     launch.add("!", "rangewebsink", "name=web", f"sync={str(not args.listen).lower()}", f"port={args.port}", f"address={args.address}")
     if args.anonymous:
@@ -85,7 +87,7 @@ def build_serve(args):
         launch.environment["RANGECAST_HOST"] = os.environ.get("RANGECAST_HOST", "web-server")
         launch.add(f"stats-address=udp://{'127.0.0.1' if is_local(args.address) else '0.0.0.0'}:{args.stats}")
     if args.audio_port:
-        transport.receive_speech(args, launch)
+        transport.receive_audio(args, launch)
         launch.add("!", "web.audio")  # the page plays it when it shows what was captured at the same time
         launch.option("--clock", args.clock)
     return launch
@@ -121,8 +123,5 @@ def follow(args, child, rig=False):
 
 
 def run_serve(args, launch):
-    """The child has this program's signals."""
-    child = launch.spawn(stdout=subprocess.PIPE, text=True)
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda number, _: child.send_signal(number))
-    return follow(args, child, args.stats is not None)
+    with Processes() as processes:
+        return follow(args, processes.start("server", launch, stdout=subprocess.PIPE, text=True), args.stats is not None)

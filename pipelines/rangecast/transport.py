@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The parts of launch strings between coded frame sets or speech and UDP. docs/guide/streaming.md and speech.md explain them."""
+"""The parts of launch strings between coded frame sets or audio and UDP. docs/guide/streaming.md and speech.md explain them."""
 
 from .launch import fail_unless
 
@@ -8,8 +8,8 @@ FEEDBACK = "rtcp-fb-nack-pli=(boolean)true,rtcp-fb-nack=(boolean)true"
 # Transport-wide feedback, from which neighbourcodeenc adaptive-bitrate=true detects congestion.
 TWCC = "extmap-1=(string)http://www.ietf.org/id/draft-holmer-rmcat-transport-wide-cc-extensions-01"
 RTX_MAP = "application/x-rtp-pt-map,96=(uint)97,122=(uint)123"
-# Every packet of speech says when it was captured (RFC 6051), on the clock of the camera hosts; so does RTCP.
-SPEECH = (
+# Each audio packet says when it was captured (RFC 6051), on the clock of the camera hosts; so does RTCP.
+AUDIO = (
     "media=audio,clock-rate=48000,encoding-name=OPUS,payload=111,extmap-2=(string)urn:ietf:params:rtp-hdrext:ntp-64"
 )
 # opusdec hides lost packets; its default tolerance would let sound be 40 ms away from its time.
@@ -27,6 +27,12 @@ def is_multicast(addresses):
 def check_sender(args):
     fail_unless(not args.rtx or args.feedback_port, "--rtx needs --feedback-port")
     fail_unless(not args.interface or is_multicast(args.to + (args.audio_to or [])), "--interface is for a multicast group in --to or --audio-to")
+
+
+def check_listen(args):
+    """Where --listen may be left out."""
+    rtp = (args.audio_port, args.multicast, args.interface, args.key, args.feedback_to, args.fec, args.rtx)
+    fail_unless(args.listen or not any(rtp), "options of RTP need --listen")
 
 
 def check_receiver(args):
@@ -111,7 +117,7 @@ def udp_group(group, interface):
     return [f"address={group}", "reuse=true", *([f"multicast-iface={interface}"] if interface else [])]  # several viewers on a host
 
 
-def send_speech(args, launch, source, to, clock, filters=()):
+def send_audio(args, launch, source, to, clock, filters=()):
     """Adds the elements from a microphone to UDP. The pipeline's clock has to be that of the camera hosts."""
     launch.option("--clock", clock)
     launch.add(*source)
@@ -120,31 +126,31 @@ def send_speech(args, launch, source, to, clock, filters=()):
     launch.add(*"! queue max-size-time=200000000 max-size-buffers=0 leaky=downstream ! audioconvert ! audioresample".split())
     launch.add("!", "audio/x-raw,format=S16LE,rate=48000,channels=1", *filters)
     launch.add(*"! opusenc audio-type=voice tolerance=5000000 bitrate=32000 ! rtpopuspay pt=111".split())
-    launch.add("!", f"application/x-rtp,{SPEECH}", "!", "speech.send_rtp_sink")
-    launch.add(*"rtpsession name=speech ntp-time-source=clock-time rtcp-sync-send-time=false speech.send_rtp_src".split())
+    launch.add("!", f"application/x-rtp,{AUDIO}", "!", "audio.send_rtp_sink")
+    launch.add(*"rtpsession name=audio ntp-time-source=clock-time rtcp-sync-send-time=false audio.send_rtp_src".split())
     if args.key:
-        launch.add(*"! encrypt-speech.rtp_sink_0 srtpenc name=encrypt-speech encrypt-speech.rtp_src_0".split())
+        launch.add(*"! encrypt-audio.rtp_sink_0 srtpenc name=encrypt-audio encrypt-audio.rtp_src_0".split())
         launch.option("--srtp-key", args.key)
-    launch.add("!", *sink(to, args), "speech.send_rtcp_src")
+    launch.add("!", *sink(to, args), "audio.send_rtcp_src")
     if args.key:
-        launch.add("!", "encrypt-speech.rtcp_sink_0", "encrypt-speech.rtcp_src_0")
+        launch.add("!", "encrypt-audio.rtcp_sink_0", "encrypt-audio.rtcp_src_0")
     # rtpsession ends its RTCP only if sending BYE takes longer than its handling of EOS (GStreamer 1.22).
     launch.add("!", "identity", "sleep-time=5000", "!", *sink(to, args, 1))
 
 
-def receive_speech(args, launch):
+def receive_audio(args, launch):
     """Adds the elements that receive Opus packets from args.audio_port."""
     kind = "application/x-srtp" if args.key else "application/x-rtp"
-    launch.add("udpsrc", f"port={args.audio_port}", f"caps={kind},{SPEECH}", *udp_group(args.multicast, args.interface))
+    launch.add("udpsrc", f"port={args.audio_port}", f"caps={kind},{AUDIO}", *udp_group(args.multicast, args.interface))
     if args.key:
-        launch.add(*"! decrypt-speech.rtp_sink srtpdec name=decrypt-speech decrypt-speech.rtp_src".split())
+        launch.add(*"! decrypt-audio.rtp_sink srtpdec name=decrypt-audio decrypt-audio.rtp_src".split())
         launch.option("--srtp-key", args.key)
     launch.add("!", "rtpneighbourcodeguard", "!", "rtpjitterbuffer", f"latency={args.jitter}", "max-dropout-time=1000",
                "max-misorder-time=500", "do-lost=true", "!", "rtpopusdepay")  # fmt: skip
 
 
-def pass_speech_on(args, launch):
+def forward_audio(args, launch):
     """Adds the elements that send the packets of both ports on as they are."""
-    launch.add("udpsrc", f"port={args.audio_port}", "reuse=false", f"caps=application/x-rtp,{SPEECH}", "!", "rtpneighbourcodeguard")
+    launch.add("udpsrc", f"port={args.audio_port}", "reuse=false", f"caps=application/x-rtp,{AUDIO}", "!", "rtpneighbourcodeguard")
     launch.add("!", *sink(args.audio_to, args), "udpsrc", f"port={args.audio_port + 1}", "reuse=false", "caps=application/x-rtcp")
     launch.add("!", *sink(args.audio_to, args, 1))

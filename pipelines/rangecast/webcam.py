@@ -12,24 +12,26 @@ from .launch import Launch, fail_unless, has_display
 
 
 def add_webcam(parser):
-    parser.add_argument("--device", default="/dev/video0", metavar="FILE", help="the camera (default /dev/video0): packs both pictures into one")
-    parser.add_argument("--input", type=options.elements, metavar="SOURCE", help="another source of packed pictures, in gst-launch-1.0 syntax")
+    source = parser.add_mutually_exclusive_group()
+    source.add_argument("--device", default="/dev/video0", metavar="FILE", help="the camera (default /dev/video0): packs both images into one")
+    options.add(source, "--source", help="another source of packed images, in gst-launch-1.0 syntax")
     parser.add_argument("--packing", choices=("side-by-side", "top-bottom"), default="side-by-side", help="default side-by-side")
-    parser.add_argument("--size", type=options.size, metavar="WxH", default="1280x480", help="size of the packed pictures (default 1280x480)")
+    options.add(parser, "--size", default="1280x480", help="size of the packed images (default 1280x480)")
     options.add(parser, "--fps", default=30)
-    parser.add_argument("--rig", default="webcam.yaml", metavar="FILE",
-                        help="the camera's calibration (default webcam.yaml); if there is none, 'rangecast calibrate' makes it first")  # fmt: skip
+    options.add(parser, "--rig", type=str, default="webcam.yaml",
+                help="the camera's calibration (default webcam.yaml); if there is none, 'rangecast calibrate' makes it first")  # fmt: skip
     parser.add_argument("--calibrate", type=options.words, metavar="OPTIONS", default=[], help="options of that, e.g. '--square 0.03'")
     options.add(parser, "--learn", default=0)
     options.add(parser, "--settle", "--depth")
     parser.add_argument("--png", type=options.output_file, metavar="FILE",
-                        help="write one picture instead of opening a window: the first one, or with --learn the 30th with somebody in it")  # fmt: skip
+                        help="write one frame instead of opening a window: the first one, or with --learn the 30th with somebody in it")  # fmt: skip
     parser.set_defaults(build=build_webcam)
 
 
 def build_webcam(args):
     fail_unless(args.png or args.print or has_display(), "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --png FILE")
-    source = args.input
+    fail_unless(args.learn or args.settle is None, "--settle needs --learn")
+    source = args.source
     if not source:
         fail_unless(args.print or os.path.exists(args.device),
                     f"--device: no camera '{args.device}'; gst-device-monitor-1.0 Source/Video/Stereo lists those with two lenses")  # fmt: skip
@@ -39,17 +41,17 @@ def build_webcam(args):
         calibrate(args, source)
     launch = Launch(*source, *"! queue max-size-buffers=2 ! depth.left stereodepth name=depth".split())
     launch.add(f"packing={args.packing}", f"rig={args.rig}", *args.depth)
-    settle = args.settle if args.settle is not None else 0 if args.input else 10 * args.fps
+    settle = args.settle if args.settle is not None else 0 if args.source else 10 * args.fps
     if args.learn:
         launch.add("!", "roiextract", f"settle-frames={settle}", f"background-frames={args.learn}")
         if settle and not args.print:
-            print(f"leave the picture now; learning the background begins in about {settle // args.fps} s", flush=True)
-    picture = "! rangerender ! video/x-raw,width=640,height=480"
+            print(f"leave the field of view now; learning the background begins in about {settle // args.fps} s", flush=True)
+    render = "! rangerender ! video/x-raw,width=640,height=480"
     if not args.png:
-        launch.add(*f"{picture} ! queue ! videoconvert ! autovideosink".split())
+        launch.add(*f"{render} ! queue ! videoconvert ! autovideosink".split())
         return launch
-    # rangecast-run counts from the first frame set with points at the element named decoder, and writes the last picture.
-    launch.add(*f"! identity name=decoder {picture} ! identity name=rendered ! videoconvert ! fakesink name=snapshot".split())
+    # rangecast-run counts from the first frame set with points at the element named decoder, and writes the last frame.
+    launch.add(*f"! identity name=decoder {render} ! identity name=rendered ! videoconvert ! fakesink name=snapshot".split())
     patience = 60 + 2 * (args.learn + settle) // args.fps if args.learn else 30
     launch.option("--frames", 30 if args.learn else 1, "--timeout", patience, "--snapshot", args.png)
     return launch
@@ -59,7 +61,7 @@ def calibrate(args, source):
     options.output_file(args.rig)
     command = [sys.executable, sys.argv[0], "calibrate", f"--{args.packing}", shlex.join(source), "--out", args.rig, "--far", "1.2"]
     command += ["--auto-finish", *([] if args.png else ["--window"]), *args.calibrate]
-    print(f"no '{args.rig}' yet: calibrating; show the camera a chessboard in all parts of the picture (Ctrl-C finishes)", flush=True)
+    print(f"no '{args.rig}' yet: calibrating; show the camera a chessboard in all parts of the image (Ctrl-C finishes)", flush=True)
     signal.signal(signal.SIGINT, lambda *_: None)  # Ctrl-C is for the calibration
     child = subprocess.Popen(command)
     for number in (signal.SIGTERM, signal.SIGHUP):

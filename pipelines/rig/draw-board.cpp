@@ -42,22 +42,23 @@ set (BoardSpec &board, const std::string &name, const std::string &value)
 {
   if (name == "board") {
     board.kind = value == "charuco" ? BoardKind::kCharuco : BoardKind::kChessboard;
-    return value == "charuco" || value == "chessboard" ? nullptr : "expected chessboard or charuco";
+    return value == "charuco" || value == "chessboard" ? nullptr
+                                                       : "is neither chessboard nor charuco";
   }
   if (name == "columns" || name == "rows")
     return read_number (value, name == "rows" ? board.rows : board.columns)
                ? nullptr
-               : "expected a whole number of inner corners";
+               : "is not a whole number of inner corners";
   if (name == "square-size" || name == "marker-size")
     return read_number (value, name == "square-size" ? board.square_m : board.marker_m)
                ? nullptr
-               : "expected metres, as a number without a unit";
+               : "is not a number of metres";
   if (name == "dictionary") {
     const auto &dictionaries = rangecast::board_dictionaries ();
     const auto dictionary = std::ranges::find (dictionaries, value);
     board.dictionary = int (dictionary - dictionaries.begin ());
     return dictionary != dictionaries.end () ? nullptr
-                                             : "expected a dictionary of rigcalibrate, e.g. 4x4-50";
+                                             : "is no dictionary of rigcalibrate, such as 4x4-50";
   }
   return "unknown property; see --help";
 }
@@ -70,10 +71,10 @@ read_properties (const std::vector<std::string> &words, BoardSpec &board)
   for (const std::string &word : words) {
     const std::size_t equals = word.find ('=');
     const std::string name = word.substr (0, equals);
-    const char *wrong = "expected NAME=VALUE; see --help";
+    const char *wrong = "is not NAME=VALUE; see --help";
     if (equals != std::string::npos)
       wrong = names.insert (name).second ? set (board, name, word.substr (equals + 1))
-                                         : "is given twice; expected once";
+                                         : "is given twice";
     if (wrong) {
       std::fprintf (stderr, "draw-board: '%s': %s\n", word.c_str (), wrong);
       return false;
@@ -135,8 +136,7 @@ main (int argc, char **argv)
     return 2;
   }
   if (!words[0].ends_with (".svg") && !words[0].ends_with (".SVG")) {
-    std::fprintf (
-        stderr, "draw-board: '%s': expected a file name that ends in .svg\n", words[0].c_str ());
+    std::fprintf (stderr, "draw-board: '%s' does not end in .svg\n", words[0].c_str ());
     return 2;
   }
   BoardSpec board;

@@ -1,18 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Prints the geometry of a rig file: poses, fields of view, stereo baselines and depth resolution;
- * and draws it (striprender's show-cameras). */
-#include <gst/app/gstappsrc.h>
-#include <gst/gst.h>
-
-#include <clocale>
+/* Prints the geometry of a rig file: poses, fields of view, stereo baselines and depth resolution.
+ * usage: rig-check RIG */
 #include <cmath>
 #include <cstdio>
-#include <gstrange/gstrange.h>
-#include <gstrange/gstrangeinfo.hpp>
+#include <rangecast/geometry/rectified_pose.hpp>
 #include <rangecast/rigfile/rig_file.hpp>
 #include <rangecast/stereo/rectification.hpp>
-#include <rangecast/surface/camera_lines.hpp>
 #include <rangecast/surface/orbit.hpp>
+#include <rangecast/surface/view_tint.hpp>
 #include <string>
 #include <vector>
 
@@ -24,14 +19,7 @@ using rangecast::Status;
 using rangecast::Vec3;
 using rangecast::View;
 
-struct Options {
-  gchar *png = nullptr;
-  gint width = 960, height = 720;
-  gdouble azimuth_deg = 30, elevation_deg = 35, distance_m = 0;
-  gchar **paths = nullptr;
-};
-
-/* One camera of the rig, for drawing. */
+/* One camera of the rig. */
 struct Camera {
   std::string name;
   View view; /* plain, with an id of its own */
@@ -46,29 +34,16 @@ name_of (const View &view)
   return number + (view.name.empty () || view.name == number ? "" : " " + view.name);
 }
 
-View
-plain_view (View view, int id)
-{
-  view.id = id;
-  view.distortion.clear ();
-  view.right.reset ();
-  view.third.reset ();
-  return view;
-}
-
-/* Partners are drawn small: the frustum of their view shows what the pair sees. */
 void
 add_partner (const View &view, const std::optional<PartnerCamera> &partner, const char *which,
     std::vector<Camera> &cameras)
 {
   if (!partner || cameras.size () >= rangecast::kMaxViews)
     return;
-  View drawn = plain_view (view, int (cameras.size ()));
-  drawn.intrinsics = partner->intrinsics;
-  drawn.world_from_view = view.world_from_view * partner->partner_from_left.inverse ();
-  drawn.far_m = 0.25 * view.near_m;
-  drawn.near_m = 0.2 * view.near_m;
-  cameras.push_back ({name_of (view) + " " + which, drawn});
+  View camera = view;
+  camera.intrinsics = partner->intrinsics;
+  camera.world_from_view = view.world_from_view * partner->partner_from_left.inverse ();
+  cameras.push_back ({name_of (view) + " " + which, camera});
 }
 
 std::vector<Camera>
@@ -76,8 +51,7 @@ cameras_of (const Rig &rig)
 {
   std::vector<Camera> cameras;
   for (const View &view : rig.views)
-    cameras.push_back (
-        {name_of (view) + (view.right ? " left" : ""), plain_view (view, int (cameras.size ()))});
+    cameras.push_back ({name_of (view) + (view.right ? " left" : ""), view});
   for (const View &view : rig.views) {
     add_partner (view, view.right, "right", cameras);
     add_partner (view, view.third, "third", cameras);
@@ -118,8 +92,8 @@ print_cameras (const std::vector<Camera> &cameras, Vec3 target)
     };
     const std::string size = std::to_string (v.width) + "x" + std::to_string (v.height);
     std::printf ("%-24s %-7.*s %-10s %5.1f x %-4.1f deg %7.3f %7.3f %7.3f  %.0f mm, %.2f m\n",
-        cameras[i].name.c_str (), int (rangecast::camera_colour (i).name.size ()),
-        rangecast::camera_colour (i).name.data (), size.c_str (), field (v.width, v.intrinsics.fx),
+        cameras[i].name.c_str (), int (rangecast::view_colour (i).name.size ()),
+        rangecast::view_colour (i).name.data (), size.c_str (), field (v.width, v.intrinsics.fx),
         field (v.height, v.intrinsics.fy), at.x, at.y, at.z, norm (off) * 1000, norm (target - at));
   }
 }
@@ -174,7 +148,8 @@ print_views (const Rig &rig)
   }
 }
 
-/* Reports views that stereodepth would refuse. @return their number */
+/* Reports views that stereodepth would refuse, and pairs that stand badly. @return the number of
+ * the former */
 int
 print_problems (const Rig &rig)
 {
@@ -186,246 +161,33 @@ print_problems (const Rig &rig)
     if (const Status status = rectifier.set (view); !status.ok ()) {
       std::fprintf (stderr, "rig-check: %s\n", status.message ().c_str ());
       problems++;
+    } else if (const std::string text = rangecast::describe_misalignment (view); !text.empty ()) {
+      std::fprintf (stderr, "rig-check: warning: %s\n", text.c_str ());
     }
   }
   return problems;
 }
 
-/* ---- the picture ---- */
-
-const char *const kPicture = "appsrc name=in format=time ! striprender name=view "
-                             "show-cameras=true ! capsfilter name=size ! gldownload "
-                             "! videoconvert ! pngenc ! filesink name=out";
-
-/* Where the picture is taken from. */
-struct Outlook {
-  Vec3 pan; /* of striprender */
-  double distance_m;
-};
-
-constexpr double kFieldDeg = 45;
-
-/* Elements allocate memory for all pixels of a rig, and with partners there may be more than a rig
- * may have. The drawing does not depend on their number. */
-View
-with_few_pixels (View view)
-{
-  constexpr int kMax = 1024;
-  const int width = std::min (view.width, kMax), height = std::min (view.height, kMax);
-  view.intrinsics =
-      view.intrinsics.scaled (double (width) / view.width, double (height) / view.height);
-  view.width = width;
-  view.height = height;
-  return view;
-}
-
-/* The corners and apexes of all frustums. */
-std::vector<Vec3>
-corners_of (const Rig &drawn)
-{
-  std::vector<Vec3> points;
-  for (const View &view : drawn.views)
-    for (double u : {0, view.width})
-      for (double v : {0, view.height})
-        for (double z : {0.0, view.near_m, view.far_m})
-          points.push_back (view.world_from_view * view.intrinsics.unproject (u, v, z));
-  return points;
-}
-
-/* Bounding box of the points in the picture, -1 to 1 from left to right and from bottom to top. */
-struct Frame {
-  double left = 1e9, right = -1e9, bottom = 1e9, top = -1e9;
-  bool behind = false; /* some points are behind the camera */
-
-  [[nodiscard]] double half_size () const { return std::max (right - left, top - bottom) / 2; }
-};
-
-Frame
-frame_of (const std::vector<Vec3> &points, const rangecast::Mat4 &m)
-{
-  Frame frame;
-  for (Vec3 p : points) {
-    const auto row = [&] (int r) {
-      return m[r] * p.x + m[4 + r] * p.y + m[8 + r] * p.z + m[12 + r];
-    };
-    const double w = row (3);
-    if (w <= 1e-6) {
-      frame.behind = true;
-      continue;
-    }
-    frame.left = std::min (frame.left, row (0) / w);
-    frame.right = std::max (frame.right, row (0) / w);
-    frame.bottom = std::min (frame.bottom, row (1) / w);
-    frame.top = std::max (frame.top, row (1) / w);
-  }
-  return frame;
-}
-
-/* All frustums fill the picture. striprender orbits about the point where the axes meet, which for
- * a single pair is arbitrary, so its target is moved. Perspective makes this a search:
- * each step centres what is seen and corrects the distance. */
-Outlook
-look_at_all (const Rig &drawn, const Options &options)
-{
-  constexpr double kFilled = 0.94;
-  const std::vector<Vec3> points = corners_of (drawn);
-  const rangecast::SceneFrame scene = rangecast::scene_frame (drawn);
-  rangecast::Orbit orbit = {options.azimuth_deg, options.elevation_deg, 1, kFieldDeg, {}};
-  for (Vec3 p : points)
-    orbit.distance_m = std::max (orbit.distance_m, 3 * norm (p - scene.target));
-  for (int step = 0; step < 50; step++) {
-    const auto seen =
-        rangecast::orbit_matrices (scene, orbit, double (options.width) / options.height, false);
-    const Frame frame = frame_of (points, seen.clip_from_world);
-    if (frame.behind) {
-      orbit.distance_m *= 1.5;
-      continue;
-    }
-    orbit.pan = orbit.pan + (frame.left + frame.right) / 4 * seen.pan_right -
-                (frame.bottom + frame.top) / 4 * seen.pan_down;
-    orbit.distance_m *= std::clamp (frame.half_size () / kFilled, 0.7, 1.4);
-  }
-  return {orbit.pan, orbit.distance_m};
-}
-
-void
-set_up (GstElement *pipeline, const Options &options, const Rig &drawn)
-{
-  GstElement *view = gst_bin_get_by_name (GST_BIN (pipeline), "view");
-  GstElement *size = gst_bin_get_by_name (GST_BIN (pipeline), "size");
-  GstElement *out = gst_bin_get_by_name (GST_BIN (pipeline), "out");
-  GstElement *in = gst_bin_get_by_name (GST_BIN (pipeline), "in");
-  GstCaps *picture = gst_caps_from_string ("video/x-raw(memory:GLMemory)");
-  gst_caps_set_simple (
-      picture, "width", G_TYPE_INT, options.width, "height", G_TYPE_INT, options.height, nullptr);
-  const Outlook outlook = look_at_all (drawn, options);
-  g_object_set (view, "azimuth", options.azimuth_deg, "elevation", options.elevation_deg,
-      "distance", options.distance_m > 0 ? options.distance_m : outlook.distance_m, "field-of-view",
-      kFieldDeg, "pan-x", outlook.pan.x, "pan-y", outlook.pan.y, "pan-z", outlook.pan.z, nullptr);
-  g_object_set (size, "caps", picture, nullptr);
-  g_object_set (out, "location", options.png, nullptr);
-  GstCaps *caps = gstrange::make_range_caps (gstrange::make_info (drawn, 1, 1));
-  g_object_set (in, "caps", caps, nullptr);
-  gst_caps_unref (caps);
-  gst_caps_unref (picture);
-
-  /* A frame set without points. */
-  GstBuffer *empty = gst_range_buffer_new (1, 1, 1);
-  gst_range_buffer_add_view (empty, guint (drawn.views[0].id), 0, 0, 0, 0, 0);
-  GST_BUFFER_PTS (empty) = 0;
-  gst_app_src_push_buffer (GST_APP_SRC (in), empty);
-  gst_app_src_end_of_stream (GST_APP_SRC (in));
-  for (GstElement *element : {view, size, out, in})
-    gst_object_unref (element);
-}
-
+/* @return whether stereodepth would take all of it */
 bool
-draw (const Options &options, const Rig &drawn)
-{
-  GError *error = nullptr;
-  GstElement *pipeline = gst_parse_launch (kPicture, &error);
-  if (!pipeline || error) {
-    g_printerr ("rig-check: %s\n", error->message);
-    g_clear_error (&error);
-    gst_clear_object (&pipeline);
-    return false;
-  }
-  set_up (pipeline, options, drawn);
-  GstBus *bus = gst_element_get_bus (pipeline);
-  gst_element_set_state (pipeline, GST_STATE_PLAYING);
-  GstMessage *message = gst_bus_timed_pop_filtered (
-      bus, 60 * GST_SECOND, GstMessageType (GST_MESSAGE_ERROR | GST_MESSAGE_EOS));
-  const bool drawn_well = message && GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS;
-  if (message && !drawn_well) {
-    gst_message_parse_error (message, &error, nullptr);
-    g_printerr ("rig-check: %s\n", error->message);
-    g_clear_error (&error);
-  } else if (!message) {
-    g_printerr ("rig-check: %s: drawing timed out after a minute\n", options.png);
-  }
-  gst_clear_message (&message);
-  gst_element_set_state (pipeline, GST_STATE_NULL);
-  gst_object_unref (bus);
-  gst_object_unref (pipeline);
-  return drawn_well;
-}
-
-bool
-check_rig (const Options &options)
+check_rig (const char *path)
 {
   Rig rig;
-  const Status status = rangecast::load_rig (options.paths[0], rig);
+  const Status status = rangecast::load_rig (path, rig);
   if (!status.ok () || rig.views.empty ()) {
-    g_printerr ("rig-check: %s\n",
-        status.ok () ? (std::string (options.paths[0]) + ": has no views").c_str ()
+    std::fprintf (stderr, "rig-check: %s\n",
+        status.ok () ? (std::string (path) + ": has no views").c_str ()
                      : status.message ().c_str ());
     return false;
   }
-  const std::vector<Camera> cameras = cameras_of (rig);
-  const rangecast::SceneFrame scene = rangecast::scene_frame (rig);
-  Rig drawn;
-  for (const Camera &camera : cameras)
-    drawn.views.push_back (with_few_pixels (camera.view));
+  const Vec3 centre = rangecast::scene_frame (rig).target;
   std::printf ("views: %zu; centre (where the optical axes meet): %.3f %.3f %.3f m\n\n",
-      rig.views.size (), scene.target.x, scene.target.y, scene.target.z);
-  print_cameras (cameras, scene.target);
+      rig.views.size (), centre.x, centre.y, centre.z);
+  print_cameras (cameras_of (rig), centre);
   print_pairs (rig);
   print_views (rig);
   std::fflush (stdout);
-  bool good = print_problems (rig) == 0;
-  if (options.png)
-    good = draw (options, drawn) && good;
-  return good;
-}
-
-/* The error in the options, or nullptr. Ranges of angles and distances are striprender's. */
-const char *
-complaint_of (const Options &o)
-{
-  const auto is_within = [] (double x, double min, double max) {
-    return x >= min && x <= max; /* NaN is not */
-  };
-  if (!o.paths || o.paths[1])
-    return "expected one rig file";
-  if (!is_within (o.width, 1, 8192) || !is_within (o.height, 1, 8192))
-    return "--width and --height: expected 1 to 8192 pixels";
-  if (!is_within (o.azimuth_deg, -360, 360) || !is_within (o.elevation_deg, -89, 89))
-    return "--azimuth and --elevation: expected -360 to 360 and -89 to 89 degrees";
-  if (o.png && !g_str_has_suffix (o.png, ".png") && !g_str_has_suffix (o.png, ".PNG"))
-    return "--png: expected a file name that ends in .png";
-  return is_within (o.distance_m, 0, 1000) ? nullptr : "--distance: expected 0 to 1000 metres";
-}
-
-bool
-parse_arguments (int *argc, char ***argv, Options &options)
-{
-  const GOptionEntry entries[] = {
-      {"png", 0, 0, G_OPTION_ARG_FILENAME, &options.png, "Draw the rig", "FILE"},
-      {"width", 0, 0, G_OPTION_ARG_INT, &options.width, "Picture width (default 960)", "PX"},
-      {"height", 0, 0, G_OPTION_ARG_INT, &options.height, "Picture height (default 720)", "PX"},
-      {"azimuth", 0, 0, G_OPTION_ARG_DOUBLE, &options.azimuth_deg,
-          "Azimuth of the viewpoint from the first view (default 30)", "DEG"},
-      {"elevation", 0, 0, G_OPTION_ARG_DOUBLE, &options.elevation_deg,
-          "Elevation of the viewpoint (default 35)", "DEG"},
-      {"distance", 0, 0, G_OPTION_ARG_DOUBLE, &options.distance_m,
-          "Distance of the viewpoint from the centre (default: all cameras are visible)", "M"},
-      {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &options.paths, nullptr, nullptr},
-      {}};
-  GOptionContext *context =
-      g_option_context_new ("RIG - print and draw the geometry of a rig file");
-  g_option_context_add_main_entries (context, entries, nullptr);
-  g_option_context_add_group (context, gst_init_get_option_group ());
-  GError *error = nullptr;
-  bool parsed = g_option_context_parse (context, argc, argv, &error);
-  if (!parsed) {
-    g_printerr ("rig-check: %s\n", error->message);
-  } else if (const char *complaint = complaint_of (options)) {
-    g_printerr ("rig-check: %s; see --help\n", complaint);
-    parsed = false;
-  }
-  g_clear_error (&error);
-  g_option_context_free (context);
-  return parsed;
+  return print_problems (rig) == 0;
 }
 
 } // namespace
@@ -433,10 +195,9 @@ parse_arguments (int *argc, char ***argv, Options &options)
 int
 main (int argc, char **argv)
 {
-  setlocale (LC_CTYPE, ""); /* arguments are in the user's encoding */
-  Options options;
-  const int status = parse_arguments (&argc, &argv, options) ? (check_rig (options) ? 0 : 1) : 2;
-  g_free (options.png);
-  g_strfreev (options.paths);
-  return status;
+  if (argc != 2 || argv[1][0] == '-') {
+    std::fprintf (stderr, "usage: rig-check RIG\n");
+    return 2;
+  }
+  return check_rig (argv[1]) ? 0 : 1;
 }

@@ -74,7 +74,8 @@ RunMeasure::stats ()
   }
   gst_iterator_free (elements);
   std::lock_guard guard (lock_);
-  stats.frames = latencies_ms_.count ();
+  stats.frames = rendered_;
+  stats.views_now = views_now_;
   return stats;
 }
 
@@ -82,19 +83,22 @@ double
 RunMeasure::fps ()
 {
   std::lock_guard guard (lock_);
-  const auto n = latencies_ms_.count ();
-  if (n < 2 || last_frame_ <= first_frame_)
+  if (rendered_ < 2 || last_frame_ <= first_frame_)
     return 0;
-  return double (n - 1) * GST_SECOND / double (last_frame_ - first_frame_);
+  return double (rendered_ - 1) * GST_SECOND / double (last_frame_ - first_frame_);
 }
 
 double
 RunMeasure::latency_ms (double p)
 {
   std::unique_lock guard (lock_);
-  const LatencySamples samples = latencies_ms_;
+  std::vector<double> values = latencies_ms_;
   guard.unlock (); /* no streaming thread waits while it sorts */
-  return samples.percentile (p);
+  if (values.empty ())
+    return 0;
+  const auto k = values.begin () + std::ptrdiff_t (p * double (values.size () - 1));
+  std::nth_element (values.begin (), k, values.end ());
+  return *k;
 }
 
 guint64
@@ -127,9 +131,6 @@ RunMeasure::count_views (GstPad *, GstPadProbeInfo *info, gpointer user_data)
   if (self->seen_points_) {
     self->decoded_++;
     self->whole_ += whole;
-    if (whole)
-      self->whole_captures_[self->whole_ % self->whole_captures_.size ()] =
-          gst_range_buffer_get_capture_time (buffer);
   }
   self->views_now_ = seen;
   return self->seen_points_ ? GST_PAD_PROBE_OK : GST_PAD_PROBE_DROP;
@@ -144,39 +145,19 @@ RunMeasure::record_rendered (GstClockTime capture, gint &frames)
   const GstClockTime now = clock ? gst_clock_get_time (clock) : gst_util_get_timestamp ();
   gst_clear_object (&clock);
   std::lock_guard guard (lock_);
-  if (options_.frames > 0 && latencies_ms_.count () >= guint64 (options_.frames))
+  if (options_.frames > 0 && rendered_ >= guint64 (options_.frames))
     return false;
   if (!GST_CLOCK_TIME_IS_VALID (first_frame_))
     first_frame_ = now;
   last_frame_ = now;
   const double latency_ms =
       GST_CLOCK_TIME_IS_VALID (capture) ? (double (now) - double (capture)) * 1e-6 : 0;
-  latencies_ms_.add (latency_ms);
-  frames = gint (std::min<guint64> (latencies_ms_.count (), G_MAXINT));
-  if (frame_log_)
-    std::fprintf (frame_log_, "%.6f,%.3f,%d\n", double (now) * 1e-9, latency_ms, views_now_);
+  if (latencies_ms_.size () < kMaxLatencies)
+    latencies_ms_.push_back (latency_ms);
+  else
+    latencies_ms_[rendered_ % kMaxLatencies] = latency_ms;
+  frames = gint (std::min<guint64> (++rendered_, G_MAXINT));
   return true;
-}
-
-void
-RunMeasure::keep_if_whole (GstPad *pad, GstBuffer *picture)
-{
-  const GstClockTime capture = gst_range_buffer_get_capture_time (picture);
-  std::lock_guard guard (lock_);
-  if (!options_.snapshot || !GST_CLOCK_TIME_IS_VALID (capture) ||
-      std::ranges::find (whole_captures_, capture) == whole_captures_.end ())
-    return;
-  g_clear_pointer (&whole_picture_, gst_sample_unref);
-  GstCaps *caps = gst_pad_get_current_caps (pad);
-  whole_picture_ = gst_sample_new (picture, caps, nullptr, nullptr);
-  gst_caps_unref (caps);
-}
-
-GstSample *
-RunMeasure::last_whole_picture ()
-{
-  std::lock_guard guard (lock_);
-  return whole_picture_ ? gst_sample_ref (whole_picture_) : nullptr;
 }
 
 GstPadProbeReturn
@@ -185,13 +166,12 @@ RunMeasure::count_rendered (GstPad *pad, GstPadProbeInfo *info, gpointer user_da
   auto self = static_cast<RunMeasure *> (user_data);
   gint frames = 0;
   if (!self->record_rendered (
-          gst_range_buffer_get_capture_time (GST_PAD_PROBE_INFO_BUFFER (info)), frames))
+          gst_range_buffer_get_capture_time (GST_PAD_PROBE_INFO_BUFFER (info)), frames)) {
+    gst_pad_push_event (pad, gst_event_new_eos ()); /* sources get GST_FLOW_EOS from now on */
     return GST_PAD_PROBE_DROP;
-  self->keep_if_whole (pad, GST_PAD_PROBE_INFO_BUFFER (info));
+  }
   const gint wanted = self->options_.frames;
-  if (wanted > 0 && frames == wanted)
-    self->on_last_ ();
-  if (self->turned_) /* the next picture; the last one is the first view's again */
+  if (self->turned_) /* the next frame; the last one is the first view's again */
     g_object_set (
         self->turned_, "azimuth", 360.0 * std::min (frames + 1, wanted) / wanted, nullptr);
   return GST_PAD_PROBE_OK;
@@ -211,31 +191,15 @@ RunMeasure::add_probe (const char *element_name, GstPadProbeCallback probe)
 
 /* ---- life ---- */
 
-RunMeasure::RunMeasure (
-    GstElement *pipeline, const RunOptions &options, std::function<void ()> on_last)
-    : pipeline_ (pipeline), options_ (options), on_last_ (std::move (on_last))
+RunMeasure::RunMeasure (GstElement *pipeline, const RunOptions &options)
+    : pipeline_ (pipeline), options_ (options)
 {
+  latencies_ms_.reserve (kMaxLatencies);
 }
 
 RunMeasure::~RunMeasure ()
 {
   gst_clear_object (&turned_);
-  g_clear_pointer (&whole_picture_, gst_sample_unref);
-  if (frame_log_)
-    std::fclose (frame_log_);
-}
-
-bool
-RunMeasure::log_frames (const char *path)
-{
-  frame_log_ = std::fopen (path, "w");
-  if (!frame_log_) {
-    g_printerr ("rangecast-run: %s: cannot be opened for writing\n", path);
-    return false;
-  }
-  std::setvbuf (frame_log_, nullptr, _IOLBF, 0); /* whoever watches reads it as it grows */
-  std::fprintf (frame_log_, "clock_s,latency_ms,views\n");
-  return true;
 }
 
 void

@@ -7,7 +7,7 @@
 
 RunOptions::~RunOptions ()
 {
-  for (gchar *text : {stats, report, snapshot, frame_log, srtp_key, clock})
+  for (gchar *text : {stats, report, snapshot, srtp_key, clock})
     g_free (text);
   g_strfreev (drop_empty);
   g_strfreev (launch);
@@ -20,7 +20,8 @@ RunOptions::parse (int *argc, char ***argv)
       {"base-time", 0, 0, G_OPTION_ARG_INT64, &base_time,
           "Base time of the pipeline: the clock time of running time 0", "NS"},
       {"frames", 0, 0, G_OPTION_ARG_INT, &frames,
-          "Stop after N frames at the element named rendered (default 0: run to the end)", "N"},
+          "End the streams after N frames at the element named rendered (default 0: no limit)",
+          "N"},
       {"views", 0, 0, G_OPTION_ARG_INT, &views,
           "Start when N views have points, or 2 s after the first one (default 1)", "N"},
       {"turn", 0, 0, G_OPTION_ARG_NONE, &turn,
@@ -30,16 +31,12 @@ RunOptions::parse (int *argc, char ***argv)
       {"loop", 0, 0, G_OPTION_ARG_NONE, &loop, "Play a file again and again", nullptr},
       {"progress", 0, 0, G_OPTION_ARG_NONE, &progress, "Print a line every 2 s", nullptr},
       {"stats", 0, 0, G_OPTION_ARG_STRING, &stats,
-          "Send the elements' statistics to udp://HOST:PORT or a file (default: "
-          "environment variable RANGECAST_STATS; none)",
+          "Send the elements' statistics to udp://HOST:PORT (default: environment variable "
+          "RANGECAST_STATS, or none)",
           "ADDRESS"},
       {"report", 0, 0, G_OPTION_ARG_FILENAME, &report, "Write the measurements", "JSON"},
       {"snapshot", 0, 0, G_OPTION_ARG_FILENAME, &snapshot,
-          "Write the last picture with all views, or else the last sample of the sink named "
-          "snapshot",
-          "PNG"},
-      {"frame-log", 0, 0, G_OPTION_ARG_FILENAME, &frame_log,
-          "Write a line for each frame: time, latency, number of views with points", "CSV"},
+          "Write the last frame of the sink named snapshot", "PNG"},
       {"srtp-key", 0, 0, G_OPTION_ARG_FILENAME, &srtp_key,
           "File with the key (60 hexadecimal digits) of every srtpenc and srtpdec", "FILE"},
       {"drop-empty", 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &drop_empty,
@@ -60,7 +57,7 @@ RunOptions::parse (int *argc, char ***argv)
   if (!parsed)
     g_printerr ("rangecast-run: %s\n", error->message);
   else if (!launch)
-    g_printerr ("rangecast-run: expected a launch string, see --help\n");
+    g_printerr ("rangecast-run: give a launch string, see --help\n");
   g_clear_error (&error);
   g_option_context_free (context);
   return parsed && launch;

@@ -15,7 +15,6 @@ struct RunOptions {
   gchar *stats = nullptr;
   gchar *report = nullptr;
   gchar *snapshot = nullptr;
-  gchar *frame_log = nullptr;
   gchar *srtp_key = nullptr;
   gchar *clock = nullptr;
   gchar **drop_empty = nullptr;

@@ -7,9 +7,9 @@
  * "decoder" (a neighbourcodedec), "view" (a striprender), "snapshot"
  * (a sink whose last sample becomes a PNG), "microphone" (a volume, which SIGUSR1 mutes and
  * unmutes); every rtpjitterbuffer, whatever its name. */
-#include <glib-unix.h>
 #include <glib/gstdio.h>
 #include <gst/gst.h>
+#include <gst/net/gstnet.h>
 
 #include <clocale>
 #include <memory>
@@ -18,8 +18,8 @@
 #include <string_view>
 #include <utility>
 
-#include "clock.hpp"
 #include "common/dump-graph.hpp"
+#include "common/final-signal.hpp"
 #include "report.hpp"
 #include "srtp-key.hpp"
 #include "stats-sender.hpp"
@@ -39,12 +39,35 @@ struct Runner {
 };
 
 gboolean
-send_eos (gpointer user_data)
+on_no_end (gpointer user_data)
 {
   auto runner = static_cast<Runner *> (user_data);
-  if (!runner->ending)
-    gst_element_send_event (runner->pipeline, gst_event_new_eos ());
-  runner->ending = true;
+  g_printerr ("ERROR: the streams do not end; files may be incomplete\n");
+  runner->failed = true;
+  g_main_loop_quit (runner->loop);
+  return G_SOURCE_REMOVE;
+}
+
+/* From another thread: a source may keep this one waiting. */
+void
+send_eos (GstElement *pipeline, gpointer)
+{
+  gst_element_send_event (pipeline, gst_event_new_eos ());
+}
+
+gboolean
+on_interrupt (gpointer user_data)
+{
+  auto runner = static_cast<Runner *> (user_data);
+  GstState state = GST_STATE_NULL;
+  gst_element_get_state (runner->pipeline, &state, nullptr, 0);
+  if (state !=
+      GST_STATE_PLAYING) { /* sources hold locks that EOS needs until sinks are prerolled */
+    g_main_loop_quit (runner->loop);
+  } else if (!std::exchange (runner->ending, true)) {
+    gst_element_call_async (runner->pipeline, send_eos, nullptr, nullptr);
+    g_timeout_add (kPatience_ms * 2 / 3, on_no_end, runner);
+  }
   return G_SOURCE_REMOVE;
 }
 
@@ -66,7 +89,7 @@ report_recovery (GstMessage *message)
   }
 }
 
-/* When nobody should be in the picture, and when people may come back. While roiextract skips
+/* When nobody should be in view, and when people may come back. While roiextract skips
  * frames before it learns, it posts 0 frames. */
 void
 report_learning (Runner &runner, GstMessage *message)
@@ -81,8 +104,8 @@ report_learning (Runner &runner, GstMessage *message)
     g_print ("view %d: the background is learnt\n", view_id);
     runner.learning.erase (view_id);
   } else if (frames > 0 && runner.learning.insert (view_id).second) {
-    g_print ("view %d: learning the background from %d frames; nobody should be in the picture\n",
-        view_id, of);
+    g_print (
+        "view %d: learning the background from %d frames; nobody should be in view\n", view_id, of);
   }
 }
 
@@ -103,7 +126,7 @@ play_again (Runner &runner)
   runner.looping = true;
   if (gst_element_seek_simple (runner.pipeline, GST_FORMAT_TIME, flags, 0))
     return;
-  g_printerr ("ERROR: --loop: expected a stream that can be played from the beginning again\n");
+  g_printerr ("ERROR: --loop: this stream cannot be played from its beginning again\n");
   runner.failed = true;
   g_main_loop_quit (runner.loop);
 }
@@ -213,11 +236,12 @@ toggle_microphone (gpointer user_data)
 void
 add_sources (Runner &runner)
 {
-  g_unix_signal_add (SIGINT, send_eos, &runner);
-  g_unix_signal_add (SIGTERM, send_eos, &runner);
+  add_final_signals (on_interrupt, &runner);
   g_unix_signal_add (SIGUSR1, toggle_microphone, &runner);
-  if (runner.options.timeout_s > 0)
-    g_timeout_add_seconds (guint (runner.options.timeout_s), on_timeout, &runner);
+  if (const int limit_s = runner.options.timeout_s; limit_s > 0) {
+    g_timeout_add_seconds (guint (limit_s), on_timeout, &runner);
+    end_process_after (1000L * limit_s + kPatience_ms);
+  }
   const auto progress = [] (gpointer data) -> gboolean {
     print_progress (*static_cast<Runner *> (data)->measure);
     return G_SOURCE_CONTINUE;
@@ -252,7 +276,7 @@ finish (Runner &runner)
   if (!runner.failed && options.report)
     runner.failed = !write_report (*runner.measure, options.report);
   if (!runner.failed && options.snapshot)
-    runner.failed = !write_snapshot (runner.pipeline, *runner.measure, options.snapshot);
+    runner.failed = !write_snapshot (runner.pipeline, options.snapshot);
   gst_element_set_state (runner.pipeline, GST_STATE_NULL);
   for (gchar **path = options.drop_empty; path && *path; path++)
     if (is_empty (*path)) {
@@ -354,15 +378,50 @@ parse_pipeline (gchar **launch)
   return pipeline;
 }
 
+/* ---- the clock ---- */
+
+/* @return transfer full; nullptr after reporting a wrong name */
+GstClock *
+open_net_clock (const std::string &name)
+{
+  const auto colon = name.rfind (':');
+  guint64 port = 0;
+  if (colon == name.npos || colon == 0 ||
+      !g_ascii_string_to_unsigned (name.c_str () + colon + 1, 10, 1, 65535, &port, nullptr)) {
+    g_printerr ("rangecast-run: --clock: '%s' is neither system nor HOST:PORT\n", name.c_str ());
+    return nullptr;
+  }
+  GstClock *clock =
+      gst_net_client_clock_new (nullptr, name.substr (0, colon).c_str (), int (port), 0);
+  bool told = false;
+  while (!gst_clock_wait_for_sync (clock, 2 * GST_SECOND))
+    if (!std::exchange (told, true))
+      g_printerr ("rangecast-run: waiting for the clock at %s\n", name.c_str ());
+  return clock;
+}
+
+/* Makes the pipeline use a clock instead of what its elements provide: "system" (monotonic), or
+ * HOST:PORT, where rangemux clock-port publishes one; waits until that is known. @return false
+ * after reporting what is wrong with the name */
+bool
+use_clock (GstElement *pipeline, const char *name)
+{
+  GstClock *clock =
+      g_strcmp0 (name, "system") == 0 ? gst_system_clock_obtain () : open_net_clock (name);
+  if (!clock)
+    return false;
+  gst_pipeline_use_clock (GST_PIPELINE (pipeline), clock);
+  gst_object_unref (clock);
+  return true;
+}
+
 /* Releases the pipeline. @return false after reporting an error */
 bool
 run (Runner &runner)
 {
   const RunOptions &options = runner.options;
-  runner.measure = std::make_unique<RunMeasure> (
-      runner.pipeline, options, [&runner] { g_idle_add (send_eos, &runner); });
+  runner.measure = std::make_unique<RunMeasure> (runner.pipeline, options);
   if ((options.clock && !use_clock (runner.pipeline, options.clock)) ||
-      (options.frame_log && !runner.measure->log_frames (options.frame_log)) ||
       (options.srtp_key && !give_srtp_key (runner.pipeline, options.srtp_key)))
     runner.failed = true;
   else

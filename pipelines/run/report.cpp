@@ -34,8 +34,8 @@ print_progress (RunMeasure &measure)
   if (stats.frames == 0)
     std::printf ("  waiting: cameras are learning their background\n");
   else
-    std::printf ("  frame set %5" G_GUINT64_FORMAT "  %5.1f /s  %7.0f points  %6.1f ms\n",
-        stats.frames, measure.fps (), per_frame (stats.points, stats.coded_frames),
+    std::printf ("  frame set %5" G_GUINT64_FORMAT "  %d view%s  %5.1f /s  %7.0f points  %6.1f ms\n",
+        stats.frames, stats.views_now, stats.views_now == 1 ? "" : "s", measure.fps (), per_frame (stats.points, stats.coded_frames),
         measure.latency_ms (0.5));
   std::fflush (stdout);
 }
@@ -71,52 +71,48 @@ write_report (RunMeasure &measure, const char *path)
 
 namespace {
 
-/* ---- the last picture ---- */
+/* ---- the last frame ---- */
 
-/* The last picture with all views, else the last one. @return transfer full; null if there is none
- * or it cannot be converted */
+/* @return transfer full; null after reporting that there is none, or that it cannot be converted */
 GstSample *
-last_picture (GstElement *pipeline, RunMeasure &measure, const char *path, GError **error)
+last_picture (GstElement *pipeline, const char *path)
 {
-  GstSample *sample = measure.last_whole_picture ();
-  GstElement *sink = sample ? nullptr : gst_bin_get_by_name (GST_BIN (pipeline), "snapshot");
-  if (sink) {
+  GstElement *sink = gst_bin_get_by_name (GST_BIN (pipeline), "snapshot");
+  GstSample *sample = nullptr;
+  if (sink)
     g_object_get (sink, "last-sample", &sample, nullptr);
-    gst_object_unref (sink);
-  }
+  gst_clear_object (&sink);
   if (!sample) {
-    g_printerr ("rangecast-run: no picture was rendered for %s\n", path);
+    g_printerr ("rangecast-run: no frame was rendered for %s\n", path);
     return nullptr;
   }
+  g_autoptr (GError) error = nullptr;
   GstCaps *png = gst_caps_new_empty_simple ("image/png");
-  GstSample *converted = gst_video_convert_sample (sample, png, 10 * GST_SECOND, error);
+  GstSample *converted = gst_video_convert_sample (sample, png, 10 * GST_SECOND, &error);
   gst_caps_unref (png);
   gst_sample_unref (sample);
   if (!converted)
-    g_printerr ("rangecast-run: %s: %s\n", path, (*error)->message);
+    g_printerr ("rangecast-run: %s: %s\n", path, error->message);
   return converted;
 }
 
 } // namespace
 
 bool
-write_snapshot (GstElement *pipeline, RunMeasure &measure, const char *path)
+write_snapshot (GstElement *pipeline, const char *path)
 {
-  GError *error = nullptr;
-  GstSample *picture = last_picture (pipeline, measure, path, &error);
-  g_clear_error (&error);
+  GstSample *picture = last_picture (pipeline, path);
   if (!picture)
     return false;
-  bool written = false;
-  GstMapInfo map;
-  if (gst_buffer_map (gst_sample_get_buffer (picture), &map, GST_MAP_READ)) {
-    written = g_file_set_contents (
-        path, reinterpret_cast<const gchar *> (map.data), gssize (map.size), &error);
-    gst_buffer_unmap (gst_sample_get_buffer (picture), &map);
-  }
+  g_autoptr (GError) error = nullptr;
+  gpointer png = nullptr;
+  gsize size = 0;
+  gst_buffer_extract_dup (gst_sample_get_buffer (picture), 0, gsize (-1), &png, &size);
+  const bool written =
+      g_file_set_contents (path, static_cast<const gchar *> (png), gssize (size), &error);
+  g_free (png);
   gst_sample_unref (picture);
   if (!written)
-    g_printerr ("rangecast-run: %s: %s\n", path, error ? error->message : "cannot be written");
-  g_clear_error (&error);
+    g_printerr ("rangecast-run: %s: %s\n", path, error->message);
   return written;
 }

@@ -10,6 +10,5 @@
 void print_progress (RunMeasure &measure);
 /** Writes what was measured, JSON; `rangecast demo` reads it. */
 bool write_report (RunMeasure &measure, const char *path);
-/** Writes the last picture that shows all views, or else the last one of the sink named "snapshot",
- *  as a PNG. */
-bool write_snapshot (GstElement *pipeline, RunMeasure &measure, const char *path);
+/** Writes the last frame of the sink named "snapshot" as a PNG. */
+bool write_snapshot (GstElement *pipeline, const char *path);

@@ -176,8 +176,8 @@ read_key (const char *path)
   g_free (text);
   if (good)
     return gst_buffer_new_memdup (key, kKeyBytes);
-  g_printerr ("rangecast-run: --srtp-key %s: expected a file of %zu hexadecimal digits\n", path,
-      2 * kKeyBytes);
+  g_printerr (
+      "rangecast-run: --srtp-key %s: give a file of %zu hexadecimal digits\n", path, 2 * kKeyBytes);
   return nullptr;
 }
 

@@ -1,11 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "stats-sender.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <cmath>
-#include <cstring>
 
 namespace {
 
@@ -73,61 +69,36 @@ append_field (GQuark field, const GValue *value, gpointer json)
 
 } // namespace
 
-/* ---- the address ---- */
-
-bool
-StatsSender::open_socket (const std::string &host, const std::string &port, std::string &error)
-{
-  addrinfo hints{}, *found = nullptr;
-  hints.ai_socktype = SOCK_DGRAM;
-  if (const int result = getaddrinfo (host.c_str (), port.c_str (), &hints, &found)) {
-    error = host + ":" + port + ": " + gai_strerror (result);
-    return false;
-  }
-  fd_ = socket (found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  std::memcpy (&to_, found->ai_addr, found->ai_addrlen);
-  to_size_ = found->ai_addrlen;
-  freeaddrinfo (found);
-  is_socket_ = true;
-  if (fd_ < 0)
-    error = std::string ("no socket: ") + g_strerror (errno);
-  return fd_ >= 0;
-}
-
 std::unique_ptr<StatsSender>
 StatsSender::open (const std::string &address, std::string host, std::string &error)
 {
   std::unique_ptr<StatsSender> sender (new StatsSender);
   sender->host_ = std::move (host);
-  if (address.starts_with ("udp://")) {
-    std::string name = address.substr (6);
-    const auto colon = name.rfind (':');
-    const std::string port = colon == std::string::npos ? "" : name.substr (colon + 1);
-    name.resize (std::min (colon, name.size ()));
-    if (name.size () > 2 && name.front () == '[' && name.back () == ']') /* IPv6 */
-      name = name.substr (1, name.size () - 2);
-    const bool numeric =
-        !port.empty () && port.find_first_not_of ("0123456789") == std::string::npos;
-    if (name.empty () || !numeric || port.size () > 5 || std::stoi (port) < 1 ||
-        std::stoi (port) > 65535) {
-      error = "expected udp://HOST:PORT or a file, got '" + address + "'";
-      return nullptr;
-    }
-    return sender->open_socket (name, port, error) ? std::move (sender) : nullptr;
-  }
-  sender->fd_ =
-      ::open (address.c_str (), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
-  if (sender->fd_ < 0) {
-    error = address + ": cannot be opened for writing: " + g_strerror (errno);
+  g_autoptr (GError) failure = nullptr;
+  g_autoptr (GSocketConnectable) to =
+      address.starts_with ("udp://") ? g_network_address_parse_uri (address.c_str (), 0, nullptr)
+                                     : nullptr;
+  if (!to || g_network_address_get_port (G_NETWORK_ADDRESS (to)) == 0) {
+    error = "'" + address + "' is not udp://HOST:PORT";
     return nullptr;
   }
+  g_autoptr (GSocketAddressEnumerator) addresses = g_socket_connectable_enumerate (to);
+  sender->to_ = g_socket_address_enumerator_next (addresses, nullptr, &failure);
+  if (sender->to_)
+    sender->socket_ = g_socket_new (g_socket_address_get_family (sender->to_),
+        G_SOCKET_TYPE_DATAGRAM, G_SOCKET_PROTOCOL_UDP, &failure);
+  if (!sender->socket_) {
+    error = address + ": " + (failure ? failure->message : "no such host");
+    return nullptr;
+  }
+  g_socket_set_blocking (sender->socket_, FALSE);
   return sender;
 }
 
 StatsSender::~StatsSender ()
 {
-  if (fd_ >= 0)
-    close (fd_);
+  g_clear_object (&socket_);
+  g_clear_object (&to_);
 }
 
 std::string
@@ -146,11 +117,7 @@ void
 StatsSender::send (std::string line)
 {
   line += "}\n";
-  const ssize_t sent = is_socket_
-                           ? sendto (fd_, line.data (), line.size (), MSG_DONTWAIT | MSG_NOSIGNAL,
-                                 reinterpret_cast<const sockaddr *> (&to_), to_size_)
-                           : write (fd_, line.data (), line.size ());
-  (void)sent; /* there may be no receiver */
+  g_socket_send_to (socket_, to_, line.data (), line.size (), nullptr, nullptr); /* or it is lost */
 }
 
 void

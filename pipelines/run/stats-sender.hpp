@@ -1,18 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <gio/gio.h>
 #include <gst/gst.h>
-#include <netdb.h>
-#include <sys/socket.h>
 
 #include <memory>
 #include <string>
 
-/** Sends the elements' `rangecast-stats` messages on, for the page /rig: a JSON object a line, or a
+/** Sends the elements' `rangecast-stats` messages on, for the page /rig: a JSON object a
  *  datagram. Never waits: what the network does not take is lost. */
 class StatsSender {
 public:
-  /** @param address  udp://HOST:PORT, or a file, to which lines are appended
+  /** @param address  udp://HOST:PORT
    *  @param host     what these messages are called in the table
    *  @param[out] error  what is wrong with the address
    *  @return null after an error */
@@ -29,13 +28,10 @@ public:
 
 private:
   StatsSender () = default;
-  bool open_socket (const std::string &host, const std::string &port, std::string &error);
   [[nodiscard]] std::string begin_line (GstMessage *message) const;
   void send (std::string line);
 
-  int fd_ = -1;
-  bool is_socket_ = false;
-  sockaddr_storage to_{};
-  socklen_t to_size_ = 0;
+  GSocket *socket_ = nullptr;
+  GSocketAddress *to_ = nullptr;
   std::string host_;
 };

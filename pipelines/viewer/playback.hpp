@@ -12,12 +12,10 @@ public:
   /** @param seekable  a file: it can be paused and sought in */
   Playback (GstElement *pipeline, bool seekable) : pipeline_ (pipeline), seekable_ (seekable) {}
 
-  [[nodiscard]] bool is_seekable () const { return seekable_; }
   [[nodiscard]] bool is_paused () const { return paused_; }
-  [[nodiscard]] bool is_seeking () const { return seeking_; }
   /** ns; 0 if it is not known */
   [[nodiscard]] GstClockTime duration () const;
-  /** Of the picture that is shown, or will be after the seeks; ns. */
+  /** Of the frame that is shown, or will be after the seeks; ns. */
   [[nodiscard]] GstClockTime position () const;
 
   void toggle_pause ();

@@ -9,8 +9,8 @@ const FIELDS = {
   rc_orbit: ['azimuth', 'elevation', 'distance', 'fieldOfView', 'panX', 'panY', 'panZ', 'homeRequests'],
   rc_ply: ['address', 'size'],
   rc_scene_state: ['address', 'size'],
+  rc_rig_view: ['id', 'width', 'height'],
 };
-const RIG_FIELDS = ['id', 'width', 'height', 'fx', 'fy', 'cx', 'cy'];
 
 export const DONE = 0, NOTHING = 1, END = 2, FAILED = 3;
 
@@ -100,14 +100,7 @@ export class Core {
     });
   }
 
-  rig () {
-    return Array.from ({ length: this.call ('rc_rig_views') }, (_, i) => {
-      const r = this.doubles (this.call ('rc_rig_view', i), 24).slice ();
-      return { ...Object.fromEntries (RIG_FIELDS.map ((field, k) => [field, r[k]])), rotation: [...r.slice (7, 16)],
-        translation: [...r.slice (16, 19)], depthUnit: r[19], near: r[20], far: r[21],
-        name: new TextDecoder ().decode (this.bytes (r[22], r[23]).slice ()) };
-    });
-  }
+  rig () { return Array.from ({ length: this.call ('rc_rig_views') }, (_, i) => this.record ('rc_rig_view', i)); }
 
   // @return the frame set as a PLY file, or null, which message () explains
   ply () {

@@ -8,7 +8,6 @@ import { HEAD, LAYER, Renderer } from './renderer.js';
 import { findServer, storeToken, readToken } from './server.js';
 import { Speech } from './speech.js';
 import { Stats } from './stats.js';
-import { Headset } from './xr.js';
 
 const element = (id) => document.getElementById (id);
 const canvas = element ('picture');
@@ -56,7 +55,6 @@ class Page {
     this.wanted = this.painting = false; // another picture; one is under way
     this.resting = false; // the next one is to have all pixels
     this.server = null; // { url, token }
-    this.headset = new Headset (this, element ('headset'), say);
     if (parameters.has ('azimuth') || parameters.has ('elevation'))
       this.camera.call ('rc_set_orbit', Number (parameters.get ('azimuth') ?? 0), Number (parameters.get ('elevation') ?? 0), 0, 0, 0, 0, 0);
     this.watch ();
@@ -125,7 +123,7 @@ class Page {
 
   draw () {
     this.wanted = true;
-    if (this.painting || this.headset.session) // a headset asks for its pictures itself
+    if (this.painting)
       return;
     this.painting = true;
     requestAnimationFrame (() => this.drawNext ());
@@ -156,8 +154,8 @@ class Page {
       }, REST);
   }
 
-  // show: draws one picture, or one for each eye. Returns the frame set that is new in it, if any.
-  paint (show = () => this.renderer.draw (this.picture ('rc_camera_picture', canvas.width, canvas.height, this.renderer.largest))) {
+  // Draws a picture. Returns the frame set that is new in it, if any.
+  paint () {
     const frame = this.pending;
     this.pending = null;
     try {
@@ -165,7 +163,7 @@ class Page {
         this.setScene (frame.state);
         this.renderer.upload (frame.layers);
       }
-      show ();
+      this.renderer.draw (this.picture ());
     } catch (error) {
       say (error.message);
     }
@@ -181,10 +179,8 @@ class Page {
     document.body.dataset.frameSets = Number (document.body.dataset.frameSets ?? 0) + 1;
   }
 
-  picture (name, ...args) {
-    const at = this.camera.call (name, ...args);
-    if (!at)
-      throw new Error ('The viewport does not fit its framebuffer.');
+  picture () {
+    const at = this.camera.call ('rc_camera_picture', canvas.width, canvas.height, this.renderer.largest);
     return this.camera.floats (at, HEAD + LAYER * this.renderer.layers.length);
   }
 
@@ -244,7 +240,7 @@ class Page {
     addEventListener ('keydown', (event) => this.key (event));
     canvas.addEventListener ('webglcontextlost', (event) => {
       event.preventDefault ();
-      say ('The browser has reset WebGL; the picture returns when WebGL does.');
+      say ('The browser has reset WebGL; rendering resumes when it is restored.');
     });
     canvas.addEventListener ('webglcontextrestored', () => {
       this.renderer.start ();
@@ -301,7 +297,7 @@ const loadModule = async () => {
   });
 };
 
-// A stream to show at once: { url, title }, or null.
+// A stream to show immediately: { url, title }, or null.
 const findStream = async () => {
   if (parameters.has ('src'))
     return null;

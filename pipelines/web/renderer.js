@@ -3,7 +3,7 @@
 // of streams.
 
 // rangecast::Shader
-const COVERING = 0, BLEND_VERTEX = 6, BLEND_FRAGMENT = 7, FILL = 10, SUM = 11;
+const COVERING = 0, BLEND_VERTEX = 6, BLEND_FRAGMENT = 7, FILL = 9, SUM = 10;
 // Floats of rc_camera_picture: those of the picture, and of each layer.
 export const HEAD = 18, LAYER = 29;
 const VERTEX = 12; // bytes of rangecast::BlendVertex
@@ -111,19 +111,15 @@ export class Renderer {
       gl.texParameteri (gl.TEXTURE_2D, name, value);
   }
 
-  // picture: the floats of rc_camera_picture or rc_camera_eye for a framebuffer of that size; part: [x, y, width, height], of an eye
-  draw (picture, { framebuffer, width, height, part } = { framebuffer: null, ...this.size }) {
-    const gl = this.gl;
-    gl.bindFramebuffer (gl.FRAMEBUFFER, framebuffer);
+  // picture: the floats of rc_camera_picture for the canvas
+  draw (picture) {
+    const { gl, canvas: { width, height } } = this;
+    gl.bindFramebuffer (gl.FRAMEBUFFER, null);
     gl.viewport (0, 0, width, height);
-    if (part) {
-      gl.enable (gl.SCISSOR_TEST);
-      gl.scissor (...part);
-    }
     gl.clearColor (picture[0], picture[1], picture[2], 1);
     gl.clear (gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     if (this.layers.length > 0 && picture[17] === this.layers.length)
-      this.drawBlended (picture, framebuffer, width, height);
+      this.drawBlended (picture, width, height);
     gl.disable (gl.SCISSOR_TEST);
   }
   // Resolves when the GPU has executed the commands issued so far, or its context was lost.
@@ -143,7 +139,6 @@ export class Renderer {
       setTimeout (look, 0); // its state does not change before
     });
   }
-  get size () { return { width: this.canvas.width, height: this.canvas.height }; }
 
   eachLayer (picture, draw) {
     this.layers.forEach (({ objects, count }, i) => {
@@ -209,7 +204,7 @@ export class Renderer {
   }
 
   // As BlendPainter::draw (); the framebuffer has been cleared.
-  drawBlended (picture, framebuffer, width, height) {
+  drawBlended (picture, width, height) {
     const gl = this.gl, [count, columns, rows] = picture.subarray (4, 7);
     if (count === 0)
       return;
@@ -222,7 +217,7 @@ export class Renderer {
     gl.depthFunc (gl.ALWAYS);
     this.addUp (picture, cells, count);
     gl.disable (gl.DEPTH_TEST);
-    gl.bindFramebuffer (gl.FRAMEBUFFER, framebuffer);
+    gl.bindFramebuffer (gl.FRAMEBUFFER, null);
     this.finishPicture (picture, height);
   }
 

@@ -9,7 +9,6 @@ import cv2, numpy as np
 
 VIEWS, BAD, AZIMUTH, SIZE, FRAMES = 6, 1, 40, 400, 16
 ALL = 'poses+views+points+colours'
-STREAM = 'video/x-neighbour-code,alignment=byte-stream'
 
 
 def launch(text):
@@ -49,10 +48,10 @@ def record(name, rig='rig.yaml', depth=lambda d: d, colour=lambda c: c):
         if i == BAD:
             d, c = depth(d), colour(c)
         cv2.imwrite('d.png', d), cv2.imwrite('c.png', c)
-        launch(f'rangecombine name=c depth-scale=0.0001 rig={rig} view-id={i} ! neighbourcodeenc profile=plain ! neighbourcodeparse ! {STREAM} '
+        launch(f'rangecombine name=c depth-scale=0.0001 rig={rig} view-id={i} ! neighbourcodeenc profile=plain '
                f'! filesink location=v{i}.rcnc filesrc location=c.png ! {still} ! c.colour '
                f'filesrc location=d.png ! {still} ! c.depth')
-    launch(f'rangemux name=m ! neighbourcodeparse ! {STREAM} ! filesink location={name}.rcnc '
+    launch(f'rangemux name=m ! filesink location={name}.rcnc '
            + ' '.join(f'filesrc location=v{i}.rcnc ! neighbourcodeparse ! queue ! m.' for i in range(VIEWS)))
 
 

@@ -39,8 +39,7 @@ cc -shared -fPIC -O2 -fno-builtin -o "$dir/count.so" "$dir/count.c"
 
 record () { # FILE FRAMES PROPERTIES...
   gst-launch-1.0 -q avatartestsrc views=4 "num-buffers=$(($2 + 20))" empty-frames=20 "${@:3}" ! video/x-range,width=320,height=240 \
-    ! roiextract background-frames=18 ! neighbourcodeenc profile=plain ! neighbourcodeparse \
-    ! video/x-neighbour-code,alignment=byte-stream ! filesink "location=$1"
+    ! roiextract background-frames=18 ! neighbourcodeenc profile=plain ! filesink "location=$1"
 }
 for n in "$frames" $((2 * frames)); do
   record "$dir/all-$n.rcnc" "$n"

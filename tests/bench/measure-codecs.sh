@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# What tests/bench/results/codec.md says of the neighbour code: runs codec_bench on all data and prints the table.
+# What tests/bench/results/codec.md says of the neighbour code: runs codec_bench on all data.
 # usage: measure-codecs.sh DATA-DIR OUT-DIR [ROUNDS]
 # A few minutes. DATA-DIR has lps_head, stanford_bunny_range,
-# open3d_rgbd, luxonis_people_stereo; OUT-DIR gets NAME.json, NAME.txt, head.svg.
+# open3d_rgbd, luxonis_people_stereo; OUT-DIR gets NAME.json and NAME.txt.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 source "$here/arguments.sh"
@@ -36,7 +36,7 @@ measure room "${pairs[@]}" --near 0.4 --far 8
 
 # A recorded stereo pair through stereodepth and roiextract: ten frames in which somebody walks through.
 people=$data/luxonis_people_stereo
-rig-convert luxonis "$people/calib.json" "$out/rig.yaml" --near 0.7 --far 4 --scale 0.5
+rangecast import "$people/calib.json" --out "$out/rig.yaml" --near 0.7 --far 4 --scale 0.5
 side () { # file, pad
   echo "filesrc location=$1 ! decodebin ! videoconvert ! videorate drop-only=true ! video/x-raw,framerate=10/1
     ! videoscale method=bilinear2 ! video/x-raw,width=640,height=400 ! queue ! $2"
@@ -45,9 +45,5 @@ side () { # file, pad
 gst-launch-1.0 -q $(side "$people/left.mp4" depth.left) $(side "$people/right.mp4" depth.right) \
   stereodepth name=depth "rig=$out/rig.yaml" \
   ! roiextract settle-frames=34 background-frames=16 cue=depth depth-threshold=0.3 min-area=1000 max-hole=400 \
-  ! identity eos-after=90 ! neighbourcodeenc depth-bits=16 depth-threshold=0 colour-threshold=0 \
-  ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink "location=$out/people.rcnc"
+  ! identity eos-after=90 ! neighbourcodeenc depth-bits=16 depth-threshold=0 colour-threshold=0 ! filesink "location=$out/people.rcnc"
 measure people --recording "$out/people.rcnc" --skip 76 --frames 10
-
-"$here/codec-table.py" "head 320x240=$out/head.json" "head 640x480=$out/head-640x480.json" "bunny=$out/bunny.json" \
-  "room=$out/room.json" "people=$out/people.json"

@@ -84,27 +84,6 @@ Options::size (const std::string &name, int &width, int &height, int least, int 
 }
 
 void
-Options::dress (const std::string &name, std::optional<unsigned> &to)
-{
-  values_[name] = [&to] (const std::string &value) -> std::string {
-    constexpr std::pair<const char *, unsigned> kPieces[] = {{"none", 0},
-        {"hair", rangecast::kDressHair}, {"glasses", rangecast::kDressGlasses},
-        {"collar", rangecast::kDressCollar}, {"hand", rangecast::kDressHand},
-        {"all", rangecast::kDressAll}};
-    std::istringstream pieces (value);
-    to = 0;
-    for (std::string piece; std::getline (pieces, piece, '+');) {
-      const auto known =
-          std::ranges::find_if (kPieces, [&] (const auto &k) { return piece == k.first; });
-      if (known == std::end (kPieces))
-        return "none, all, or some of hair, glasses, collar and hand with + between";
-      *to |= known->second;
-    }
-    return {};
-  };
-}
-
-void
 Options::value (const std::string &name, Take take)
 {
   values_[name] = std::move (take);

@@ -23,8 +23,6 @@ public:
   void number (const std::string &name, double &to, double least, double most);
   /** WxH, pixels, each from `least` to `most`. */
   void size (const std::string &name, int &width, int &height, int least, int most);
-  /** Pieces of the built-in figure's dress with + between, "none" or "all". */
-  void dress (const std::string &name, std::optional<unsigned> &to);
   void value (const std::string &name, Take take);
 
   /** @return nothing: go on; else the status to exit with, all being said: 0 after --help, 2 */

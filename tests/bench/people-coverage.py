@@ -5,7 +5,7 @@ against the outlines in tests/data/people.
 
 usage: people-coverage.py [--min-covered PERCENT] [--max-beside PERCENT]   (after: source pipelines/env.sh)
 
-The recording runs through the elements with their default properties, a rig made by rig-convert, and a background learnt
+The recording runs through the elements with their default properties, a rig made by `rangecast import`, and a background learnt
 from the frames 120 to 183, which show nobody. Covered: share of the person's pixels that have depth. Beside: pixels with
 depth outside the person, as a share of the person's pixels. Pixels within `unsure` outlines count for nothing. Looks for the
 recording in RANGECAST_DATA, else in ../shared/data beside the source tree. Exit status 77 if that or a Python module is
@@ -71,7 +71,7 @@ def fill(outlines, labelled, view):
 
 
 def run_pipeline(recording, folder):
-    subprocess.run(["rig-convert", "luxonis", recording / "calib.json", folder / "rig.yaml", "--near", "0.7", "--far", "4",
+    subprocess.run(["rangecast", "import", recording / "calib.json", "--out", folder / "rig.yaml", "--near", "0.7", "--far", "4",
                     "--scale", str(WIDTH / 1280)], check=True)
     first, last = BACKGROUND_FRAMES
 

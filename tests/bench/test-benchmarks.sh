@@ -11,13 +11,14 @@ prints_rows () { # rows command...
 
 test_benchmarks_print_their_tables () {
   prints_rows 3 codec_bench --size 64x48 --frames 2 --rounds 1
-  prints_rows 3 cylinder_bench --views 4 --size 96x72 --rounds 1 --noise exact --pose-mm 0
-  prints_rows 3 stereo_bench --scene --frames 1
-  prints_rows 1 roi_bench --frames 1 --depth range
+  prints_rows 3 stereo_bench --scene --size 160x120 --frames 1
+  prints_rows 1 roi_bench --frames 1 --depth range --room standard
+  prints_rows 2 roi_bench --changes --depth range --room lamp
   prints_rows 3 cameras_bench --size 160x120 --seconds 1 --rounds 1
+  prints_rows 1 network_bench --views 2 --size 160x120 --fps 30 --frames 36 --loss 0.05 --reorder 0.1 --duplicate 0.1 --jitter 20 --fec 50
 }
 
 test_benchmark_of_the_renderer_prints_its_table () {
   need_gl
-  prints_rows 3 render_bench --rounds 1 --dress none --mode points --depth exact
+  prints_rows 3 render_bench --rounds 1 --mode points --depth exact
 }

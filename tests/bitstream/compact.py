@@ -59,11 +59,17 @@ def models(name: str) -> list[list[int]]:
     return [[0, *(8 * int(word[i : i + 3], 16) for i in range(0, len(word), 3)), 1 << 15] for word in table(name)]
 
 
+def choice_models(name: str, key: bool) -> list[list[int]]:
+    """By number; those that key slices can't have are empty."""
+    made = iter(models(f"choices, {name}"))
+    return [[] if key and (number % 8 == 7 or number // 8 % 5 == 4 or number // 40 == 4) else next(made) for number in range(200)]
+
+
 # Choice models and number models at the beginning of a slice.
-INITIAL = {name: (models(f"choices, {name}"), models(f"numbers, {name}")) for name in ("exact", "fine", "coarse", "without key")}
+INITIAL = {name: (choice_models(name, name != "without key"), models(f"numbers, {name}")) for name in ("exact", "rounded", "without key")}
 CHOICES = [prefix_code([int(digit) for digit in word]) for word in table("choice lengths")]
 PATTERN_LENGTHS = [int(word) for word in table("pattern lengths")]
-PATTERNS = [prefix_code(PATTERN_LENGTHS[i : i + 16]) for i in (0, 16, 32)]
+PATTERNS = [prefix_code(PATTERN_LENGTHS[i : i + 16]) for i in (0, 16)]
 
 
 class Pixel(NamedTuple):
@@ -119,8 +125,6 @@ class PackedData:
     """Bits, and what packed makes of them."""
 
     def __init__(self, data: bytes, exact: bool) -> None:
-        if len(data) < 2:
-            raise Damage("no orders")
         self.exact = exact  # all steps are 1
         self.orders = [data[i // 2] >> 4 * (i % 2) & 15 for i in range(4)]
         self.size = 8 * len(data) - 16
@@ -140,9 +144,9 @@ class PackedData:
         while not self.take(1):
             zeros += 1
             if zeros > 18:
-                raise Damage("prefix")
+                break
         value = ((1 << zeros) + self.take(zeros) - 1 << order) + self.take(order)
-        if value >> 20:
+        if value >> 18:
             raise Damage("too large")
         return value
 
@@ -170,14 +174,12 @@ class PackedData:
         return self.symbol(CHOICES[near.kinds()])
 
     def residual(self, near: Neighbours) -> tuple[int, ...]:
-        pattern = self.symbol(PATTERNS[1 if not any(near) else 2 if self.exact else 0])
+        pattern = self.symbol(PATTERNS[int(self.exact)])
         return tuple(self.number(self.orders[i]) if pattern >> i & 1 else 0 for i in range(4))
 
     def number(self, order: int) -> int:
         negative = self.take(1)
         size = self.golomb(order) + 1
-        if size > 1 << 18:
-            raise Damage("residual")
         return -size if negative else size
 
     def finish(self) -> None:
@@ -190,21 +192,19 @@ def set_of_models(key: bool, steps: tuple[int, ...]) -> str:
     """Which a slice begins with."""
     if not key:
         return "without key"
-    return "exact" if steps == (1, 1, 1, 1) else "fine" if steps[1] <= 5 else "coarse"
+    return "exact" if steps == (1, 1, 1, 1) else "rounded"
 
 
 class EntropyData:
     """States and models, and what entropy makes of them."""
 
     def __init__(self, data: bytes, key: bool, steps: tuple[int, ...]) -> None:
-        if len(data) < 16:
-            raise Damage("no states")
         self.key = key
         self.choices, self.numbers = ([list(model) for model in kind] for kind in INITIAL[set_of_models(key, steps)])
-        self.x = [int.from_bytes(data[4 * k : 4 * k + 4], "little") for k in range(4)]
+        self.x = [int.from_bytes(data[4 * k : 4 * k + 4], "little") for k in range(2)]
         self.data = data
-        self.position = 16
-        for k in range(4):
+        self.position = 8
+        for k in range(2):
             self.refill(k)
 
     def refill(self, k: int) -> None:
@@ -272,7 +272,9 @@ class EntropyData:
                 continue
             if not self.key or left or any(upper[x : x + 3]):
                 context = left + 8 * group[upper[x + 1]] + 40 * group[upper[x + 2]]
-                choices[x] = self.decode(count % 4, self.choices[context])
+                choices[x] = self.decode(count % 2, self.choices[context])
+                if self.key and choices[x] == EARLIER:
+                    raise Damage("earlier than a key slice")
                 count += 1
             else:
                 choices[x] = 5
@@ -282,7 +284,7 @@ class EntropyData:
         before: Optional[Numbers] = None  # activity to the left
         for x, choice in enumerate(choices):
             residual = self.residual(before, *activities[x : x + 2]) if choice == 5 else (0, 0, 0, 0)
-            before = None if choice is None else tuple(min(abs(r), 21) for r in residual)
+            before = None if choice is None else tuple(abs(r) for r in residual)
             row.append(Coded(choice, residual))
         return row
 
@@ -294,8 +296,8 @@ class EntropyData:
             else:
                 total = left[i] + upper[i] + (upper_right[i] if upper_right else 0)
                 a = sum(total >= least for least in (1, 2, 3, 5, 8, 13, 21))
-            symbols.append(self.decode(i, self.numbers[10 * i + a]))
-        return tuple(self.number_of(i, symbol) for i, symbol in enumerate(symbols))
+            symbols.append(self.decode(i % 2, self.numbers[10 * i + a]))
+        return tuple(self.number_of(i % 2, symbol) for i, symbol in enumerate(symbols))
 
     def finish(self) -> None:
         if self.position < len(self.data) or any(x != 1 << 20 for x in self.x):
@@ -307,11 +309,6 @@ Data = Union[PackedData, EntropyData]
 
 def cut(value: int, least: int, most: int) -> int:
     return min(max(value, least), most)
-
-
-def signed(value: int) -> int:
-    """The number from -32768 to 32767 that equals this one modulo 2^16."""
-    return (value + 32768) % 65536 - 32768
 
 
 def read_runs(begin: int, end: int, above: list[bool], later: Callable[[bool], int]) -> list[bool]:
@@ -336,8 +333,6 @@ class CompactSlice:
     def __init__(
         self, profile: int, body: bytes, columns: int, last: int, maximum: int, earlier: Optional[Earlier]
     ) -> None:
-        if len(body) < 4:
-            raise Damage("no steps")
         depth = int.from_bytes(body[:2], "little")
         self.steps = (depth, body[2], body[3], body[3])
         if 0 in self.steps:
@@ -380,8 +375,6 @@ class CompactSlice:
                 choice = self.data.choice(near) if any(near) else 5
                 coded = Coded(choice, self.data.residual(near) if choice == 5 else (0, 0, 0, 0))
             if coded.choice == EARLIER:
-                if not self.earlier:
-                    raise Damage("earlier than a key slice")
                 pixel = self.earlier_pixel(self.earlier, x, number)
             else:
                 pixel = self.pixel(near, *coded)
@@ -417,15 +410,9 @@ class CompactSlice:
         if any(isinstance(pixel, Unknown) for pixel in four):
             return None
         known = [pixel for pixel in four if isinstance(pixel, tuple)]
-        if len(known) == 4 and all(abs(signed(pixel[0] - known[0][0])) <= self.gap for pixel in known):
+        if len(known) == 4 and all(abs(pixel[0] - known[0][0]) <= self.gap for pixel in known):
             weights = ((4 - a) * (4 - b), a * (4 - b), (4 - a) * b, a * b)
-            numbers = []
-            for i, first in enumerate(known[0]):
-                differences = [pixel[i] - first for pixel in known]
-                if i == 0:
-                    differences = [signed(difference) for difference in differences]
-                numbers.append(first + (sum(w * d for w, d in zip(weights, differences)) + 8) // 16)
-            return (numbers[0] % 65536, *numbers[1:])
+            return tuple((sum(w * n for w, n in zip(weights, numbers)) + 8) // 16 for numbers in zip(*known))
         nearest = four[(a >= 2) + 2 * (b >= 2)]
         return nearest if isinstance(nearest, tuple) else None
 
@@ -437,7 +424,7 @@ class CompactSlice:
             return Pixel(same.numbers, same.known, choice)
         numbers, known = self.predicted(near)
         made = (cut(n + d * s, *limit) for n, d, s, limit in zip(numbers, r, self.steps, self.limits))
-        return Pixel(tuple(made), known, choice, tuple(min(abs(d), 21) for d in r))
+        return Pixel(tuple(made), known, choice, tuple(abs(d) for d in r))
 
     def predicted(self, near: Neighbours) -> tuple[Numbers, bool]:
         """The numbers, and whether they are known."""

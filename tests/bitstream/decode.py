@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Decodes a byte stream of the neighbour code, written from docs/formats/bitstream.md and docs/formats/rig.md alone.
 
-Shares no line with the plugin, so that where both give the same pictures the documents say what the plugin does.
+Shares no line with the plugin.
 
 usage: decode.py FILE OUT_PREFIX
 Writes for each view N of the rig, one picture of its full size for each frame set, one behind the other:
@@ -19,30 +19,30 @@ from array import array
 from collections import Counter
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import accumulate
 from math import floor, hypot
 from typing import BinaryIO, Callable, Iterable, Iterator, NamedTuple, Union
 
 import compact
 from compact import UNKNOWN, Unknown
 
-VERSION = 3
+VERSION = 4
 PLAIN, PACKED, ENTROPY = 0, 1, 2
 SLICE, RIG_VIEW, ACCESS_UNIT = 1, 2, 3
-START_CODE = b"\x00RCU"
+MAGIC = b"\x00RCU"
 UNIT_HEADER = struct.Struct("<BBH")
-ACCESS_UNIT_FIELDS = struct.Struct("<IQQ")
+ACCESS_UNIT_FIELDS = struct.Struct("<4sIQQ")
 SLICE_FIELDS = struct.Struct("<BBBBIQ8H")
 RIG_VIEW_FIELDS = struct.Struct("<BBII")
 ACCESS_UNIT_SIZE = UNIT_HEADER.size + ACCESS_UNIT_FIELDS.size
 MAX_ACCESS_UNIT = 32 << 20
 MAX_SLICES = 1 << 17  # of an access unit
 MAX_RIG_PIXELS = 1 << 27
-MOST_REPEATS = 8  # of the pixels of a view's ROI, in its slices
-KEY, INVERSE_DEPTH, REFERENCE = 1, 2, 4
-FULL_PIXEL, INVALID, SAME_AS_EARLIER = 4, 5, 6
+KEY, REFERENCE = 1, 4
+FULL_PIXEL, INVALID = 4, 5
 NEIGHBOURS = ((-1, 0), (-1, -1), (0, -1), (1, -1))  # of symbols 0 to 3: columns to the right, rows down
 COUNTED = "access units", "slices", "damaged slices", "damaged rig views", "unknown pixels"
-Numbers = tuple[int, ...]  # plain: codes of depth, R, G, B; packed and entropy: Z, Y, Co, Cg
+Numbers = tuple[int, ...]  # of shown pixels: codes of depth, R, G, B; of kept ones Z, Y, Co, Cg
 
 
 class Damaged(Exception):
@@ -80,7 +80,6 @@ class Slice(NamedTuple):
     first_column: int
     columns: int
     body: bytes
-    inverse_depth: bool
     reference: bool  # a later frame set may refer to this one
     distance: int  # in frame numbers, to the earlier frame set; 0: key
 
@@ -95,19 +94,15 @@ class Slice(NamedTuple):
     def common(self) -> tuple:
         return *self[6:10], self.frame, self.reference, *self.format()
 
-    def format(self) -> tuple[int, int, bool, bool]:
+    def format(self) -> tuple[int, int]:
         """What the numbers of its pixels mean."""
-        return self.depth_bits, self.colour_bits, self.inverse_depth, self.profile == PLAIN
-
-    def place(self) -> tuple[int, int, int, int]:
-        """Where it lies; slices of a view are taken in this order."""
-        return self.first_column, self.first_row, self.columns, self.rows
+        return self.depth_bits, self.colour_bits
 
     def too_short(self) -> bool:
         """It is shorter than any that gives its pixels."""
         if not self.rows:
             return False
-        bits = {PLAIN: 3 * self.rows * self.columns, PACKED: 48 + 2 * self.rows, ENTROPY: 160}[self.profile]
+        bits = {PLAIN: 3 * self.rows * self.columns, PACKED: 48 + 2 * self.rows, ENTROPY: 96}[self.profile]
         return 8 * len(self.body) < bits
 
     def pixel_bits(self) -> int:
@@ -146,7 +141,7 @@ class Picture:
         values = [(code * 255 + maximum // 2) // maximum for code in range(maximum + 1)]
         for at, pixel in enumerate(self.pixels):
             if pixel is not None and not isinstance(pixel, Unknown):
-                depth, *colour = pixel if self.like.profile == PLAIN else compact.codes(pixel, maximum)
+                depth, *colour = pixel
                 depths[at] = depth_codes(self.like, self.view)[1](depth)
                 colours[3 * at : 3 * at + 3] = bytes(values[code] for code in colour)
         return depths, colours
@@ -169,9 +164,8 @@ class Reader:
         """The pictures of each access unit that is a frame set, by view-id."""
         position = self.find_access_unit(0)
         while position >= 0:
-            head = position + len(START_CODE)
-            size = ACCESS_UNIT_FIELDS.unpack_from(self.data, head + UNIT_HEADER.size)[0]
-            begin = head + ACCESS_UNIT_SIZE
+            size = ACCESS_UNIT_FIELDS.unpack_from(self.data, position + UNIT_HEADER.size)[1]
+            begin = position + ACCESS_UNIT_SIZE
             end = self.end_of(begin, size)
             pictures = self.read_access_unit(self.data[begin:end])
             if pictures is not None:
@@ -181,33 +175,23 @@ class Reader:
 
     def end_of(self, begin: int, size: int) -> int:
         """Where the access unit ends whose units begin here and are said to be so many bytes."""
-        told = min(begin + size, len(self.data))
-        end = begin
-        for kind, flags, payload in units(self.data[begin:told]):
-            end += UNIT_HEADER.size + len(payload)
-        fills = end == begin + size
-        if told < begin + size and self.breaks_off(end, begin + size):
-            end = told
+        end = min(begin + size, len(self.data))
         inner = self.find_access_unit(begin)
         if not begin <= inner < end:
             return end
+        sizes = (UNIT_HEADER.size + len(payload) for _, _, payload in units(self.data[begin:end]))
+        *begins, last = accumulate(sizes, initial=begin)
+        fills = last == begin + size and all(self.find_access_unit(at) != at for at in begins)
         behind = end == len(self.data) or self.find_access_unit(end) == end
         return end if fills and behind else inner
 
-    def breaks_off(self, position: int, limit: int) -> bool:
-        """Whether the file ends in a unit that could have been sound."""
-        if position + UNIT_HEADER.size > len(self.data):
-            return position + UNIT_HEADER.size <= limit
-        kind, _, size = UNIT_HEADER.unpack_from(self.data, position)
-        return kind >> 4 == VERSION and UNIT_HEADER.size <= size <= limit - position
-
     def find_access_unit(self, position: int) -> int:
-        """Where the next start code with a sound access-unit unit is; -1: nowhere."""
-        while (position := self.data.find(START_CODE, position)) >= 0:
-            head = position + len(START_CODE)
-            if head + ACCESS_UNIT_SIZE <= len(self.data):
-                kind, flags, size = UNIT_HEADER.unpack_from(self.data, head)
-                length = ACCESS_UNIT_FIELDS.unpack_from(self.data, head + UNIT_HEADER.size)[0]
+        """Where the next sound access-unit unit is; -1: nowhere."""
+        while (magic := self.data.find(MAGIC, position + UNIT_HEADER.size)) >= 0:
+            position = magic - UNIT_HEADER.size
+            if position + ACCESS_UNIT_SIZE <= len(self.data):
+                kind, flags, size = UNIT_HEADER.unpack_from(self.data, position)
+                length = ACCESS_UNIT_FIELDS.unpack_from(self.data, magic)[1]
                 sound = kind == VERSION << 4 | ACCESS_UNIT and flags <= KEY and size == ACCESS_UNIT_SIZE
                 if sound and length <= MAX_ACCESS_UNIT:
                     return position
@@ -251,39 +235,29 @@ class Reader:
         self.counts["damaged slices"] += len(parts) - len(agreeing)
         picture = Picture(self.views[frequent.view], frequent)
         kept = self.kept(picture) if frequent.reference else None
-        drawn = set()
-        pixels_so_far = 0
-        for part in sorted(agreeing, key=Slice.place):
-            pixels_so_far += 0 if part.too_short() else part.rows * part.columns
-            if part.place() in drawn:
-                continue
-            if pixels_so_far > MOST_REPEATS * frequent.width * frequent.height and not part.too_short():
+        ends = [0] * frequent.width  # of the slices that were taken, by column
+        for part in sorted(agreeing, key=lambda part: part.first_row):
+            columns = slice(part.first_column, part.first_column + part.columns)
+            if part.too_short() or any(end > part.first_row for end in ends[columns]):
                 self.counts["damaged slices"] += 1
                 continue
-            lost = part.rows * part.columns
+            ends[columns] = [part.first_row + part.rows] * part.columns
             try:
-                pixels = kept_pixels = decode_slice(part, picture.view, self.referred(part))
-                drawn.add(part.place())
+                pixels = decode_slice(part, picture.view, self.referred(part))
+                picture.put(part, [shown(part, pixel) for pixel in pixels])
             except Damaged:
                 self.counts["damaged slices"] += 1
-                pixels, kept_pixels = [None] * lost, [UNKNOWN] * lost
-            if part.place() in drawn or not part.too_short():
-                picture.put(part, pixels)
-                if kept:
-                    kept.put(part, kept_pixels)
+                pixels = [UNKNOWN] * (part.rows * part.columns)
+            if kept:
+                kept.put(part, pixels)
         self.counts["unknown pixels"] += picture.pixels.count(UNKNOWN)
         return picture
 
     def kept(self, picture: Picture) -> Picture | None:
         """What takes the pixels of a picture for later frame sets to refer to; None if it comes too late."""
         latest = self.earlier.get(picture.view.id, [])
-        age = (latest[0].like.frame - picture.like.frame) % (1 << 32) if latest else 0
-        if 1 <= age <= 255:
+        if latest and (latest[0].like.frame - picture.like.frame) % (1 << 32) <= 255:
             return None
-        if latest and latest[0].like.frame == picture.like.frame:
-            if latest[0].like.common() == picture.like.common():
-                return latest[0]
-            latest = latest[1:]
         kept = Picture(picture.view, picture.like)
         kept.lose_roi()
         self.earlier[picture.view.id] = [kept] + latest[:1]
@@ -357,7 +331,7 @@ def parse_rig_blob(blob: bytes) -> View:
 
 def is_lens(lens: list[float]) -> bool:
     """Focal lengths and principal point lie within the limits of docs/formats/rig.md."""
-    return all(0 < f <= 1e6 for f in lens[:2]) and all(abs(c) <= 1e6 for c in lens[2:])
+    return all(1e-3 <= f <= 1e6 for f in lens[:2]) and all(abs(c) <= 1e6 for c in lens[2:])
 
 
 def is_pose(pose: list[float]) -> bool:
@@ -376,13 +350,15 @@ def parse_slice(flags: int, payload: bytes) -> Slice:
     """Reads and checks what can be checked without the rig."""
     key = flags & KEY
     size = SLICE_FIELDS.size + (0 if key else 1)
-    if flags & ~(KEY | INVERSE_DEPTH | REFERENCE) or len(payload) < size:
+    if flags & ~(KEY | REFERENCE) or len(payload) < size:
         raise Damaged("flags or size")
     distance = 0 if key else payload[size - 1]
     if not key and not distance:
         raise Damaged("distance")
-    scale, reference = bool(flags & INVERSE_DEPTH), bool(flags & REFERENCE)
-    part = Slice(*SLICE_FIELDS.unpack_from(payload), payload[size:], scale, reference, distance)
+    reference = bool(flags & REFERENCE)
+    part = Slice(*SLICE_FIELDS.unpack_from(payload), payload[size:], reference, distance)
+    if part.profile == PLAIN and (reference or not key):
+        raise Damaged("references of profile plain")
     if part.view > 63 or part.profile > 2 or not 6 <= part.depth_bits <= 16 or not 4 <= part.colour_bits <= 8:
         raise Damaged("view, profile or bits")
     if any(part[6:14]) or not key:
@@ -391,6 +367,13 @@ def parse_slice(flags: int, payload: bytes) -> Slice:
         if part.first_row + part.rows > part.height or part.first_column + part.columns > part.width:
             raise Damaged("beyond the ROI")
     return part
+
+
+def shown(part: Slice, pixel: Pixel) -> Pixel:
+    """A decoded pixel as codes of depth, R, G and B."""
+    if part.profile == PLAIN or pixel is None or isinstance(pixel, Unknown):
+        return pixel
+    return compact.codes(pixel, (1 << part.colour_bits) - 1)
 
 
 def decode_slice(part: Slice, view: View, earlier: Callable[[int, int], Pixel]) -> list[Pixel]:
@@ -402,8 +385,6 @@ def decode_slice(part: Slice, view: View, earlier: Callable[[int, int], Pixel]) 
         return decode_compact_slice(part, view, None if not part.distance else compact.Earlier(x, y, earlier))
     count, columns = part.rows * part.columns, part.columns
     symbols_size = (3 * count + 7) // 8
-    if part.too_short():
-        raise Damaged("short of symbols")
     symbol_bits = int.from_bytes(part.body[:symbols_size], "little")
     if symbol_bits >> 3 * count:
         raise Damaged("bits set behind the symbols")
@@ -419,8 +400,6 @@ def decode_slice(part: Slice, view: View, earlier: Callable[[int, int], Pixel]) 
             pixels.append(None)
         elif symbol == FULL_PIXEL:
             pixels.append(next(full))
-        elif symbol == SAME_AS_EARLIER and part.distance:
-            pixels.append(earlier(x + column, y + row) or UNKNOWN)
         elif symbol > INVALID:
             raise Damaged("reserved symbol")
         else:
@@ -433,17 +412,8 @@ def decode_slice(part: Slice, view: View, earlier: Callable[[int, int], Pixel]) 
 
 def depth_codes(part: Slice, view: View) -> tuple[int, Callable[[int], int]]:
     """The greatest depth code of a slice, and what gives the depth of a code, in depth units."""
-    near, far, extent = view.near, view.far, view.far - view.near
-    greatest = (1 << part.depth_bits) - 1
-
-    def inverse(code: int) -> int:
-        divisor = far * last - code * extent
-        return (near * far * last + divisor // 2) // divisor
-
-    if part.inverse_depth:
-        last = min((far * extent + near - 1) // near, greatest)
-        return last, inverse
-    last = min(extent, greatest)
+    near, extent = view.near, view.far - view.near
+    last = min(extent, (1 << part.depth_bits) - 1)
     return last, lambda code: near + (code * extent + last // 2) // last
 
 

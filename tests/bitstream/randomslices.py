@@ -105,7 +105,7 @@ class RandomPacked(Chooser, compact.PackedData):
         return chosen
 
     def residual(self, near: Neighbours) -> Numbers:
-        code = compact.PATTERNS[1 if not any(near) else 2 if self.exact else 0]
+        code = compact.PATTERNS[int(self.exact)]
         numbers = tuple(self.number_or_0(6) if self.rng.random() < 0.98 else self.number_or_0(18) for _ in range(4))
         if not any(numbers) and 0 not in code.values():
             numbers = (1, 0, 0, 0)
@@ -181,7 +181,7 @@ class RandomEntropy(Chooser, compact.EntropyData):
             choice = 5
             if not self.key or any(near):
                 choice = self.rng.choice([i for i in range(4) if near[i]] + [4, 5] + ([] if self.key else [EARLIER]))
-                self.put(count % 4, self.choices[left + 8 * group[near[2]] + 40 * group[near[3]]], choice)
+                self.put(count % 2, self.choices[left + 8 * group[near[2]] + 40 * group[near[3]]], choice)
                 count += 1
             choices[x] = choice
             left = choice + 1
@@ -190,7 +190,7 @@ class RandomEntropy(Chooser, compact.EntropyData):
         before: Optional[Numbers] = None
         for x, choice in enumerate(choices):
             residual = self.residual(before, *activities[x : x + 2]) if choice == 5 else (0, 0, 0, 0)
-            before = None if choice is None else tuple(min(abs(r), 21) for r in residual)
+            before = None if choice is None else tuple(abs(r) for r in residual)
             row.append(Coded(choice, residual))
         return row
 
@@ -202,9 +202,9 @@ class RandomEntropy(Chooser, compact.EntropyData):
             else:
                 total = left[i] + upper[i] + (upper_right[i] if upper_right else 0)
                 a = sum(total >= least for least in (1, 2, 3, 5, 8, 13, 21))
-            self.put(i, self.numbers[10 * i + a], symbol_of(number))
+            self.put(i % 2, self.numbers[10 * i + a], symbol_of(number))
         for i, number in enumerate(numbers):
-            self.put_rest(i, number)
+            self.put_rest(i % 2, number)
         return numbers
 
     def finish(self) -> None:
@@ -215,13 +215,13 @@ class RandomEntropy(Chooser, compact.EntropyData):
 
         odd_state: one that begins, against the rules, with another number.
         """
-        states, words = [(1 << 20) + (k == odd_state) for k in range(4)], []
+        states, words = [(1 << 20) + (k == odd_state) for k in range(2)], []
         for k, start, size in reversed(self.coded):
             if states[k] >= size << 21:
                 words.append((k, states[k] % 65536))
                 states[k] //= 65536
             states[k] = 32768 * (states[k] // size) + states[k] % size + start
-        for k in (3, 2, 1, 0):
+        for k in (1, 0):
             if states[k] >> 32:
                 words.append((-1 - k, states[k] % 65536))
                 states[k] //= 65536
@@ -235,6 +235,49 @@ class RandomEntropy(Chooser, compact.EntropyData):
 def symbol_of(number: int) -> int:
     size = abs(number)
     return 2 * size - (number > 0) if size <= 4 else min(7 + (size - 3).bit_length(), 14)
+
+
+# ---- single rows ----
+
+ROW = 8  # columns of the rows below
+ALL_VALID = signed_golomb(1, -ROW) + signed_golomb(1, ROW)  # of a row below one of invalid pixels
+
+
+def packed_pixel(residual: int, first: bool, order: int = 0) -> str:
+    """A pixel in the first row, steps 1, of which only Z has a residual."""
+    if not residual and not first:
+        return prefix(compact.CHOICES[3], 4)
+    start = "" if first else prefix(compact.CHOICES[3], 5)
+    bits = start + prefix(compact.PATTERNS[1], 1 if residual else 0)
+    return bits + (str(int(residual < 0)) + golomb(order, abs(residual) - 1) if residual else "")
+
+
+def packed_row(depths: list[int], last: int) -> str:
+    """A first row of pixels of these depth codes."""
+    before = [last // 2, *depths]
+    return ALL_VALID + "".join(packed_pixel(depth - before[i], i == 0) for i, depth in enumerate(depths))
+
+
+def packed_motion(*motion: int) -> str:
+    return "0" + "".join(signed_golomb(1, v) for v in motion)
+
+
+class Symbols(RandomEntropy):
+    """Symbols of one row."""
+
+    def __init__(self, rng: random.Random, key: bool) -> None:
+        super().__init__(rng, (1, 1, 1, 1), key)
+
+    def residual(self, context: int, *numbers: int) -> None:
+        for i, number in enumerate(numbers):
+            self.put(i % 2, self.numbers[10 * i + context], symbol_of(number))
+        for i, number in enumerate(numbers):
+            self.put_rest(i % 2, number)
+
+    def one_pixel(self) -> None:
+        """Runs of a slice of one pixel, which is valid."""
+        self.put_later(False, -1)
+        self.put_later(True, 1)
 
 
 def body(
@@ -254,7 +297,7 @@ def body(
     data = RandomPacked(rng, four, orders) if profile == compact.PACKED else RandomEntropy(rng, four, earlier is None)
     head = steps[0].to_bytes(2, "little") + bytes(steps[1:])
     # The constructor reads a slice of no pixels first.
-    minimal = head + bytes(2) if profile == compact.PACKED else head + bytes(16 + 8)
+    minimal = head + bytes(2) if profile == compact.PACKED else head + bytes(8 + 8)
     part.__init__(profile, minimal, columns, *limits, earlier)
     part.data = data
     read_runs, compact.read_runs = compact.read_runs, data.runs

@@ -43,6 +43,15 @@ units_of (std::span<const guint8> bytes)
   return units;
 }
 
+/** The slices of a coded buffer. */
+inline std::vector<std::vector<guint8>>
+slices_of (GstBuffer *buffer)
+{
+  auto units = units_of (bytes_of (buffer));
+  std::erase_if (units, [] (const auto &unit) { return (unit[0] & 15) != int (UnitType::kSlice); });
+  return units;
+}
+
 inline GstBuffer *
 buffer_of (const std::vector<std::vector<guint8>> &units, GstClockTime time = 0)
 {
@@ -55,8 +64,7 @@ buffer_of (const std::vector<std::vector<guint8>> &units, GstClockTime time = 0)
   return buffer;
 }
 
-/** One element with its properties, which gst_harness_new_parse() would hide in a bin. Encoder and
- * parser are asked for access units, until other sink caps are set. */
+/** One element with its properties, which gst_harness_new_parse() would hide in a bin. */
 inline GstHarness *
 harness_of (const std::string &launch)
 {
@@ -64,8 +72,6 @@ harness_of (const std::string &launch)
   fail_unless (element != nullptr);
   GstHarness *h = gst_harness_new_with_element (element, "sink", "src");
   gst_object_unref (element);
-  if (launch.starts_with ("neighbourcodeenc") || launch.starts_with ("neighbourcodeparse"))
-    gst_harness_set_sink_caps_str (h, kAccessUnitsOrSlices);
   return h;
 }
 
@@ -78,10 +84,10 @@ encoded_units (const Rig &rig, GstBuffer *frame_set,
   GstHarness *h = harness_of (std::string ("neighbourcodeenc profile=plain ") + properties);
   gst_harness_set_src_caps (h, range_caps (rig));
   GstBuffer *coded = gst_harness_push_and_pull (h, frame_set);
-  const auto units = units_of (bytes_of (coded));
+  const auto slices = slices_of (coded);
   gst_buffer_unref (coded);
   gst_harness_teardown (h);
-  return units;
+  return slices;
 }
 
 inline SliceHeader

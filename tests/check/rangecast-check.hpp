@@ -83,10 +83,6 @@ make_frame_set (const Rig &rig, GstClockTime time = 0, Roi roi = {})
   return buffer;
 }
 
-/** For the sink of a harness, whose default takes anything and so is sent a byte stream. */
-inline constexpr const char *kAccessUnitsOrSlices =
-    "video/x-neighbour-code,alignment={access-unit,slice}";
-
 /** How many times as long as usual a camera's work may take: RANGECAST_SLOWDOWN, else 1. */
 inline int
 slowdown ()
@@ -138,6 +134,28 @@ play_to_the_end (GstElement *pipeline)
   gst_message_unref (message);
   gst_object_unref (bus);
   gst_element_set_state (pipeline, GST_STATE_NULL);
+}
+
+/** A counter in `stats`, or in another property that holds a structure. */
+inline guint64
+stats_field (GstElement *element, const char *name, const char *property = "stats")
+{
+  GstStructure *stats = nullptr;
+  guint64 value = 0;
+  g_object_get (element, property, &stats, nullptr);
+  fail_unless (gst_structure_get_uint64 (stats, name, &value), "no %s in %s", name, property);
+  gst_structure_free (stats);
+  return value;
+}
+
+/** The same of an element in a harness. */
+inline guint64
+stats_field (GstHarness *h, const char *factory, const char *name)
+{
+  GstElement *element = gst_harness_find_element (h, factory);
+  const guint64 value = stats_field (element, name);
+  gst_object_unref (element);
+  return value;
 }
 
 } // namespace rangecast::testing

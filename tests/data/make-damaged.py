@@ -12,8 +12,8 @@ from pathlib import Path
 sys.path.append(str(Path(__file__).resolve().parents[1] / "bitstream"))
 import compact  # its tables of prefix codes
 
-START_CODE = b"\x00RCU"
-SLICE, RIG_VIEW, ACCESS_UNIT = 0x31, 0x32, 0x33
+MAGIC = b"\x00RCU"
+SLICE, RIG_VIEW = 0x41, 0x42
 
 
 def units_of(data: bytes) -> list[list[bytes]]:
@@ -21,8 +21,7 @@ def units_of(data: bytes) -> list[list[bytes]]:
     access_units: list[list[bytes]] = []
     position = 0
     while position < len(data):
-        if data[position : position + 4] == START_CODE:
-            position += 4
+        if data[position + 4 : position + 8] == MAGIC:
             access_units.append([])
         size = struct.unpack_from("<H", data, position + 2)[0]
         access_units[-1].append(data[position : position + size])
@@ -33,7 +32,7 @@ def units_of(data: bytes) -> list[list[bytes]]:
 def access_unit(head: bytes, units: list[bytes], claimed: int | None = None) -> bytes:
     """Bytes of a stream; the size may be a lie."""
     size = sum(map(len, units)) if claimed is None else claimed
-    return START_CODE + head[:4] + struct.pack("<I", size) + head[8:] + b"".join(units)
+    return head[:8] + struct.pack("<I", size) + head[12:] + b"".join(units)
 
 
 def patched(unit: bytes, at: int, *values: int) -> bytes:
@@ -45,13 +44,13 @@ def longer(unit: bytes, tail: bytes) -> bytes:
 
 
 def small_slice(
-    like: bytes, row: int, rows: int, symbols: str, codes: list[int], tail: int = 0, more: bytes = b"", distance: int | None = None
+    like: bytes, row: int, rows: int, symbols: str, codes: list[int], tail: int = 0, more: bytes = b""
 ) -> bytes:
     """A slice of 14 and 5 bits at the left of a ROI, its symbols as octal digits, with bits behind its full pixels."""
     size = (3 * len(symbols) + 7) // 8
     full = sum((code | code * 77 % 32768 << 14) << 29 * i for i, code in enumerate(codes)) | tail << 29 * len(codes)
     body = int(symbols[::-1], 8).to_bytes(size, "little") + full.to_bytes((29 * len(codes) + 7) // 8, "little") + more
-    return slice_of(like, 0, row, rows, len(symbols) // rows, body, distance)
+    return slice_of(like, 0, row, rows, len(symbols) // rows, body, None)
 
 
 def slice_of(like: bytes, profile: int, row: int, rows: int, columns: int, body: bytes, distance: int | None) -> bytes:
@@ -100,7 +99,7 @@ SMALL_SLICES: list[tuple] = [
     (1, "40054", [0, 8500]),
     (1, "40054", [0, 8501]),  # beyond the greatest
     (1, "40654", [1, 2]),  # reserved symbols
-    (1, "70", []),
+    (1, "74", [41]),
     (1, "04", [3]),  # no pixel to the left
     (1, "454055", [4, 5]),
     (1, "4505", [6]),  # an invalid one
@@ -121,20 +120,6 @@ SMALL_SLICES: list[tuple] = [
     (1, "4", [22]),
 ]
 
-# The same without key: symbols, full pixels, distance. They refer to EARLIER_SYMBOLS.
-EARLIER_SYMBOLS = "44554"
-LATER_SLICES: list[tuple] = [
-    (1, "66544", [23, 24], 1),
-    (1, "66666", [], 1),  # two that are invalid in the earlier one
-    (2, "6666644420", [25, 26, 27], 1),  # and neighbours that equal such
-    (1, "66504", [28], 1),  # an invalid pixel to the left
-    (1, "67544", [29, 30], 1),  # a reserved symbol
-    (1, "64544", [31, 32], 0),  # refers to itself
-    (1, "64544", [33, 34], 2),  # to one that is not there
-    (1, "66544", [35, 36], None),  # with key
-    (1, "44544", [37, 38, 39, 40], None),
-]
-
 VALID = 6  # pixels of the rows below
 ALL_VALID = golomb(1, -VALID) + golomb(1, VALID)  # runs: no invalid pixel, then all valid; also of pixels that are earlier
 LIKE_LEFT = "".join(prefix(compact.CHOICES[kind], 0) for kind in (3, 1, 1, 1, 1))
@@ -152,36 +137,22 @@ PACKED_ROWS = [motion(*v) + ALL_VALID + ALL_VALID for v in MOTIONS] + [
     motion(1, 0, 0) + ALL_VALID + ALL_VALID + "1",  # a bit left over
     motion(1, 0, 0) + ALL_VALID,  # it ends too soon
 ]
-ENTROPY_ROWS = [b"", b"\xff" * 15, bytes(16), *(bytes((i, 17, 34, 51)) * 8 for i in (0, 64, 128, 192)), bytes(40), b"\xff" * 40]
+ENTROPY_ROWS = [b"", b"\xff" * 7, bytes(8), *(bytes((i, 17, 34, 51)) * 8 for i in (0, 64, 128, 192)), bytes(40), b"\xff" * 40]
 
 
 def without_key(one: list[bytes]) -> list[list[bytes]]:
     """Frame sets for what the document says of slices without key, from a slice of each view."""
     first, other = one[0], one[-1]
-    earlier = [small_slice(first, 2 * i, 1, EARLIER_SYMBOLS, [90 + 3 * i, 800 - i, 77]) for i in range(15)]
-    earlier += [small_slice(other, 0, 1, EARLIER_SYMBOLS, [1, 2, 3])]
-    later = [small_slice(first, 2 * i, *parts[:3], distance=parts[3]) for i, parts in enumerate(LATER_SLICES)]
-    no_distance = longer(patched(small_slice(first, 28, 1, "4", [3]), 1, 0)[:36], b"")
     keys = [packed(first, i, VALID, KEY_ROW) for i in range(31)] + [entropy(other, 0, 4, ENTROPY_ROWS[4])]
     rows = [packed(first, i, VALID, bits, 1) for i, bits in enumerate(PACKED_ROWS)]
     noise = [entropy(other, i, 12, data, 1) for i, data in enumerate(ENTROPY_ROWS)]
     return [
-        frame_set(earlier, 10, 4),
-        # No reference itself, as the next ones.
-        frame_set([*later, no_distance, packed(first, 30, VALID, KEY_ROW)], 11),
-        # Of other bits, of another profile, of two views one without pixels and without key.
-        [patched(unit, 6, 13) for unit in frame_set(later, 11)],
-        frame_set(rows + [patched(slice_of(other, 0, 0, 0, 0, b"", 1), 20, *bytes(16))], 11),
-        # Repeated, as a reference: refers to the same one both times.
-        frame_set(later[:5], 11, 4),
-        frame_set(later[:3] + later[4:6], 11, 4),
-        frame_set(later[:4], 12, 4),
-        # Slices that lack the flag of the others.
-        frame_set(later[:4], 13, 4)[:3] + frame_set(later[3:4], 13),
-        # Packed and entropy.
         frame_set(keys, 20, 4),
         frame_set(rows + noise, 21, 4),
         frame_set(rows[::-1] + noise, 22, 4),
+        frame_set(rows, 22, 4),  # again: not kept
+        [patched(unit, 6, 13) for unit in frame_set(rows, 23)],  # of other bits
+        frame_set(rows + [patched(slice_of(other, 1, 0, 0, 0, b"", 1), 20, *bytes(16))], 23),
         frame_set(rows, 24),
     ]
 
@@ -193,17 +164,17 @@ def main() -> None:
     head = coarse[1][0]
     one = [unit for unit in coarse[1] if unit[0] == SLICE]
     two = [unit for unit in coarse[2] if unit[0] == SLICE]
-    unknown = bytes((0x39, 0xFF, 8, 0, 1, 2, 3, 4))
+    unknown = bytes((0x49, 0xFF, 8, 0, 1, 2, 3, 4))
     damaged = [
-        # Rubbish, a start code that means nothing, and access units before the rig is known.
-        b"rubbish" + START_CODE + b"no access unit behind it, but as many bytes",
+        # Rubbish, the beginning of an access-unit unit that is not sound, and access units before the rig is known.
+        b"rubbish" + head[:8] + b"no access unit behind it, but as many bytes",
         access_unit(head, one),
         access_unit(head, rig[1:]),
         # The rig's last view comes behind the slices, in another access unit than the others.
         access_unit(head, one + rig[:1]),
         # Any order, repetition, units to be passed over.
-        access_unit(head, two[::-1] + two[3:5] + [unknown, head] + two[1:2]),
-        # Slices that are as if they had not come: the depth scale that others have not, another profile, too few depth bits, too many,
+        access_unit(head, two[::-1] + two[3:5] + [unknown, patched(head, 1, 2)] + two[1:2]),
+        # Slices that are as if they had not come: a reserved flag, another profile, too few depth bits, too many,
         # too many colour bits, a view that the rig lacks, rows beyond the ROI; another frame number, another ROI.
         access_unit(head, [patched(one[0], 1, 3), patched(one[1], 5, 1)] + one[2:5] + [patched(one[5], 6, 5)] + one[6:]),
         access_unit(head, one[:1] + [patched(one[1], 6, 17), patched(one[2], 7, 9)] + one[3:5] + [patched(one[5], 4, 9)]),
@@ -219,7 +190,7 @@ def main() -> None:
         access_unit(head, [patched(unit, 1, 0) for unit in one]),
         *(access_unit(patched(head, 1, 0), units) for units in without_key(one)),
         # What follows a unit of another version, or one that is too short, cannot be read.
-        access_unit(head, two[:3] + [patched(unknown, 0, 0x49)] + two[3:]),
+        access_unit(head, two[:3] + [patched(unknown, 0, 0x39)] + two[3:]),
         access_unit(head, two[:5] + [patched(unknown, 2, 3)] + two[5:]),
         # Nothing but rig views is no frame set; a unit of unknown type makes one without views.
         access_unit(head, rig),

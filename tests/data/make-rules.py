@@ -8,119 +8,17 @@ Pixels are random; each call makes the same ones. tests/bitstream/perturb.py lis
 
 from __future__ import annotations
 
-import random
+import math
 import struct
 import sys
-from importlib import import_module
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "bitstream"))
+# First, because it finds tests/bitstream.
+from stream import ENTROPY, KEY, PACKED, PLAIN, REFERENCE, Stream, Units, damaged, rig_view, unit_of
+
 import compact
-import decode
 import randomslices
-
-damaged = import_module("make-damaged")
-PLAIN, PACKED, ENTROPY = 0, 1, 2
-KEY, INVERSE, REFERENCE = 1, 2, 4
-UNIT = 1e-3  # metres a depth unit
-Units = list[bytes]
-Place = tuple[int, int, int, int]  # first column, first row, columns, rows; of a ROI x, y, width, height
-
-
-def unit_of(kind: int, flags: int, content: bytes) -> bytes:
-    return struct.pack("<BBH", 0x30 | kind, flags, 4 + len(content)) + content
-
-
-def rig_view(
-    number: int = 0, total: int = 1, view_id: int = 0, size: tuple[int, int] = (24, 20), near: float = 300, far: float = 1300,
-    name: bytes = b"", rate: tuple[int, int] = (15, 1), flags: int = 0, rotation: float = 1.0, tail: bytes = b"",
-) -> bytes:
-    """near and far in depth units."""
-    blob = b"RCRG" + bytes((1, 1, view_id, 0, len(name))) + name + struct.pack("<2H4dB", *size, 20, 20, 10, 10, 0)
-    blob += struct.pack("<15d", rotation, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, UNIT, near * UNIT, far * UNIT)
-    return unit_of(2, flags, struct.pack("<BBII", number, total, *rate) + blob + tail)
-
-
-class Stream:
-    """Access units, and what the next ones can refer to."""
-
-    def __init__(self, seed: int, *rig: bytes) -> None:
-        self.rng = random.Random(seed)
-        self.reader = decode.Reader(b"")
-        self.bytes = b""
-        self.rig = list(rig)
-        self.size = 24, 20  # of the views' images
-        self.bits = 10, 6
-        self.inverse = 0
-        if rig:
-            self.reader.read_access_unit(b"".join(rig))
-
-    def add(self, units: Units, **head: int) -> None:
-        """An access unit; the first one also holds the rig."""
-        units = [*self.rig, *units]
-        self.rig = []
-        self.reader.read_access_unit(b"".join(units))
-        self.raw(units, **head)
-
-    def raw(self, units: Units, flags: int = 1, claimed: int | None = None, kind: int = 0x33, size: int = 24) -> None:
-        head = struct.pack("<BBHIQQ", kind, flags, size, 0, (1 << 64) - 1, 77)
-        self.bytes += damaged.access_unit(head, units, claimed)
-
-    def header(
-        self, place: Place, number: int, profile: int = PLAIN, flags: int = KEY, view: int = 0,
-        roi: Place | None = None, distance: int | None = None, capture: int = 99,
-    ) -> tuple[int, bytes]:
-        """Flags and fields of a slice. place: first column, first row, columns, rows; with a distance it is without key"""
-        column, row, columns, rows = place
-        fields = *(roi or (0, 0, *self.size)), row, rows, column, columns
-        head = struct.pack("<4BIQ8H", view, profile, *self.bits, number, capture, *fields)
-        flags = flags | self.inverse if distance is None else (flags | self.inverse) & ~KEY
-        return flags, head + (b"" if distance is None else bytes((distance,)))
-
-    def slice(self, place: Place, number: int, body: bytes, **more: int) -> bytes:
-        flags, head = self.header(place, number, **more)
-        return unit_of(1, flags, head + body)
-
-    def limits(self, view: int = 0) -> tuple[int, int]:
-        """Greatest codes of depth and colour."""
-        flags, head = self.header((0, 0, 1, 1), 0, view=view)
-        part = decode.parse_slice(flags, head)
-        return decode.depth_codes(part, self.reader.views[view])[0], (1 << self.bits[1]) - 1
-
-    def plain(self, place: Place, number: int, symbols: str | None = None, **more: int) -> bytes:
-        """A slice of random symbols, or these and random full pixels."""
-        columns, rows = place[2:]
-        last, most = self.limits(more.get("view", 0))
-        depth_bits, colour_bits = self.bits
-        if symbols is None:
-            symbols = ""
-            for i in range(columns * rows):
-                x, y = i % columns, i // columns
-                near = [(x + dx, y + dy) for dx, dy in decode.NEIGHBOURS]
-                at = [v * columns + u if 0 <= u < columns and v >= 0 else len(symbols) for u, v in near]
-                valid = [n for n in range(4) if symbols[at[n] : at[n] + 1] not in ("", "5")]
-                symbols += str(self.rng.choice(valid + [4, 4, 5] + ([6, 6] if more.get("distance") else [])))
-        full, at = 0, 0
-        for _ in range(symbols.count("4")):
-            depth = self.rng.choice((0, last, self.rng.randint(0, last), self.rng.randint(0, last)))
-            colours = [self.rng.choice((0, most, self.rng.randint(0, most))) for _ in range(3)]
-            for value, bits in ((depth, depth_bits), *((colour, colour_bits) for colour in colours)):
-                full |= value << at
-                at += bits
-        body = int("0" + symbols[::-1], 8).to_bytes((3 * len(symbols) + 7) // 8, "little") + full.to_bytes((at + 7) // 8, "little")
-        return self.slice(place, number, body, **more)
-
-    def compact(
-        self, profile: int, place: Place, number: int, steps: tuple[int, int, int] = (1, 1, 1), odd_state: int | None = None, **more: int
-    ) -> bytes:
-        """A random slice of profile packed or entropy."""
-        flags, head = self.header(place, number, profile=profile, **more)
-        part = decode.parse_slice(flags, head)
-        x, y = part.x + part.first_column, part.y + part.first_row
-        earlier = compact.Earlier(x, y, self.reader.referred(part)) if part.distance else None
-        body = randomslices.body(self.rng, profile, part.rows, part.columns, steps, self.limits(part.view), earlier, odd_state)
-        return unit_of(1, flags, head + body)
-
+from randomslices import ALL_VALID, ROW, Symbols, packed_motion, packed_pixel, packed_row
 
 # ---- a stream for each chapter ----
 
@@ -139,11 +37,11 @@ def examples() -> Stream:
     bits = [signed(1, -3), signed(1, 2), signed(1, 0)]  # runs: 1 invalid, 2 valid, 1 invalid
     bits += [prefix(compact.PATTERNS[1], 3), "1", unsigned(0, 26), "0", unsigned(0, 2), prefix(compact.CHOICES[3], 0)]
     bits += [signed(1, 0)] * 3 + [prefix(compact.CHOICES[28], 2), prefix(compact.CHOICES[6], 5)]
-    bits += [prefix(compact.PATTERNS[2], 1), "0", unsigned(0, 0)]
+    bits += [prefix(compact.PATTERNS[1], 1), "0", unsigned(0, 0)]
     data = randomslices.packed_bytes((0, 0, 0, 0), bits)
     stream.add([stream.slice(place, 2, head + data, profile=PACKED, roi=roi)])
 
-    coder = Symbols(stream, True)
+    coder = Symbols(stream.rng, True)
     for valid, later in ((False, -3), (True, 2), (False, 0)):
         coder.put_later(valid, later)
     coder.put(0, coder.choices[6], 0)  # class (L) is 6
@@ -158,18 +56,19 @@ def examples() -> Stream:
 
 
 def depths() -> Stream:
-    """Quantisation: each number of bits on both scales. View 1 reaches from below the first to beyond the last depth unit."""
-    rig = [rig_view(0, 2, 0, (8, 4), 299.6, 1300.4), rig_view(1, 2, 1, (8, 4), 0.4, 65535.7)]
+    """Quantisation: each number of bits. View 1 reaches from below the first to beyond the last depth unit."""
+    # Exactly between two depths, and less than in single precision or by the reciprocal of the unit.
+    rig = [rig_view(0, 2, 0, (8, 4), 300.5, 1000.5), rig_view(1, 2, 1, (8, 4), 0.4, 65535.7)]
     stream = Stream(1, *rig)
     stream.size = 8, 4
     for number, (depth_bits, colour_bits) in enumerate(((6, 4), (8, 5), (9, 6), (10, 7), (12, 8), (13, 4), (16, 8))):
-        for stream.inverse in (0, INVERSE):
-            stream.bits = depth_bits, colour_bits
-            stream.add([stream.plain((0, 0, 8, 4), number, "4" * 32, view=view) for view in (0, 1)])
-    stream.inverse = 0
-    # near and far one depth unit apart, and none.
-    stream.reader.read_access_unit(rig_view(0, 2, 0, (8, 4), 300, 301))
-    stream.add([rig_view(0, 2, 0, (8, 4), 300, 301), stream.plain((0, 0, 8, 4), 9, "44440000" + "2" * 24)])
+        stream.bits = depth_bits, colour_bits
+        stream.add([stream.plain((0, 0, 8, 4), number, "4" * 32, view=view) for view in (0, 1)])
+    # near and far one depth unit apart, two, and none.
+    for far in (2, 3):
+        close = rig_view(0, 2, 0, (8, 4), 1, far)
+        stream.reader.read_access_unit(close)
+        stream.add([close, stream.plain((0, 0, 8, 4), 9, "4" * 12 + "2" * 20)])
     stream.reader.read_access_unit(rig_view(0, 2, 0, (8, 4), 300.1, 300.2))
     stream.add([rig_view(0, 2, 0, (8, 4), 300.1, 300.2), stream.plain((0, 0, 8, 4), 9, "4" * 32)])
     return stream
@@ -177,11 +76,11 @@ def depths() -> Stream:
 
 def coded(profile: int) -> Stream:
     """Random slices of a profile, key and not, with some that are lost."""
-    stream = Stream(2 + profile, rig_view(size=(40, 36), far=900))
+    stream = Stream(7 + profile, rig_view(size=(40, 36), far=900))
     stream.size = 40, 36
     roi = 3, 5, 35, 29
-    kinds = (1, 1, 1), (3, 2, 5), (5, 5, 6), (300, 6, 7)
-    places = (0, 0, 19, 13), (0, 13, 19, 16), (19, 0, 16, 9), (19, 9, 16, 20)
+    kinds = (1, 1, 1), (3, 1, 2), (5, 5, 6), (300, 6, 7)
+    places = (0, 0, 13, 13), (0, 13, 13, 16), (13, 0, 22, 9), (13, 9, 22, 20)  # 13 ends a block
     # Each slice of a frame set has other steps; key slices come thrice, for each of the sets of models.
     for number in range(6):
         distance = None if number in (0, 3) else 1
@@ -190,36 +89,15 @@ def coded(profile: int) -> Stream:
             for i, place in enumerate(places)
         ]
         stream.add(parts if number not in (1, 3) else parts[:3])
+    # Only two of the steps are 1.
+    for steps in ((1, 1, 2), (1, 2, 1), (2, 1, 1)):
+        stream.add([stream.compact(profile, (0, 0, 4, 4), 6, steps, roi=roi)])
     # Other bits, the other scale, and depths that are cut to the last code.
     stream.bits = 6, 4
-    stream.inverse = INVERSE
     for number in (6, 7):
         distance = 1 if number == 7 else None
         stream.add([stream.compact(profile, (0, 0, 35, 29), number, (1, 2, 3), roi=roi, flags=KEY | REFERENCE, distance=distance)])
     return stream
-
-
-ROW = 8  # columns of the rows below
-ALL_VALID = randomslices.signed_golomb(1, -ROW) + randomslices.signed_golomb(1, ROW)  # of a row below one of invalid pixels
-
-
-def packed_pixel(residual: int, first: bool, order: int = 0) -> str:
-    """A pixel in the first row, steps 1, of which only Z has a residual."""
-    if not residual and not first:
-        return randomslices.prefix(compact.CHOICES[3], 4)
-    start = "" if first else randomslices.prefix(compact.CHOICES[3], 5)
-    bits = start + randomslices.prefix(compact.PATTERNS[1 if first else 2], 1 if residual else 0)
-    return bits + (str(int(residual < 0)) + randomslices.golomb(order, abs(residual) - 1) if residual else "")
-
-
-def packed_row(depths: list[int], last: int) -> str:
-    """A first row of pixels of these depth codes."""
-    before = [last // 2, *depths]
-    return ALL_VALID + "".join(packed_pixel(depth - before[i], i == 0) for i, depth in enumerate(depths))
-
-
-def packed_motion(*motion: int) -> str:
-    return "0" + "".join(randomslices.signed_golomb(1, v) for v in motion)
 
 
 def damage_of_packed(stream: Stream) -> None:
@@ -250,12 +128,11 @@ def damage_of_packed(stream: Stream) -> None:
     add(wide, orders=(15, 0, 0, 0))
     add(wide, orders=(15, 0, 0, 0), cut=1)
     run = randomslices.signed_golomb
-    # Runs: a second one that is empty, one beyond the columns, one that ends before it begins.
-    one = packed_pixel(5, True)
-    add(run(1, 2 - ROW) + run(1, 0) + run(1, 3 - ROW) + run(1, ROW - 3) + one * 5)
-    add(run(1, 2 - ROW) + run(1, 0) + run(1, 7 - ROW) + run(1, 1) + one)
-    add(run(1, 1 - ROW) + run(1, ROW) + one)
-    add(run(1, 2 - ROW) + run(1, -1) + one)
+    # Runs: a second one that is empty, one that ends before it begins, one beyond the columns.
+    first, next_one = packed_pixel(5, True), packed_pixel(1, False)
+    for later in (0, -1):
+        add(run(1, 2 - ROW) + run(1, later) + run(1, 3 - ROW) + run(1, ROW - 3) + first + next_one * (ROW - 4))
+    add(run(1, 1 - ROW) + run(1, ROW) + first + next_one * (ROW - 2))
     # The greatest residual, and one that is beyond it.
     for size in (1 << 18, (1 << 18) + 1):
         add(ALL_VALID + packed_pixel(-size, True) + packed_pixel(7, False) * (ROW - 1))
@@ -270,27 +147,9 @@ def damage_of_packed(stream: Stream) -> None:
             motion[i] = v
             add(packed_motion(*motion) + ALL_VALID + none + pixels, distance=1)
     for dz in (32767, 32768, 40000):  # unit 2
-        first = randomslices.prefix(compact.PATTERNS[1], 0)
+        first = randomslices.prefix(compact.PATTERNS[0], 0)
         like = randomslices.prefix(compact.CHOICES[3], 4) * (ROW - 1)
         add(packed_motion(0, 0, dz, 0, 0) + ALL_VALID + none + first + like, head=(16, 0, 1, 1), distance=1)
-
-
-class Symbols(randomslices.RandomEntropy):
-    """Symbols of one row."""
-
-    def __init__(self, stream: Stream, key: bool, steps: Place = (1, 1, 1, 1)) -> None:
-        super().__init__(stream.rng, steps, key)
-
-    def residual(self, context: int, *numbers: int) -> None:
-        for i, number in enumerate(numbers):
-            self.put(i, self.numbers[10 * i + context], randomslices.symbol_of(number))
-        for i, number in enumerate(numbers):
-            self.put_rest(i, number)
-
-    def one_pixel(self) -> None:
-        """Runs of a slice of one pixel, which is valid."""
-        self.put_later(False, -1)
-        self.put_later(True, 1)
 
 
 def damage_of_entropy(stream: Stream) -> None:
@@ -304,12 +163,12 @@ def damage_of_entropy(stream: Stream) -> None:
 
     # The greatest numbers, and ones that are too great.
     for size in (3 + (1 << 18) - 1, 3 + (1 << 18), 3 + (1 << 21)):
-        coder = Symbols(stream, True)
+        coder = Symbols(stream.rng, True)
         coder.one_pixel()
         coder.residual(9, 20, -size, 3, 0)
         add(coder)
     # The last word is 0, and there or not.
-    coder = Symbols(stream, True)
+    coder = Symbols(stream.rng, True)
     coder.one_pixel()
     coder.residual(9, 20, 0, 0, 3 + (1 << 17) + 5)
     data = coder.body()
@@ -318,27 +177,31 @@ def damage_of_entropy(stream: Stream) -> None:
     add(coder)
     add(coder, data[:-2])
     add(coder, data[:-1])
-    # X (3) stays below 2^20 from its loading to its only symbol, and is 2^20 after the next word.
-    coder = Symbols(stream, True)
+    # X (1) stays below 2^20 from its loading to its first symbol, and is what an encoder has after the next word.
+    coder = Symbols(stream.rng, True)
     coder.one_pixel()
-    coder.residual(9, 20, 0, 0)
+    coder.residual(9, 20, 0, 0, 0)
     loaded, words = coder.states_and_words()
-    model = coder.numbers[39]
-    begin, rest = [word for k, word in words if k < 0], [word for k, word in words if k >= 0]
-    data = b"".join(x.to_bytes(4, "little") for x in [*loaded[:3], 0])
-    data += b"".join(word.to_bytes(2, "little") for word in [*begin, model[0] + 16, *rest, 0])
-    add(coder, data)
+    size = compact.INITIAL["exact"][1][39][1]
+    last = (1 << 20) // size * 32768 + (1 << 20) % size  # before its second symbol
+    begin, rest = [word for k, word in words if k == -1], [word for k, word in words if k == 0]
+    head = loaded[0].to_bytes(4, "little") + bytes(4)
+    for at in range(len(rest) + 1):
+        low = [*begin, last >> 16, *rest[:at], last & 0xFFFF, *rest[at:]]
+        add(coder, head + b"".join(word.to_bytes(2, "little") for word in low))
     # Choice 6 in a key slice, choices of a pixel that is invalid.
     for choice in (6, 1):
-        coder = Symbols(stream, True)
+        coder = Symbols(stream.rng, True)
         coder.put_later(False, -2)
         coder.put_later(True, 2)
         coder.put(0, coder.choices[6], choice)
         coder.residual(9, 20, 0, 0, 0)
+        if choice == 6:
+            coder.residual(8, 1, 0, 0, 0)  # or else it would be damage for lack of one
         add(coder, columns=2)
     # A motion that is neither 0 nor 1.
     for change in (1, 2, -1):
-        coder = Symbols(stream, False)
+        coder = Symbols(stream.rng, False)
         coder.put_number(42, change)
         for i in range(5):
             coder.put_number(43 + i, 0)
@@ -369,21 +232,21 @@ def damage() -> Stream:
     with_body(lambda body: body[:2] + b"\0" + body[3:])
     with_body(lambda body: body[:3] + b"\0" + body[4:])
     # Encoders that begin with another state.
-    for k in range(4):
+    for k in range(2):
         stream.add([stream.compact(ENTROPY, place, 1, (2, 2, 2), odd_state=k)])
     # States that no encoder leaves: below 2^20 though a word was read, 2^32 - 1, all words 0.
-    stream.add([stream.slice(place, 2, bytes((1, 0, 1, 1)) + bytes(16) + b"\x01\0" * 9, profile=ENTROPY)])
-    stream.add([stream.slice(place, 2, bytes((1, 0, 1, 1)) + b"\xff" * 16 + bytes(40), profile=ENTROPY)])
+    stream.add([stream.slice(place, 2, bytes((1, 0, 1, 1)) + bytes(8) + b"\x01\0" * 9, profile=ENTROPY)])
+    stream.add([stream.slice(place, 2, bytes((1, 0, 1, 1)) + b"\xff" * 8 + bytes(40), profile=ENTROPY)])
     # A row without pixels: states that are as an encoder begins with, in which run ends are 0 or not.
     for low in (0, 5000, 20000, 32767):
-        data = b"".join(((1 << 20) + low * (k == 0)).to_bytes(4, "little") for k in range(4))
+        data = b"".join(((1 << 20) + low * (k == 0)).to_bytes(4, "little") for k in range(2))
         stream.add([stream.slice((0, 0, 1, 1), 3, bytes((1, 0, 1, 1)) + data, profile=ENTROPY)])
         stream.add([stream.slice((0, 0, 1, 1), 3, bytes((1, 0, 1, 1)) + data + b"\0\0", profile=ENTROPY)])
     return stream
 
 
 def motion() -> Stream:
-    """Interpolation: depth codes that differ by the gap and around it, modulo 2^16, and pixels that are missing or outside."""
+    """Interpolation: depth codes that differ by the gap and around it, and pixels that are missing or outside."""
     stream = Stream(11, rig_view(near=1, far=65535))
     stream.bits = 16, 8
     place, roi = (0, 0, ROW, 1), (16, 19, ROW, 1)  # in the corner of the image
@@ -423,24 +286,25 @@ def slices() -> Stream:
     def other(unit: bytes, at: int, *values: int) -> bytes:
         return damaged.patched(unit, at, *values)
 
-    # Headers that break a rule; view 1 shows that the access unit was read.
-    for at, value in (
-        (1, 9), (4, 64), (4, 7), (5, 3), (6, 5), (6, 17), (7, 3), (7, 9),
-        (30, 0), (34, 0), (30, 5), (28, 1), (34, 9), (32, 1), (20, 17), (22, 17),
-    ):
-        unit = other(one(), at, value)
-        stream.add([unit, one(view=1)])
-        stream.add([unit, unit, one((0, 0, 4, 4)), one((4, 0, 4, 4))])
-    stream.add([one(distance=0), one(view=1)])
+    # Headers that break a rule. If one of them had a vote, frame number 2 would have no majority.
+    small = one((0, 0, 1, 1))
+    headers = [
+        (1, 9), (1, 0x81), (4, 64), (4, 7), (5, 3), (6, 5), (6, 17), (7, 3), (7, 9),
+        (30, 0), (34, 0), (30, 5), (28, 4), (34, 9), (32, 8), (20, 17), (22, 17),
+    ]
+    headers += [(at, 0xFF, 0xFF, 2, 0) for at in (28, 32)] + [(at, 0xFF, 0xFF) for at in (20, 22)]  # sums beyond 16 bits
+    stream.add([*(other(small, *header) for header in headers), one(full, 2)])
+    refers = stream.compact(PACKED, full, 1, roi=roi, distance=1)
+    stream.add([other(refers, 36, 0), one(view=1)])
+    stream.add([other(refers, 36, 0), refers, one(full, 2), one(view=1)])
     # 36 bytes: an empty ROI; one that is not, all fields 0 but one; without key; and more bytes behind an empty one.
     empty = stream.slice((0, 0, 0, 0), 1, b"", roi=(0, 0, 0, 0))
-    without_key = stream.slice((0, 0, 0, 0), 1, b"", roi=(0, 0, 0, 0), distance=1)
+    without_key = stream.slice((0, 0, 0, 0), 1, b"", profile=PACKED, roi=(0, 0, 0, 0), distance=1)
     odd = [other(empty, at, 1) for at in range(20, 36, 2)]
-    odd += [other(empty, 1, 0), unit_of(1, 1, empty[4:] + b"\0"), one()[:2] + b"\x24\0" + one()[4:36]]
-    for unit in (empty, without_key, *odd):
-        stream.add([unit, one(view=1)])
-        # Where such a header is valid, it has a vote: with it, the others are no majority.
-        stream.add([unit, unit, one((0, 0, 4, 4)), one((4, 0, 4, 4))])
+    odd += [other(empty, 1, 0), without_key]
+    stream.add([*odd, one(full, 2)])
+    for unit in (empty, unit_of(1, 1, empty[4:] + b"\0"), one()[:2] + b"\x24\0" + one()[4:36]):  # these are valid
+        stream.add([unit, one(full, 2)])
     # No majority in any single field, but one for all together; two equally frequent.
     stream.add(
         [one((0, 0, 2, 4), 7), one((2, 0, 2, 4), 7), one((4, 0, 2, 4), 8)]
@@ -450,7 +314,8 @@ def slices() -> Stream:
     stream.add([one((0, 0, 4, 4), 2), one((4, 0, 4, 4), 1), one((0, 0, 4, 4), 1), one((4, 0, 4, 4), 2)])
     # Each field in which slices agree: two of three have one value.
     for at, value in ((20, 3), (22, 4), (24, 9), (26, 5), (6, 11), (1, 3), (7, 7), (8, 9), (1, 5)):
-        stream.add([other(one((0, 0, 4, 4)), at, value), one((0, 0, 4, 4)), one((4, 0, 4, 4))])
+        left = stream.compact(PACKED, (0, 0, 4, 4), 1, roi=roi)
+        stream.add([other(left, at, value), stream.compact(PACKED, (0, 0, 4, 4), 1, roi=roi), one((4, 0, 4, 4))])
     stream.add([stream.compact(PACKED, (0, 0, 4, 4), 1, roi=roi), one((0, 0, 4, 4)), one((4, 0, 4, 4))])
     stream.add([stream.compact(PACKED, (0, 0, 4, 4), 1, roi=roi), stream.compact(ENTROPY, (4, 0, 4, 4), 1, roi=roi)])
     # Capture times and key may differ, and bytes that are damaged or too few have a vote.
@@ -460,35 +325,29 @@ def slices() -> Stream:
     short = one((0, 0, 4, 4), 3)
     short = short[:2] + b"\x25\0" + short[4:37]
     stream.add([one((0, 0, 4, 4), 1), short, short])
-    # Overlap: by column, row, columns, rows. The later replaces, also by its damage.
-    places = [(0, 0, 6, 2), (0, 1, 3, 3), (0, 1, 4, 2), (0, 1, 4, 3), (1, 0, 2, 4), (2, 0, 6, 1), (2, 1, 1, 1)]
-    stream.add([one(place) for place in places[::-1]])
-    for i in range(len(places)):
-        stream.add([damaged.longer(one(place), b"\0") if i == j else one(place) for j, place in enumerate(places)])
-    stream.add([one((0, 1, 4, 2)), one((0, 1, 3, 3))])
-    # Of one place: the first sound one, after one that is too short and one that is damaged.
-    stream.add([short, bad, one((0, 0, 4, 4), 3), one((0, 0, 4, 4), 3), bad])
-    # One that is too short replaces nothing.
-    stream.add([one(full, 3), other(short, 30, 3)])
+    # Overlap: by first row, then arrival; damaged ones count, those that are too short don't.
+    places = [(0, 0, 6, 2), (0, 1, 3, 3), (0, 1, 4, 2), (4, 2, 4, 2), (1, 3, 2, 1), (6, 0, 2, 1), (6, 1, 1, 1), (7, 1, 1, 2)]
+    for some in (places, places[::-1], places[1:], places[2:]):
+        stream.add([one(place) for place in some])
+        stream.add([damaged.longer(one(place), b"\0") if i == 0 else one(place) for i, place in enumerate(some)])
+    stream.add([bad, one(full, 3)])
+    stream.add([short, one(full, 3), bad])
     # Too short for each profile: one byte less than the least, and the least.
-    for profile, size in ((PLAIN, 9), (PACKED, 7), (ENTROPY, 20)):
-        for distance in (None, 1):
+    for profile, size in ((PLAIN, 7), (PACKED, 7), (ENTROPY, 12)):
+        for distance in (None, 1) if profile else (None,):
             for less in (0, 1):
-                part = stream.slice((2, 0, 6, 4), 3, bytes(size - less), profile=profile, roi=roi, distance=distance)
-                below = stream.compact(PACKED, (0, 0, 8, 4), 3, roi=roi) if profile else one(full, 3)
-                stream.add([below, part])
+                body = b"\x04" + bytes(size - less - 1)  # plain: a full pixel that is not there
+                part = stream.slice((2, 0, 6, 3), 3, body, profile=profile, roi=roi, distance=distance)
+                stream.add([part, one(full, 3)])
     for size in (7, 8):
         part = stream.slice((2, 0, 6, 8), 3, bytes(size), profile=PACKED, roi=(2, 3, 8, 8))
-        stream.add([stream.compact(PACKED, (0, 0, 8, 8), 3, roi=(2, 3, 8, 8)), part])
+        stream.add([part, one((0, 0, 8, 8), 3, roi=(2, 3, 8, 8))])
     # Bits set behind the symbols.
     part = one((0, 0, 3, 1))
     stream.add([other(part, 37, part[37] | 128), one(view=1)])
-    # At most eight times the pixels of the ROI: damaged and repeated ones count, too short ones do not.
-    bad = damaged.longer(one(full, 3), b"\0")
-    stream.add([bad] * 7 + [one(full, 3)])
-    stream.add([bad] * 8 + [one(full, 3)])
-    stream.add([bad] * 7 + [other(short, 32, 0)] * 9 + [one(full, 3)])
-    stream.add([one(full, 3)] * 7 + [one((1, 0, 5, 4), 3), one((2, 0, 6, 4), 3), one((3, 0, 1, 2), 3), one((7, 0, 1, 1), 3)])
+    # Profile plain has neither references nor slices that refer to others.
+    for more in ({"flags": KEY | REFERENCE}, {"distance": 1}):
+        stream.add([one(number=3, **more), one((0, 0, 4, 4), 4), one((4, 0, 4, 4), 4, view=1)])
     # A ROI that is empty with a header of pixels is not one.
     stream.add([one((0, 0, 1, 1), roi=(0, 0, 0, 0)), one(view=1)])
     return stream
@@ -502,11 +361,10 @@ def references() -> Stream:
     flags = KEY | REFERENCE
 
     def key(number: int, place: Place = full, **more: object) -> bytes:
-        return stream.plain(place, number, **{"roi": roi, "flags": flags, **more})
+        return stream.compact(PACKED, place, number, **{"roi": roi, "flags": flags, **more})
 
     def later(number: int, distance: int, place: Place = full, **more: object) -> bytes:
-        symbols = "664465664" + "6" * (place[2] * place[3] - 9)
-        return stream.plain(place, number, symbols, **{"roi": roi, "flags": 0, "distance": distance, **more})
+        return stream.compact(ENTROPY, place, number, **{"roi": roi, "flags": 0, "distance": distance, **more})
 
     # Numbers turn over; a frame set without the flag is not kept; the right distance and wrong ones.
     stream.add([key((1 << 32) - 2)])
@@ -514,6 +372,9 @@ def references() -> Stream:
     stream.add([later(1, 2)])
     stream.add([later(2, 4)])
     stream.add([later(2, 1)])
+    stream.add([key(2, left)])
+    stream.add([key((1 << 32) - 3, left)])  # late
+    stream.add([later(3, 1, left)])
     # Too late: 1 to 255 numbers. They decode, but the latest stays.
     stream.add([key(1000)])
     stream.add([key(999)])
@@ -524,14 +385,14 @@ def references() -> Stream:
     stream.add([key(744)])  # 256: an encoder that began again
     stream.add([later(745, 1)])
     stream.add([later(1001, 1)])
-    # The same number goes on, and refers to what the latest referred to.
+    # The same number again is not kept, and refers to what the latest referred to.
     stream.add([key(2000)])
     stream.add([later(2001, 1, left, flags=REFERENCE)])
     stream.add([later(2001, 1, right, flags=REFERENCE)])
     stream.add([later(2002, 1)])
     stream.add([damaged.longer(later(2001, 1, left, flags=REFERENCE), b"\0")])
     stream.add([later(2002, 1)])
-    # One that differs in ROI replaces the latest, also for what it refers to.
+    # Nor is one that differs in ROI.
     stream.add([later(2001, 1, (0, 0, 8, 8), flags=REFERENCE, roi=(4, 6, 8, 8))])
     stream.add([later(2002, 1)])
     # Kept though nothing of it is sound: the one before is out of reach.
@@ -547,11 +408,10 @@ def references() -> Stream:
     stream.add([key(3002)])
     stream.add([stream.slice((0, 0, 0, 0), 3003, b"", roi=(0, 0, 0, 0), flags=flags)])
     stream.add([later(3004, 1)])
-    # Other bits, scale and profile.
+    # Other bits and scale.
     stream.add([key(4000)])
-    for stream.bits, stream.inverse in (((11, 6), 0), ((10, 7), 0), ((10, 6), INVERSE)):
+    for stream.bits in ((11, 6), (10, 7), (10, 6)):
         stream.add([later(4001, 1)])
-    stream.inverse = 0
     for profile in (PACKED, ENTROPY):
         stream.add([stream.compact(profile, full, 4001, roi=roi, flags=0, distance=1)])
     stream.add([stream.compact(PACKED, full, 4001, roi=roi, flags=flags)])
@@ -568,31 +428,38 @@ def references() -> Stream:
     return stream
 
 
+FX, CX, ROTATION, TRANSLATION, DEPTH_UNIT = 27, 43, 60, 132, 156  # places in a rig view without name
+
+
+def with_numbers(unit: bytes, at: int, *numbers: float) -> bytes:
+    return damaged.patched(unit, at, *struct.pack(f"<{len(numbers)}d", *numbers))
+
+
 def rigs() -> Stream:
     """Which rig holds, and when it has changed: then a slice that refers to the frame set before has unknown pixels."""
     a, b = rig_view(0, 2, 0), rig_view(1, 2, 1)
     near_a, near_b = rig_view(0, 2, 0, near=250), rig_view(1, 2, 1, near=400)
-    stream = Stream(7)
+    stream = Stream(23)
     number = 0
-    full = 0, 0, 4, 4
+    full = 0, 0, 6, 4
 
     def frame_set(before: Units, after: Units = [], step: int = 1) -> None:
         """Refers to the frame set before it; rig views before and after its slices."""
         nonlocal number
         number += step
-        later = [stream.plain(full, number, "6645" * 4, flags=REFERENCE, distance=1, view=view) for view in (0, 1)]
+        later = [stream.compact(ENTROPY, full, number, flags=REFERENCE, distance=1, view=view) for view in (0, 1)]
         stream.add([*before, *later, *after])
 
     def key() -> None:
         nonlocal number
         number += 1
-        stream.add([stream.plain(full, number, "4" * 16, flags=KEY | REFERENCE, view=view) for view in (0, 1)])
+        stream.add([stream.compact(ENTROPY, full, number, flags=KEY | REFERENCE, view=view) for view in (0, 1)])
 
     # Not known yet: no frame set, and nothing to refer to. Views in any order, from two access units.
     early = Stream(8, a, b)
-    stream.raw([early.plain(full, 1, "4" * 16, flags=KEY | REFERENCE)])
+    stream.raw([early.compact(PACKED, full, 1, flags=KEY | REFERENCE)])
     stream.raw([b])
-    stream.raw([early.plain(full, 1, "4" * 16, flags=KEY | REFERENCE), a, early.plain(full, 1, "4" * 16, view=1)])
+    stream.raw([early.compact(PACKED, full, 1), a, early.plain(full, 1, "4" * 24, view=1)])
     stream.reader.read_access_unit(b"".join((b, a)))
     number = 1
     key()
@@ -621,26 +488,48 @@ def rigs() -> Stream:
     frame_set([a, b])
     # Incomplete: one view of a rig of another total or rate, or with the id of another. The known rig stays.
     key()
-    frame_set([rig_view(0, 3, 0, near=200)])
+    frame_set([rig_view(0, 3, 0, near=200), near_a])
+    frame_set([a, b, rig_view(0, 2, 0, near=200, rate=(15, 2))])
     frame_set([rig_view(0, 2, 0, near=200, rate=(7, 1))])
     frame_set([rig_view(1, 2, 1, near=200)])  # of this rate there is only that one
     frame_set([a, b])
     frame_set([rig_view(0, 2, 0, near=200, rate=(30, 2))])  # begins a new rig, though the rate is the same
     frame_set([a, b, rig_view(0, 2, 1, near=200)])
     frame_set([b])  # of two views with id 1
+    frame_set([rig_view(0, 2, 1, near=200), near_a])  # takes the place of the first, and the second is still there
     frame_set([a])
-    # Refused: fields out of range, a reserved flag, too short, bytes behind the blob, a lens, a pose, two views; the key flag is ignored.
+    # Refused: fields out of range, reserved flags, too short, bytes behind the blob, a lens, a pose, two views; the key flag is ignored.
     def refused(*place: int, near: float = 200, **more: object) -> bytes:
         return rig_view(*(place or (0, 2, 0)), near=near, **more)
 
+    above, nan = (lambda limit: math.nextafter(limit, math.inf)), math.nan
     bad = [refused(2, 2, 0), refused(0, 65, 0), rig_view(0, 0, 0), refused(rate=(15, 0)), refused(rate=(1 << 31, 1))]
-    bad += [refused(rate=(1, 1 << 31)), refused(flags=2), a[:2] + b"\x08\0" + a[4:8], refused(tail=b"\0")]
-    bad += [refused(rotation=-1), refused(rotation=1 + 2e-5), refused(near=0), refused(far=65536), refused(far=200), refused(0, 2, 64)]
-    bad += [refused(size=(0, 20)), refused(size=(24, 16385))]
+    bad += [refused(rate=(1, 1 << 31)), refused(flags=2), refused(flags=0x80), a[:2] + b"\x08\0" + a[4:8], refused(0, 3, 0, tail=b"\0")]
+    bad += [refused(rotation=-1), refused(near=0), refused(far=65536), refused(far=200), refused(0, 2, 64)]
+    bad += [refused(size=size) for size in ((0, 20), (24, 0), (24, 16385), (16385, 20))]
     bad += [damaged.patched(refused(), at, value) for at, value in ((14, 0), (18, 2), (19, 2), (21, 1), (59, 1), (34, 0xC0))]
-    for unit in bad:
-        frame_set([unit])
+    lens = [(FX, above(1e6)), (FX, nan), (FX + 8, 9e-4), (CX, above(1e6)), (CX, nan), (CX + 8, -above(1e6))]
+    scales = [(DEPTH_UNIT, 9e-8, 9e-6, 9e-5), (DEPTH_UNIT, above(1), 200, 1300), (DEPTH_UNIT, nan), (DEPTH_UNIT + 8, nan), (DEPTH_UNIT + 16, nan)]
+    # A row that is too long, though no column is; rows that are no right angle; translations.
+    long_row = [*[(1 + 6e-6) / 3**0.5] * 3, 0.5**0.5, -(0.5**0.5), 0, *[6**-0.5] * 2, -2 * 6**-0.5]
+    poses = [(ROTATION, *long_row), (ROTATION + 16, 2e-5), (ROTATION, nan), (TRANSLATION, 6e5, 8e5), (TRANSLATION, nan)]
+    bad += [with_numbers(refused(), *change) for change in lens + scales + poses]
+    frame_set(bad)
     frame_set([rig_view(0, 2, 0, flags=KEY, near=310)])
+    frame_set([a])
+    # At the limits: sound, so that the next view begins another rig.
+    greatest = (1 << 31) - 1
+    largest = with_numbers(rig_view(63, 64, 63, (16384, 1), rate=(greatest, greatest)), FX, 1e6, 1e6, 1e6, -1e6)
+    largest = with_numbers(with_numbers(largest, ROTATION, 1 + 4.9e-6), TRANSLATION, -math.nextafter(1e6, 0))
+    least = with_numbers(rig_view(1, 64, 0, (1, 16384), rate=(0, 1)), FX, 1e-3, 1e-3, -1e6, 1e6)
+    for unit in with_numbers(largest, DEPTH_UNIT, 1, 0.25, 65535.99), with_numbers(least, DEPTH_UNIT, 1e-7, 1e-9, 1e-3):
+        frame_set([a, b])
+        key()
+        frame_set([a, b, unit, near_a])
+    frame_set([a, b])
+    # As large as it may be; it holds, though no frame set shows it.
+    key()
+    stream.add([rig_view(0, 2, 0, (16384, 4096))])
     frame_set([a])
     # Too large: the known one stays, and the views that make it so wait.
     key()
@@ -681,38 +570,41 @@ def byte_stream() -> Stream:
         first, last = pair()
         return [first, unit, last]
 
-    code = damaged.START_CODE
-    head = struct.pack("<BBHIQQ", 0x33, 1, 24, 0, 5, 6)
+    head = struct.pack("<BBH4sIQQ", 0x43, 1, 28, damaged.MAGIC, 0, 5, 6)
+    too_long = head[:8] + b"\xff" * 4
     stream.add([one()])
     # Access-unit units that are not sound: they begin nothing.
-    for more in ({"flags": 2}, {"kind": 0x43}, {"kind": 0x31}, {"size": 25}, {"claimed": (32 << 20) + 1}):
+    for more in ({"flags": 2}, {"kind": 0x33}, {"kind": 0x41}, {"size": 29}, {"claimed": (32 << 20) + 1}):
         stream.raw([one()], **more)
     stream.add([one()])
     # Exactly 32 MiB may be declared; the access unit ends after its last unit that can be read.
     stream.raw([one()], claimed=32 << 20)
     stream.bytes += b"rubbish"
-    # A start code alone, in a unit and between access units.
-    stream.add([unit_of(9, 0, code + b"abcdefghi"), one()])
-    stream.bytes += code
+    # One of which only the beginning is sound, in a unit and between access units.
+    stream.add([unit_of(9, 0, too_long + b"abcde"), one()])
+    stream.bytes += too_long
     # A whole beginning inside a unit: chance if the sizes agree and another beginning or the end follows, else the end.
-    inside = unit_of(9, 0, code + head + b"abc")
+    inside = unit_of(9, 0, head + b"abc")
     stream.add(around(inside))
     stream.add(around(inside))
     stream.bytes += b"rubbish"
     stream.add(around(inside))
     stream.raw(around(inside), claimed=9999)
+    # One among the units begins another access unit, though the sizes agree.
+    stream.raw([one(), head, *pair()])
     # A declared size that is too small, within a unit and at the end of one.
     stream.raw(pair(), claimed=90)
     units = pair()
     stream.raw(units, claimed=len(units[0]))
     # Units that end the access unit: another version, a size below 4, one beyond the declared end.
-    for bad in (b"\x41\x01\x10\0" + bytes(12), b"\x31\x01\x03\0", b"\x31\x01\xff\xff"):
+    for bad in (b"\x31\x01\x10\0" + bytes(12), b"\x41\x01\x03\0", b"\x41\x01\xff\xff"):
         stream.raw(around(bad))
     # Of 1 byte, if that were possible: it and the next unit of 256 bytes read as one of size 1.
     next_unit = stream.plain((0, 0, 8, 8), number, "4" * 56 + "5" * 8)
     if len(next_unit) != 256:
         sys.exit(f"make-rules.py: a slice of {len(next_unit)} bytes, expected 256")
-    stream.raw([b"\x31" + next_unit])
+    stream.raw([b"\x41" + next_unit])
+    stream.raw([], claimed=50)  # another one begins where it begins
     # Its last unit claims a byte more than there is.
     first, last = pair()
     stream.raw([first, damaged.patched(last, 2, len(last) + 1)])

@@ -13,7 +13,7 @@ read_stream (std::span<const std::uint8_t> bytes)
   while (!bytes.empty ()) {
     const bool at_end = size >= bytes.size ();
     const StreamPart part = next_part (bytes.first (std::min (size, bytes.size ())), at_end);
-    const std::size_t used = part.length + part.rubbish;
+    const std::size_t used = part.length + part.garbage;
     if (used > bytes.size () || (part.wanted ? part.wanted <= size || at_end : used == 0))
       std::abort ();
     bytes = bytes.subspan (used);

@@ -20,7 +20,7 @@ static constexpr std::uint8_t kRightSize = 1, kLongest = 255; /* Ask::length */
 struct Ask {
   std::uint8_t profile; /* bits 0-1; 4: no key; 8: reference; 16: older image; 32: once */
   std::uint8_t earlier; /* bits 0-1: none, same ROI, other ROI, does not serve; from 2: how known */
-  std::uint8_t depth;   /* bits - 6; 128: inverse */
+  std::uint8_t depth;   /* bits - 6 */
   std::uint8_t colour;  /* bits - 4 */
   std::uint8_t width, height, x, y;        /* of the ROI, less 1 where it cannot be 0 */
   std::uint8_t columns, rows, column, row; /* of the slice */
@@ -28,12 +28,12 @@ struct Ask {
   std::uint8_t length; /* kRightSize: cut or filled for plain; kLongest: repeated */
 };
 
-/* A view for each kind of depth code: tables are kept by view. */
+/* A view for each number of depth bits: tables are kept by view. */
 static Rig
 views_of_all_depths ()
 {
   Rig rig;
-  for (int id = 0; id < 22; id++) {
+  for (int id = 0; id < 11; id++) {
     View view;
     view.id = id;
     view.width = kWidth;
@@ -65,10 +65,10 @@ static std::size_t
 size_of_slice (const SliceHeader &header, std::span<const std::uint8_t> body)
 {
   const auto pixels = std::size_t (header.rows) * std::size_t (header.columns);
-  BitReader symbols (body.data (), std::min (body.size (), symbol_bytes (pixels)));
+  const LittleEndianBits symbols (body.first (std::min (body.size (), symbol_bytes (pixels))));
   std::size_t full = 0;
-  for (std::size_t i = 0; i < pixels; i++)
-    full += symbols.get (kSymbolBits) == kFull;
+  for (std::size_t i = 0; i < pixels && i * kSymbolBits < 8 * body.size (); i++)
+    full += (symbols.from (i * kSymbolBits) & 7) == kFull;
   const auto bits = std::size_t (header.depth_bits + 3 * header.colour_bits);
   return std::min (
       header_size_of (header) + symbol_bytes (pixels) + (full * bits + 7) / 8, kMaxUnitSize);
@@ -80,12 +80,12 @@ make_header (const Ask &ask)
   const auto at_most = [] (int value, int most) { return value % (most + 1); };
   SliceHeader header;
   header.profile = Profile{static_cast<std::uint8_t> (at_most (ask.profile & 3, 2))};
-  header.key = !(ask.profile & 4);
-  header.reference = ask.profile & 8;
-  header.inverse_depth = ask.depth & 128;
+  const bool plain = header.profile == Profile::kPlain;
+  header.key = plain || !(ask.profile & 4);
+  header.reference = !plain && ask.profile & 8;
   header.depth_bits = static_cast<std::uint8_t> (6 + at_most (ask.depth & 127, 10));
   header.colour_bits = static_cast<std::uint8_t> (4 + at_most (ask.colour, 4));
-  header.view_id = static_cast<std::uint8_t> (2 * (header.depth_bits - 6) + header.inverse_depth);
+  header.view_id = static_cast<std::uint8_t> (header.depth_bits - 6);
   header.frame_number = 100;
   header.reference_distance =
       header.key ? std::uint8_t{0} : std::max (ask.distance, std::uint8_t{1});
@@ -126,8 +126,6 @@ make_slice (const SliceHeader &header, std::uint8_t length, std::span<const std:
 static std::uint64_t
 earlier_pixel (const SliceHeader &header, std::uint32_t random)
 {
-  if (header.profile == Profile::kPlain)
-    return (random & 0xffff) | 1 | std::uint64_t{random >> 8} << 16;
   const std::int32_t most = (1 << header.colour_bits) - 1;
   const auto chroma = [&] (int shift) {
     return static_cast<std::int32_t> (random >> shift & 0x1ff) % (2 * most + 1) - most;
@@ -152,7 +150,7 @@ fill_earlier (const Ask &ask, SliceHeader header, ReferencePlane &plane)
   for (int y = 0; y < header.roi.height; y++)
     for (int x = 0; x < header.roi.width; x++) {
       random = random * 1664525u + 1013904223u;
-      const bool empty = header.profile != Profile::kPlain && (random >> 8 & 15) == 0;
+      const bool empty = (random >> 8 & 15) == 0;
       const std::uint64_t pixel =
           empty ? kEmptyPixel : earlier_pixel (header, random >> 3 ^ random << 13);
       if (random >> 26 >= static_cast<std::uint32_t> (ask.earlier >> 2)) /* else unknown */

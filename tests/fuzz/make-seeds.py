@@ -3,7 +3,6 @@
 """Makes first inputs for the fuzz targets, most of them of the golden streams in tests/data; README.md says what becomes of them."""
 
 import argparse
-import json
 import struct
 import sys
 from base64 import b64encode
@@ -17,7 +16,7 @@ streams = import_module("make-damaged")
 LARGEST = 2000  # bytes of a seed
 SLICE = streams.SLICE
 STREAMS = [path for path in sorted(DATA.glob("*.rcnc"))]
-KEY, INVERSE, REFERENCE = 1, 2, 4
+KEY, REFERENCE = 1, 4
 KEY_SLICE, OTHER_SLICE = 2, 6  # Ask::profile of profile entropy
 
 
@@ -44,8 +43,7 @@ def slice_seed(unit: bytes, earlier: int, more: int, length: int = 0) -> bytes:
     key = unit[1] & KEY
     x, y = (x + column) % 16, (y + row) % 16
     profile = unit[5] & 3 | (0 if key else 4) | (8 if unit[1] & REFERENCE else 0) | more
-    depth = (unit[6] - 6) | (128 if unit[1] & INVERSE else 0)
-    ask = (profile, earlier, depth, unit[7] - 4, columns - 1, rows - 1, x, y, columns - 1, rows - 1, 0, 0, 1, length)
+    ask = (profile, earlier, unit[6] - 6, unit[7] - 4, columns - 1, rows - 1, x, y, columns - 1, rows - 1, 0, 0, 1, length)
     return bytes(ask) + unit[36 if key else 37 :]
 
 
@@ -129,70 +127,6 @@ def rtp_seeds(access_units: list[list[bytes]]) -> list[bytes]:
     return seeds
 
 
-VIEW = {
-    "id": "0",
-    "name": "\"front\"",
-    "image_size": "[ 64, 48 ]",
-    "intrinsics": "[ 60., 60., 31.5, 23.5 ]",
-    "world_from_view": {"rotation": "[ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]", "translation": "[ 0., 0., 0.8 ]"},
-    "depth_unit": "1.0e-04",
-    "near": "0.45",
-    "far": "1.3",
-}
-PARTNER = {
-    "camera": "\"1234\"",
-    "intrinsics": "[ 60., 60., 31.5, 23.5 ]",
-    "distortion": "[ 0.1, -0.2, 0., 0. ]",
-    "partner_from_left": {"rotation": "[ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]", "translation": "[ -0.1, 0., 0. ]"},
-}
-
-
-def yaml_of(node: dict, indent: int = 0) -> str:
-    lines = []
-    for key, value in node.items():
-        start = " " * indent + f"{key}:"
-        if isinstance(value, dict):
-            lines.append(start + (" !!opencv-matrix\n" if "dt" in value else "\n") + yaml_of(value, indent + 3))
-        elif isinstance(value, list):
-            items = [yaml_of(item, indent + 6) for item in value]
-            lines.append(start + "\n" + "".join(" " * (indent + 3) + "-\n" + item for item in items))
-        else:
-            lines.append(f"{start} {value}\n")
-    return "".join(lines)
-
-
-def json_of(node: dict) -> str:
-    parts = []
-    for key, value in node.items():
-        if isinstance(value, dict):
-            text = json_of({"type_id": "\"opencv-matrix\"", **value} if "dt" in value else value)
-        else:
-            text = "[ " + ", ".join(json_of(item) for item in value) + " ]" if isinstance(value, list) else value
-        parts.append(f'"{key}": {text}')
-    return "{ " + ",\n".join(parts) + " }"
-
-
-def texts_of(node: dict) -> list[bytes]:
-    return [text.encode() for text in ("%YAML:1.0\n---\n" + yaml_of(node), json_of(node))]
-
-
-def rig_file_seeds() -> list[bytes]:
-    views = [[VIEW], [{**VIEW, "right": PARTNER, "third": PARTNER}], [VIEW, {**VIEW, "id": "7"}], []]
-    return [text for some in views for text in texts_of({"rangecast_rig": "1", "views": some})]
-
-
-def range_meta_seeds() -> list[bytes]:
-    """Two memories of which each holds a view of 8 x 4 pixels; the views in another order, with padding, or empty."""
-
-    def view(number: int, offset: int, width: int = 8, more: int = 0) -> bytes:
-        strides = (width * 2 + more, width * 4 + more)
-        return struct.pack("<7I4x2Q", number, 5, 6, width, 4, *strides, offset, offset + 4 * strides[0])
-
-    sizes = struct.pack("<2H", 192, 256)
-    views = [[view(0, 0), view(1, 192)], [view(9, 192, 8, 8), view(63, 0)], [view(0, 0, 0), view(0, 192)], [view(0, 384)], [view(3, 96)]]
-    return [bytes((1 | len(some) << 2,)) + sizes + b"".join(some) for some in views]
-
-
 def caps_seeds(rigs: list[bytes]) -> list[bytes]:
     fields = "width=(int)80, height=(int)60, views=(int)%d, framerate=(fraction)30/1, rig=(buffer)%s"
     media = ("video/x-range, format=(string)Z16_RGBx, ", "video/x-neighbour-code, version=(int)3, alignment=(string)slice, ")
@@ -206,11 +140,6 @@ def rtp_caps_seeds(rigs: list[bytes]) -> list[bytes]:
     return [b"\7" + b"1\0" + b"30/1\0" + b64encode(rig) for rig in rigs] + [b"\x0b" + b"1\0" + b"25/1\0" + rig for rig in rigs] + [b"\1" + b"2"]
 
 
-def camera_texts_seeds() -> list[bytes]:
-    texts = [b"Gamma=0.8 LineSelector='Line 1' UserSetLoad", b'A="x y",B=1;C', b"1A=2", b"A=\"x", b"A=1=2"]
-    return texts + [bytes.fromhex("0000008500180001000000e8") + name.ljust(16, b"\0") for name in (b"left", b"sixteen letters ")]
-
-
 def parse_seeds(access_units: list[list[bytes]], stream: bytes) -> list[bytes]:
     """As a byte stream in pieces of 1025 and 17 bytes, and as single access units."""
     own = [b"".join(moved(unit) for unit in units[1:]) for units in access_units]
@@ -222,8 +151,7 @@ def main() -> None:
     parser.add_argument("folder", metavar="FOLDER", type=Path)
     to = parser.parse_args().folder
     seeds: dict[str, list[bytes]] = {"slice": too_large_numbers(), "access_unit": [], "rtp_depay": [], "byte_stream": [], "rig": []}
-    seeds |= {"rig_file": rig_file_seeds(), "range_meta": range_meta_seeds(), "parse": []}
-    seeds |= {"camera_texts": camera_texts_seeds()}
+    seeds |= {"parse": []}
     for path in STREAMS:
         data = path.read_bytes()
         if path.stem == "damaged" or path.stem.startswith("rules-"):  # some of their sizes are lies

@@ -125,7 +125,7 @@ def check(root):
         part = "/".join(folder.split("/")[:2])
         rows = [allowed for prefixes, allowed in LAYERS if is_in(folder, prefixes)]
         if not rows:
-            problems.append(f"{file}: in no layer of this script; expected one of LAYERS")
+            problems.append(f"{file}: in no layer of this script; add its folder to LAYERS")
             continue
         for other in includes:
             if not is_in(os.path.dirname(other), rows[0] + (part if part != "lib/rangecast" else folder,)):
@@ -149,7 +149,7 @@ def main():
     for problem in problems:
         print(problem, file=sys.stderr)
     if n == 0:
-        print("no sources; expected lib/, gst/ and pipelines/", file=sys.stderr)
+        print("no sources; run it where lib/, gst/ and pipelines/ are", file=sys.stderr)
     return 1 if problems or n == 0 else 0
 
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <opencv2/imgproc.hpp>
 #include <random>
 #include <rangecast/roi/background.hpp>
@@ -14,6 +15,10 @@
 
 namespace rangecast::testing {
 
+/** Paints on an image, and on its depth unless that is empty, but not on the person. */
+using RoomChange = std::function<void (
+    cv::Mat &colour, cv::Mat &depth, const cv::Mat &person, double time_s, SceneCamera camera)>;
+
 struct RoiTrial {
   SceneSettings scene;
   SegmentationSettings settings;
@@ -21,8 +26,12 @@ struct RoiTrial {
   bool stereo = false;      ///< depth of StereoDepth instead of the exact one with noise
   double depth_noise = 0.2; ///< of the exact depth: as a stereo camera's disparity noise, pixels
   bool grey = false;        ///< of a camera without colour
+  RoomChange before;        ///< of the room when it is learnt
+  double cast_shadow = 0;   ///< fraction of light that the person's shadow blocks
+  double light_drift = 0;   ///< amplitude of a slow change of all light (40 s)
   double exposure = 1;      ///< of the frames with the person; the background has 1
   int background_frames = 30;
+  bool person_learnt = false; ///< stands in the background
   double frame_period_s = 1 / 30.0;
   double first_s = 1.5, step_s = 1.7; ///< of the frames with the person
   int frames = 12;
@@ -33,9 +42,8 @@ struct RoiTrial {
     RoiTrial trial;
     trial.scene.far_m = 4.5;
     trial.scene.noise_sigma = 2.5;
-    trial.scene.cast_shadow = 0.4;
-    trial.scene.light_drift = 0.1;
-    trial.scene.chair = true;
+    trial.cast_shadow = 0.4;
+    trial.light_drift = 0.1;
     return trial;
   }
 };
@@ -57,19 +65,15 @@ public:
   explicit RoiStage (const RoiTrial &trial)
       : trial_ (trial), size_ (trial.scene.width, trial.scene.height)
   {
-    for (cv::Mat *m : {&colour_, &other_, &plain_, &lit_})
+    for (cv::Mat *m : {&colour_, &other_})
       m->create (size_, CV_8UC4);
     depth_.create (size_, CV_16U);
     truth_.create (size_, CV_8U);
+    other_truth_.create (size_, CV_8U);
   }
 
   Status prepare ()
   {
-    SceneSettings clean = trial_.scene;
-    clean.noise_sigma = 0;
-    clean.light_drift = 0;
-    if (Status s = Scene::create (clean, shadowed_); !s.ok ())
-      return s;
     if (Status s = Scene::create (trial_.scene, scene_); !s.ok ())
       return s;
     background_.reset (size_.width, size_.height);
@@ -80,7 +84,7 @@ public:
   Status learn ()
   {
     for (int i = 0; i < trial_.background_frames; i++) {
-      take (i * trial_.frame_period_s, true);
+      take (i * trial_.frame_period_s, !trial_.person_learnt, trial_.before);
       if (Status s = background_.learn (image ()); !s.ok ())
         return s;
     }
@@ -90,13 +94,21 @@ public:
   }
 
   /** One moment's colour, depth and truth. */
-  void take (double time_s, bool empty)
+  void take (double time_s, bool empty, const RoomChange &change = {})
   {
-    const auto left = rgbx (colour_);
-    (void)scene_->render (
-        trial_.view, SceneCamera::kLeft, time_s, empty, left, depth_view (), bytes (truth_));
+    (void)scene_->render (trial_.view, SceneCamera::kLeft, time_s, empty, rgbx (colour_),
+        depth_view (), bytes (truth_));
+    if (change)
+      change (colour_, depth_, truth_, time_s, SceneCamera::kLeft);
+    const double light = 1 + trial_.light_drift * std::sin (2 * CV_PI * time_s / 40);
+    shadow_ = shade (colour_, truth_, light, 0);
     if (trial_.stereo) {
-      (void)scene_->render (trial_.view, SceneCamera::kRight, time_s, empty, rgbx (other_), {}, {});
+      (void)scene_->render (
+          trial_.view, SceneCamera::kRight, time_s, empty, rgbx (other_), {}, bytes (other_truth_));
+      cv::Mat none;
+      if (change)
+        change (other_, none, other_truth_, time_s, SceneCamera::kRight);
+      shade (other_, other_truth_, light, 11); /* the wall's disparity */
       const cv::Mat copy = colour_.clone ();
       (void)stereo_.process (rgbx (copy), rgbx (other_), image ());
     } else {
@@ -105,7 +117,6 @@ public:
     if (trial_.grey || (!empty && trial_.exposure != 1))
       disturb_colour (empty ? 1 : trial_.exposure);
     time_s_ = time_s;
-    empty_ = empty;
   }
 
   Status segment ()
@@ -144,7 +155,6 @@ public:
     cv::compare (depth_, 0, kept, cv::CMP_GT);
     cv::Mat truth = truth_ != 0;
     cv::distanceTransform (truth, inside, cv::DIST_C, 3, CV_32F);
-    mark_shadow ();
     const double iou = overlap (kept, truth);
     score.worst_iou = std::min (score.worst_iou, iou);
     score.mean_iou += iou / trial_.frames;
@@ -218,32 +228,37 @@ private:
               std::clamp (std::lround (d + share * d * d * normal (random_)), 1L, 65535L));
   }
 
-  /* What the figure's shadow darkens by 5 % or more. */
-  void mark_shadow ()
+  /* Changes all light, and lets the person's silhouette fall onto the wall as a shadow with a soft
+   * rim, to the right and down: a little bluer, as the light of the sky is.
+   * @return what the shadow darkens by 5 % or more */
+  cv::Mat shade (cv::Mat &colour, const cv::Mat &person, double light, int disparity) const
   {
-    (void)shadowed_->render (
-        trial_.view, SceneCamera::kLeft, time_s_, empty_, rgbx (plain_), {}, {});
-    (void)shadowed_->render (trial_.view, SceneCamera::kLeft, time_s_, true, rgbx (lit_), {},
-        {}); /* nobody, no shadow */
-    shadow_.create (size_, CV_8U);
+    const cv::Matx23d by (1, 0, 70 - disparity, 0, 1, 25);
+    cv::Mat dark;
+    cv::warpAffine (truth_ != 0, dark, by, size_);
+    cv::GaussianBlur (dark, dark, {}, 2);
+    dark.setTo (0, person != 0);
+    dark.convertTo (dark, CV_32F, trial_.cast_shadow / 255);
     for (int y = 0; y < size_.height; y++)
-      for (int x = 0; x < size_.width; x++) {
-        const int dark = plain_.at<cv::Vec4b> (y, x)[1], lit = lit_.at<cv::Vec4b> (y, x)[1];
-        shadow_.at<std::uint8_t> (y, x) =
-            truth_.at<std::uint8_t> (y, x) == 0 && dark < 0.95 * lit ? 255 : 0;
-      }
+      for (int x = 0; x < size_.width; x++)
+        for (int c = 0; c < 3; c++) {
+          auto &level = colour.at<cv::Vec4b> (y, x)[c];
+          const double tint[] = {1, 0.98, 0.94};
+          level = cv::saturate_cast<std::uint8_t> (
+              level * light * (1 - dark.at<float> (y, x) * tint[c]));
+        }
+    return dark > 0.05;
   }
 
   RoiTrial trial_;
   cv::Size size_;
-  std::unique_ptr<Scene> scene_, shadowed_;
+  std::unique_ptr<Scene> scene_;
   StereoDepth stereo_;
   BackgroundModel background_, learnt_;
   Segmenter segmenter_;
   std::mt19937 random_{1};
-  cv::Mat colour_, other_, plain_, lit_, depth_, truth_, shadow_, kept_;
+  cv::Mat colour_, other_, depth_, truth_, other_truth_, shadow_, kept_;
   double time_s_ = 0;
-  bool empty_ = true;
 };
 
 /** Learns the empty room and scores the frames with people. */

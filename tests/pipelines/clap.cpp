@@ -2,8 +2,8 @@
 /* For LD_PRELOAD into programs that run launch strings. With CLAP_SEND, a clap every two seconds of
  * capture time, as when hands are clapped before the cameras: what reaches an encoder becomes
  * white, and loud, for 150 ms; otherwise sound is silent. The sinks named snapshot and speaker
- * write to the file $CLAP_LOG what they show and when: a line of the kind (picture or sound), the
- * clock's time, the running time (both in ns) and the brightness or loudness.
+ * write to the file $CLAP_LOG what they show and when it is due: a line of the kind (picture or
+ * sound), the running time (ns) and the brightness or loudness.
  * tests/pipelines/claps.py finds the claps in it. */
 #include <dlfcn.h>
 #include <gst/gst.h>
@@ -86,11 +86,8 @@ static void
 write_line (GstElement *sink, GstPad *pad, GstBuffer *buffer, const char *kind, GstClockTime later,
     double level)
 {
-  GstClock *clock = gst_element_get_clock (sink);
-  const GstClockTime now = clock ? gst_clock_get_time (clock) : 0;
-  gst_clear_object (&clock);
-  std::fprintf (log_file, "%s %" G_GUINT64_FORMAT " %" G_GUINT64_FORMAT " %.1f\n", kind,
-      now + later, clock_time_of (pad, buffer) - gst_element_get_base_time (sink) + later, level);
+  std::fprintf (log_file, "%s %" G_GUINT64_FORMAT " %.1f\n", kind,
+      clock_time_of (pad, buffer) - gst_element_get_base_time (sink) + later, level);
   std::fflush (log_file);
 }
 

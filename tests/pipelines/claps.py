@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Finds claps in what clap.cpp wrote, and how far sound is from picture.
 
-usage: claps.py LOG [--running]
+usage: claps.py LOG
 
 Prints for each clap that was both seen and heard: its time in s, and by how many ms the sound comes after the picture
-(negative: before). By the clock; with --running by running time, for files. The beginnings of picture and sound are where
-brightness and loudness rise over the middle between what they are most of the time and their greatest."""
+(negative: before). By running time, when sinks are to show them: what a busy machine shows late was not sent late. The beginnings of
+picture and sound are where brightness and loudness rise over the middle between what they are most of the time and their greatest."""
 import sys
 
 APART_S = 0.5  # claps are 2 s apart
@@ -30,15 +30,14 @@ def beginnings(points):
 
 
 def main():
-    if len(sys.argv) not in (2, 3):
+    if len(sys.argv) != 2:
         sys.exit(__doc__)
-    column = 2 if "--running" in sys.argv[2:] else 1
     points = {"picture": [], "sound": []}
     with open(sys.argv[1], encoding="utf-8") as log:
         for line in log:
             words = line.split()
-            if len(words) == 4:
-                points[words[0]].append((int(words[column]) * 1e-9, float(words[3])))
+            if len(words) == 3:
+                points[words[0]].append((int(words[1]) * 1e-9, float(words[2])))
     sounds = beginnings(points["sound"])
     for picture in beginnings(points["picture"]):
         sound = min(sounds, key=lambda time: abs(time - picture), default=None)

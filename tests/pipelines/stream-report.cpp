@@ -126,16 +126,16 @@ main (int argc, char **argv)
   std::map<int, ViewReport> reports;
   while (!rest.empty ()) {
     const StreamPart part = next_part (rest, true);
-    if (part.length > kStreamPrefixSize) {
+    if (part.length > kAccessUnitHeaderSize) {
       const FrameSet frame_set =
-          read_frame_set (rest.subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
+          read_frame_set (rest.subspan (kAccessUnitHeaderSize, part.length - kAccessUnitHeaderSize));
       add (reports, frame_set);
       if (list && !frame_set.empty ())
         print_frame_set (frame_set);
       if (numbers && !frame_set.empty ())
         print_numbers (frame_set);
     }
-    const std::size_t used = std::max (part.rubbish, part.length);
+    const std::size_t used = std::max (part.garbage, part.length);
     if (used == 0)
       break;
     rest = rest.subspan (used);

@@ -42,8 +42,7 @@ record () {
   shift 4
   # shellcheck disable=SC2086
   gst-launch-1.0 -q avatartestsrc "views=$views" $source \
-    ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc "$@" \
-    ! neighbourcodeparse ! video/x-neighbour-code,alignment=byte-stream ! filesink "location=$file"
+    ! "video/x-range,width=${size%x*},height=${size#*x},framerate=15/1" ! neighbourcodeenc "$@" ! filesink "location=$file"
 }
 
 test_recording_script_writes_what_the_document_says () {
@@ -51,6 +50,61 @@ test_recording_script_writes_what_the_document_says () {
   expect_decoders_agree recording.rcnc 4 record
   expect_nothing_damaged record
   [[ "$(cat counts.txt)" == "3 access units, "* ]] || fail "$(cat counts.txt)"
+}
+
+# Two views of a person who moves, coded without and with references to earlier frame sets.
+intra=(avatartestsrc views=2 num-buffers=30 range-person-only=true motion=2 ! video/x-range,width=64,height=48,framerate=2/1 ! neighbourcodeenc)
+temporal=("${intra[@]}" temporal=true key-interval=2000)
+play_file () { write_pictures "$1" 2 filesrc "location=$2" ! neighbourcodeparse ! neighbourcodedec; } # PREFIX FILE
+
+test_coded_buffers_of_any_element_are_a_recording () {
+  local elements written='filesink location=written.rcnc' slices=video/x-neighbour-code,alignment=slice
+  write_pictures direct 2 "${temporal[@]}" ! neighbourcodedec
+  while read -r elements; do
+    rm -f element-*.raw
+    # shellcheck disable=SC2086
+    timeout 60 gst-launch-1.0 -q "${temporal[@]}" ! $elements || fail "$elements"
+    play_file element written.rcnc
+    expect_same_pictures element direct 2 "$elements"
+  done <<END
+$written
+tee name=t t. ! queue ! $written t. ! queue ! neighbourcodedec ! fakesink
+tee name=t t. ! queue ! $written t. ! queue ! rtpneighbourcodepay ! fakesink
+tee name=t t. ! queue ! $written t. ! queue ! rangewebsink port=0 sync=false root=$source_dir/pipelines/web
+rtpneighbourcodepay ! rtpneighbourcodedepay ! $written
+$slices ! $written
+$slices ! neighbourcodeparse ! $written
+rangedemux name=d d.src_0 ! queue ! m. d.src_1 ! queue ! m. rangemux name=m ! $written
+END
+  gst-launch-1.0 -q "${temporal[@]}" ! rangedemux name=d d.src_0 ! queue ! fakesink d.src_1 ! queue ! filesink location=one.rcnc
+  gst-launch-1.0 -q filesrc location=one.rcnc ! neighbourcodeparse ! neighbourcodedec ! rangesplit name=s s.depth_1 ! queue ! filesink location=one.raw
+  cmp one.raw direct-depth-1.raw || fail "rangedemux"
+}
+
+# Each piece plays by itself, and all of them show what was coded.
+test_pieces_of_a_recording_begin_with_rig_and_key_frame_set () {
+  local elements piece file scene
+  while read -r scene elements; do
+    declare -n coded=$scene
+    rm -f piece*.rcnc direct-*.raw element-*.raw
+    write_pictures direct 2 "${coded[@]}" ! neighbourcodedec
+    # shellcheck disable=SC2086
+    timeout 60 gst-launch-1.0 -q "${coded[@]}" ! $elements location=piece%02d.rcnc || fail "$elements"
+    [ -s piece01.rcnc ] || fail "$scene $elements: one piece"
+    for piece in piece*.rcnc; do
+      play_file part "$piece"
+      for file in part-*.raw; do cat "$file" >>"${file/part/element}"; done
+    done
+    expect_same_pictures element direct 2 "$scene $elements"
+  done <<'END'
+intra multifilesink next-file=key-frame
+temporal multifilesink next-file=key-frame
+intra multifilesink next-file=max-size max-file-size=6000
+temporal multifilesink next-file=max-size max-file-size=6000 aggregate-gops=true
+intra multifilesink next-file=max-duration max-file-duration=3000000000
+temporal multifilesink next-file=max-duration max-file-duration=3000000000 aggregate-gops=true
+temporal splitmuxsink muxer=identity max-size-time=3000000000
+END
 }
 
 test_all_bit_depths_and_thresholds_decode_the_same () {
@@ -61,17 +115,10 @@ test_all_bit_depths_and_thresholds_decode_the_same () {
     expect_decoders_agree settings.rcnc 2 "$settings"
     expect_nothing_damaged "$settings"
   done <<'END'
-depth-threshold=0 colour-threshold=0
 depth-threshold=0 colour-threshold=0 depth-bits=6 colour-bits=4
-depth-bits=7 colour-bits=5 depth-threshold=1 colour-threshold=1
 depth-bits=9 colour-bits=6 depth-threshold=65535 colour-threshold=2
-depth-bits=11 colour-bits=7 depth-threshold=4 colour-threshold=255
-depth-bits=13 depth-threshold=16
-depth-bits=14 depth-threshold=0
-depth-bits=16 colour-bits=8 depth-threshold=100
-depth-scale=inverse
-depth-scale=inverse depth-bits=6 colour-bits=4 depth-threshold=0
-depth-scale=inverse depth-bits=16 depth-threshold=0
+depth-bits=14 depth-threshold=0 colour-threshold=255
+depth-bits=16 depth-threshold=0
 END
 }
 
@@ -85,30 +132,24 @@ test_packed_and_entropy_decode_the_same () {
       expect_nothing_damaged "$profile $settings"
     done
   done <<'END'
-choice=best
-depth-threshold=0 colour-threshold=0 depth-bits=16
 depth-threshold=0 colour-threshold=0 depth-bits=6 colour-bits=4
-depth-bits=7 colour-bits=5 depth-threshold=1 colour-threshold=1
-depth-bits=9 colour-bits=6 depth-threshold=65535 colour-threshold=2
 depth-bits=11 colour-bits=7 depth-threshold=4 colour-threshold=255
 depth-bits=16 colour-bits=8 depth-threshold=16 max-slice-size=400
-depth-scale=inverse choice=best
-depth-scale=inverse depth-bits=7 depth-threshold=3
-depth-scale=inverse depth-bits=16 depth-threshold=0
+choice=best
 END
 }
 
 test_slices_without_key_decode_the_same () {
   local settings profile
   while read -r settings; do
-    for profile in plain packed entropy; do
+    for profile in packed entropy; do
       # shellcheck disable=SC2086
       record temporal.rcnc 2 48x136 "num-buffers=6 range-person-only=true motion=2" "profile=$profile" temporal=true $settings
       expect_decoders_agree temporal.rcnc 2 "$profile temporal $settings"
       expect_nothing_damaged "$profile temporal $settings"
     done
   done <<'END'
-refresh-period=200 max-slice-size=400 depth-scale=inverse
+refresh-period=200 max-slice-size=400
 depth-threshold=0 colour-threshold=0 depth-bits=16 refresh-period=200
 depth-bits=7 colour-bits=5 depth-threshold=1 colour-threshold=30
 END
@@ -117,7 +158,7 @@ END
 test_short_and_long_slices_decode_the_same () {
   local size profile
   for profile in plain packed entropy; do
-    for size in 256 257 300 65535; do
+    for size in 256 65535; do
       record slices.rcnc 1 160x64 num-buffers=1 "profile=$profile" "max-slice-size=$size" depth-bits=16 depth-threshold=0 colour-threshold=0
       expect_decoders_agree slices.rcnc 1 "$profile max-slice-size=$size"
       expect_nothing_damaged "$profile max-slice-size=$size"
@@ -160,12 +201,12 @@ test_damaged_rigs_decode_the_same () {
   record one.rcnc 2 64x48 "num-buffers=1 range-person-only=true"
   record other.rcnc 2 48x36 "num-buffers=1 range-person-only=true arc=60"
   cat one.rcnc other.rcnc one.rcnc other.rcnc >rigs.rcnc
-  for seed in {1..8}; do
+  for seed in {1..3}; do
     python3 - "$seed" <<'END'
 import random, sys
 random.seed(int(sys.argv[1]))
 data = bytearray(open("rigs.rcnc", "rb").read())
-rig_views = [i for i in range(len(data) - 18) if data[i] == 0x32 and data[i + 14 : i + 18] == b"RCRG"]
+rig_views = [i for i in range(len(data) - 18) if data[i] == 0x42 and data[i + 14 : i + 18] == b"RCRG"]
 for begin in rig_views[2:]:
     width = begin + 23 + data[begin + 22]
     end = begin + int.from_bytes(data[begin + 2 : begin + 4], "little")
@@ -180,21 +221,11 @@ END
 
 test_recorded_streams_decode_as_ever () {
   local stream
-  for stream in default exact coarse damaged packed exact-packed entropy inverse temporal-{plain,packed,entropy,lossy} \
+  for stream in default exact coarse damaged packed exact-packed entropy temporal-{packed,entropy,lossy} \
     rules-{damage,depth,entropy,examples,motion,packed,references,rig,slices,stream}; do
     python3 "$python_decoder" "$source_dir/tests/data/$stream.rcnc" "$stream" || fail "$stream"
   done
   sha256sum --check --quiet "$source_dir/tests/data/SHA256SUMS"
-}
-
-# The streams of the document's numbered rules: no encoder writes such.
-test_rules_decode_the_same () {
-  local stream views
-  for stream in damage depth entropy examples motion packed references rig slices stream; do
-    views=1
-    [[ $stream =~ ^(depth|rig|slices)$ ]] && views=2
-    expect_decoders_agree "$source_dir/tests/data/rules-$stream.rcnc" "$views" "rules-$stream"
-  done
 }
 
 # Each misreading of a rule changes a picture of a recorded stream.
@@ -212,7 +243,7 @@ import re, sys
 root = sys.argv[1]
 stream = open(f"{root}/tests/data/rules-examples.rcnc", "rb").read()
 page = open(f"{root}/docs/formats/bitstream.md", encoding="utf-8").read().partition("## Examples")[2]
-blocks = [block for block in re.split(r"\n\n+", page) if block.startswith("    31 01 ")]
+blocks = [block for block in re.split(r"\n\n+", page) if block.startswith("    41 01 ")]
 slices = [bytes.fromhex("".join(re.findall(r"^    ((?:[0-9a-f]{2} ?)+)(?:  |$)", block, re.MULTILINE))) for block in blocks]
 wrong = [one.hex(" ") for one in slices if one not in stream or int.from_bytes(one[2:4], "little") != len(one)]
 sys.exit("\n".join(wrong) if wrong or len(slices) != 3 else 0)
@@ -246,7 +277,7 @@ END
 # whole, or there would be nothing to see.
 test_damaged_files_decode_the_same () {
   local seed profile profiles=(plain packed entropy)
-  for seed in {1..18}; do
+  for seed in {1..6}; do
     profile=${profiles[seed % 3]}
     record good.rcnc 2 64x48 "num-buffers=5 range-person-only=true" max-slice-size=400 "profile=$profile"
     python3 - "$seed" <<'END'
@@ -254,7 +285,7 @@ import random, sys
 random.seed(int(sys.argv[1]))
 data = bytearray(open("good.rcnc", "rb").read())
 first = 28 + 2 * 200
-slices = [i for i in range(first, len(data) - 36) if data[i : i + 2] == b"\x31\x01" and data[i + 5] <= 2 and data[i + 4] < 2]
+slices = [i for i in range(first, len(data) - 36) if data[i : i + 2] == b"\x41\x01" and data[i + 5] <= 2 and data[i + 4] < 2]
 for i in range(20):
     at = random.choice((random.randrange(first, len(data)), random.choice(slices) + random.randrange(36)))
     data[at] ^= 1 << random.randrange(8)
@@ -271,13 +302,13 @@ END
 # What is lost of a frame set is unknown in those that refer to it, and both decoders find the same of
 # it unknown.
 test_damaged_slices_without_key_decode_the_same () {
-  local seed profile profiles=(plain packed entropy) streams=$source_dir/tests/data
-  for seed in {1..24}; do
-    profile=${profiles[seed % 3]}
+  local seed profile profiles=(packed entropy) streams=$source_dir/tests/data
+  for seed in {1..8}; do
+    profile=${profiles[seed % 2]}
     python3 "$source_dir/tests/bitstream/mangle.py" "$streams/temporal-$profile.rcnc" \
-      "$streams/temporal-${profiles[seed % 2 + 1]}.rcnc" mangled.rcnc "$seed"
+      "$streams/temporal-${profiles[(seed + 1) % 2]}.rcnc" mangled.rcnc "$seed"
     expect_decoders_agree mangled.rcnc 1 "$profile, mangled with seed $seed"
     grep -q ' 0 unknown pixels' counts.txt || echo "$seed" >>with-unknown.txt
   done
-  [ "$(wc -l <with-unknown.txt)" -ge 12 ] || fail "hardly any stream had unknown pixels"
+  [ "$(wc -l <with-unknown.txt)" -ge 4 ] || fail "hardly any stream had unknown pixels"
 }

@@ -42,14 +42,6 @@ wait_for_size () { # file bytes seconds
   fail "$1 did not reach $2 bytes in $3 s: $(tail -n 20 host.log)"
 }
 
-test_host_takes_the_cameras_that_its_rig_names () {
-  need_cameras
-  start_cameras cameras.log --views 1 --rig-export rig.yaml
-  start_hosts $((ports + 0)) --input cameras
-  wait_for_size all.rcnc 60000 60
-  stop_all "$host" "$parent" "$recorder" "$cameras"
-}
-
 test_host_takes_bayer_cameras_by_address () {
   need_cameras
   start_cameras cameras.log --views 1 --rig-export rig.yaml --colour bayer
@@ -65,7 +57,7 @@ test_host_waits_for_cameras_that_are_killed_and_come_back () {
   wait_for_size all.rcnc 30000 60
   kill -KILL "$cameras"
   wait "$cameras" 2>/dev/null || true
-  sleep 8 # longer than a heartbeat
+  wait_for host.log '^WARNING: cameras: ' 60
   kill -0 "$host" 2>/dev/null || fail "the host ended: $(cat host.log)"
   start_cameras cameras2.log --views 1
   local before
@@ -76,26 +68,8 @@ test_host_waits_for_cameras_that_are_killed_and_come_back () {
   stop_all "$host" "$parent" "$recorder" "$cameras"
 }
 
-# Pairs from stereocamsrc by themselves; fails unless both cameras took at least so many pictures.
-take_pairs () { # pairs properties...
-  local pairs=$1 side
-  shift
-  timeout 100 gst-launch-1.0 -q stereocamsrc name=c rig=rig.yaml num-buffers="$pairs" "$@" \
-    c.left ! video/x-raw,format=GRAY8,framerate=8/1 ! fakesink c.right ! fakesink >pairs.log 2>&1 || fail "$(cat pairs.log)"
-  for side in left right; do
-    [ "$(grep -c "view0-$side " shots.log)" -ge "$pairs" ] || fail "$side: $(tail -n 5 shots.log pairs.log)"
-  done
-}
-
-test_action_commands_fire_the_cameras () {
-  need_cameras
-  start_cameras cameras.log --views 1 --rig-export rig.yaml --log shots.log
-  take_pairs 20 trigger=action
-  stop_all "$cameras"
-}
-
-# Commands reach the cameras of all hosts: each camera takes one picture a tick all the same.
-test_one_host_of_two_sends_the_action_commands () {
+# Commands are heard by the cameras of all hosts: each camera takes one image a tick all the same.
+test_action_commands_of_two_hosts_trigger_their_own_cameras () {
   need_cameras
   local view
   start_cameras cameras.log --views 2 --rig-export rig.yaml --log shots.log
@@ -104,20 +78,16 @@ test_one_host_of_two_sends_the_action_commands () {
       --input cameras --trigger action >host$view.log 2>&1 &
     hosts[view]=$!
   done
-  wait_for shots.log view1-right 60
-  sleep 6
+  local i
+  for ((i = 0; i < 300; i++)); do
+    [ "$(grep -c view1-right shots.log)" -lt 25 ] || [ "$(grep -c view0-right shots.log)" -lt 25 ] || break
+    sleep 0.2
+  done
   stop_all "${hosts[@]}" "$cameras"
   awk '{ n[$1]++; if (!($1 in first)) first[$1] = $3; last[$1] = $3 }
     END { for (name in n) { ticks = (last[name] - first[name]) / 125e6; cameras++
-        if (n[name] < 20 || n[name] > ticks + 4) { print name, n[name], "pictures in", ticks, "ticks"; bad = 1 } }
+        if (n[name] < 20 || n[name] > ticks + 4) { print name, n[name], "images in", ticks, "ticks"; bad = 1 } }
       exit bad || cameras != 4 }' shots.log || fail "$(tail -n 5 host?.log)"
-}
-
-test_left_cameras_output_line_fires_the_right_one () {
-  need_cameras
-  start_cameras cameras.log --views 1 --rig-export rig.yaml --log shots.log
-  take_pairs 20 trigger=hardware output-line=Line2
-  stop_all "$cameras"
 }
 
 test_cameras_say_what_is_wrong () {
@@ -131,7 +101,6 @@ test_cameras_say_what_is_wrong () {
   stop_all "$cameras"
   expect_error "--trigger" rangecast camera --view 0 --rig rig.yaml --to 127.0.0.1:1 --input cameras --trigger never
   expect_error "--clock-server" rangecast camera --view 0 --rig rig.yaml --to 127.0.0.1:1 --clock-server 127.0.0.1:1
-  expect_error "--action-send" rangecast camera --view 0 --rig rig.yaml --to 127.0.0.1:1 --input cameras --action-send 3
   expect_error "--input" rangecast camera --view 0 --rig rig.yaml --to 127.0.0.1:1 --input cameras=one
   expect_error "$(address 1)" rangecast camera --view 0 --rig rig.yaml --to 127.0.0.1:1 --input cameras
 }
@@ -238,9 +207,14 @@ start_machines () { # host-options...
   for view in 0 1 2; do wait_for "shots$view.log" . 60; done
 }
 
-# Sets `ticks` and `p50_us` from so many seconds of the machines' pictures.
-watch_machines () { # seconds
-  sleep "$1"
+# Sets `ticks` and `p50_us` from so many images of each machine's cameras.
+watch_machines () { # images
+  local view
+  for view in 0 1 2; do
+    enough () { [ "$(grep -c left "shots$view.log")" -ge "$images" ]; }
+    images=$1
+    until_true 120 enough
+  done
   remove_machines
   spread shots?.log | tee spread.txt
   local cameras
@@ -254,21 +228,11 @@ test_eight_cameras_of_three_machines_fire_at_the_same_ticks () {
   need_namespaces "rc$$"
   trap remove_machines EXIT
   start_machines --clock-server 10.213.7.1:7100
-  watch_machines 25
+  watch_machines 100
   [ "$ticks" -ge 50 ] || fail "few ticks: $(cat spread.txt)"
-  # Not a matter of speed: by clocks of their own they are 30 ms and more apart, see the next test.
+  # Not a matter of speed: by clocks of their own they are 30 ms and more apart.
   [ "$p50_us" -lt 15000 ] || fail "the machines do not fire together: $(cat spread.txt)"
   timeout 60 count-points all.rcnc >views.txt
   awk '/^frame set/ { n = 0 } /^  view [012]: [1-9]/ && ++n == 3 { whole++ } END { exit !(whole >= 20) }' views.txt ||
     fail "few frame sets of all three views: $(tail -n 8 views.txt) $(tail -n 5 host?.log)"
-}
-
-test_without_the_shared_clock_they_do_not () {
-  need_cameras
-  need_namespaces "rc$$"
-  trap remove_machines EXIT
-  start_machines
-  watch_machines 12
-  [ "$ticks" -ge 20 ] || fail "few ticks: $(cat spread.txt)"
-  [ "$p50_us" -gt 30000 ] || fail "the test before proves nothing: $(cat spread.txt)"
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# The main job: all hosts as separate processes. Nothing here asserts a speed.
+# The whole system: all hosts as separate processes. Nothing here asserts a speed.
 
 report () { python3 -c "import json; r = json.load(open('$1')); print($2)"; }
 
@@ -47,8 +47,8 @@ test_demo_plays_recorded_pairs () {
   mkdir pairs
   for view in 0 1; do
     gst-launch-1.0 -q avatartestsrc name=s views=2 arc=60 view-id=$view num-buffers=200 empty-frames=25 rig-export=pairs/rig.yaml \
-      s.left ! video/x-raw,format=RGB,width=160,height=120,framerate=8/1 ! queue ! jpegenc ! multifilesink location="pairs/view$view-left-%05d.jpg" \
-      s.right ! video/x-raw,format=RGB,width=160,height=120,framerate=8/1 ! queue ! jpegenc ! multifilesink location="pairs/view$view-right-%05d.jpg"
+      s.left ! video/x-raw,width=160,height=120,framerate=8/1 ! queue ! jpegenc ! multifilesink location="pairs/view$view-left-%05d.jpg" \
+      s.right ! video/x-raw,width=160,height=120,framerate=8/1 ! queue ! jpegenc ! multifilesink location="pairs/view$view-right-%05d.jpg"
   done
   rangecast demo --input pairs --fps 8 --frames 10 --out demo
   check_report demo 10 2
@@ -64,6 +64,12 @@ test_demo_takes_pictures_with_cameras () {
 test_demo_says_what_is_wrong () {
   expect_error "none of: avatar" rangecast demo --input nowhere --out demo
   expect_error "no model 'none.glb'" rangecast demo --input avatar=none.glb --out demo
+  expect_error "--window: no display" env -u DISPLAY -u WAYLAND_DISPLAY rangecast demo --window --out demo
+  [ ! -e demo ] || fail "written before the check"
+  touch file
+  expect_error "/file/log': Not a directory" rangecast demo --out file
+  mkdir -p busy/log
+  expect_error "another demo writes to '$PWD/busy'" flock busy/log/lock rangecast demo --out busy
   echo "this is no model" >bad.glb
   expect_error "bad.glb" rangecast demo --input avatar=bad.glb --out demo
 }
@@ -86,7 +92,12 @@ test_interrupted_demo_ends_all_hosts () {
   local demo=$!
   host () { pgrep -f "rangecast-run .*$PWD/demo/log/viewer.json" >host.txt; }
   until_true 60 host
+  kill -STOP "$demo" # so that the second one comes while it ends them
+  kill -INT "$demo"
   kill -TERM "$demo"
-  ! wait "$demo" || fail "status 0 after SIGTERM"
+  kill -CONT "$demo"
+  local status=0
+  wait "$demo" || status=$?
+  [ "$status" = 130 ] || [ "$status" = 143 ] || fail "status $status after signals"
   ! pgrep -f "rangecast-run .*$PWD/demo" || fail "hosts are left"
 }

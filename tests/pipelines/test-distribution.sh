@@ -80,15 +80,6 @@ test_a_multicast_group_reaches_all_viewers () {
   wait_for_whole_sets two.rcnc 8 40
 }
 
-test_a_picture_is_drawn_on_a_host_of_its_own () {
-  need_gl
-  start_network screen
-  start_hosts --to "$(list screen)"
-  rangecast view --listen 6000 --picture 320x240 --print | sed 's/^gst-launch-1.0 -e/rangecast-run --frames 12 --views 2 --snapshot picture.png/' >view.sh
-  net_on screen timeout -k 5 100 bash view.sh >screen.log 2>&1 || fail "$(tail -n 5 ./*.log)"
-  expect_file picture.png 3000
-}
-
 test_encrypted_hosts_need_the_same_key () {
   head -c 30 /dev/urandom | od -An -tx1 | tr -d ' \n' >right.key
   head -c 30 /dev/urandom | od -An -tx1 | tr -d ' \n' >wrong.key
@@ -112,7 +103,7 @@ test_encrypted_hosts_need_the_same_key () {
 test_a_viewer_that_joins_gets_a_key_frame_set_through_the_parent () {
   start_network one
   rangecast record one.rcnc --listen 6000 --feedback-to "$(net_address parent):5200" --print |
-    sed 's/! neighbourcodeparse/! neighbourcodedec ! neighbourcodeenc ! neighbourcodeparse/' >decode.sh
+    sed 's/! filesink/! neighbourcodedec ! neighbourcodeenc ! filesink/' >decode.sh
   net_on parent rangecast parent --views 2 --listen 5000 --to "$(list one)" --feedback-port 5200 \
     --cameras "$(net_address camera0):5100,$(net_address camera1):5100" >parent.log 2>&1 &
   local view
@@ -160,26 +151,6 @@ test_retransmission_makes_frame_sets_whole_between_hosts () {
   repair "--rtx --feedback-port 5200" --rtx --feedback-to PARENT:5200
 }
 
-# Capture times of the frame sets of a file that lack nothing.
-whole_times () { # file
-  "${RANGECAST_BUILD:-$source_dir/build}/tests/pipelines/stream-report" --list "$1" 2>/dev/null | awk '!/!/ { print $1 }' | sort
-}
-
-# Who may ask takes nothing for lost that is only late.
-test_retransmission_costs_nothing_on_a_good_network () {
-  start_network one two
-  camera_options="--input range --encoder profile=entropy"
-  start_hosts --to "$(list one two)" --rtx --feedback-port 5200
-  start_viewer two
-  start_viewer one --rtx --feedback-to "$(net_address parent):5200"
-  wait_for_whole_sets one.rcnc 40 90
-  wait_for_whole_sets two.rcnc 40 90
-  local first last missing
-  first=$(whole_times one.rcnc | head -n 1) last=$(whole_times one.rcnc | tail -n 1)
-  missing=$(comm -13 <(whole_times one.rcnc) <(whole_times two.rcnc) | awk -v a="$first" -v b="$last" '$1 > a && $1 < b' | wc -l)
-  [ "$missing" -le 1 ] || fail "$missing frame sets of those that came without retransmission did not come with it"
-}
-
 resident_kb () { awk '/^VmRSS/ { print $2 }' "/proc/$1/status"; }
 
 # Nothing grows where a viewer does not read: neither the parent, nor the viewer when it goes on.
@@ -193,7 +164,7 @@ test_a_stopped_viewer_costs_no_memory () {
   parent_before=$(resident_kb "$parent") viewer_before=$(resident_kb "$viewer")
   kill -STOP "$viewer"
   sets=$(whole_sets two.rcnc)
-  wait_for_whole_sets two.rcnc $((sets + 120)) 90
+  wait_for_whole_sets two.rcnc $((sets + 60)) 60
   kill -CONT "$viewer"
   sets=$(whole_sets one.rcnc)
   wait_for_whole_sets one.rcnc $((sets + 8)) 40

@@ -9,7 +9,7 @@
 pages=$source_dir/docs/elements
 
 test_tables_are_those_of_the_elements () {
-  RANGECAST_BUILD=${RANGECAST_BUILD:-$source_dir/build} python3 "$pages/update.py" --check
+  RANGECAST_BUILD=${RANGECAST_BUILD:-$source_dir/build} /usr/bin/python3 "$pages/update.py" --check
 }
 
 # usage: adapt <script >script

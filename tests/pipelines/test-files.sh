@@ -25,8 +25,11 @@ test_recording_becomes_points_film_and_numbers () {
   rangecast convert recording.rcnc cloud-%05d.ply
   [ "$(find . -name 'cloud-*.ply' | wc -l)" = 8 ] || fail "not 8 PLY files: $(ls)"
   [ "$(ply_vertices cloud-00005.ply)" -gt 3000 ] || fail "few points: $(ply_vertices cloud-00005.ply)"
-  expect_error "a second point cloud would go into the file of the first" rangecast convert recording.rcnc one.ply
-  rangecast play recording.rcnc --film film.webm --picture 320x240
+  rangecast convert recording.rcnc one.ply # the first
+  cmp one.ply cloud-00000.ply
+  expect_error "recording.rcnc' is what is converted" rangecast convert recording.rcnc ./recording.rcnc
+  expect_error "needs a name that ends in .ply, .pcd" rangecast convert recording.rcnc one.png
+  rangecast play recording.rcnc --video film.webm --output-size 320x240
   expect_file film.webm 1000
   "${RANGECAST_BUILD:-$source_dir/build}/pipelines/count-points" recording.rcnc >points.txt
   [ "$(grep -c '^frame set' points.txt)" = 8 ] || fail "$(cat points.txt)"
@@ -41,7 +44,38 @@ test_rgbd_pictures_become_points_and_a_picture () {
   [ "$(ply_vertices cloud.ply)" -gt 200000 ] || fail "few points: $(ply_vertices cloud.ply)"
   rangecast convert --rgbd "${pictures[@]}" picture.png --focal-length 525
   expect_file picture.png 50000
-  expect_error "is not a 16-bit greyscale PNG" rangecast convert --rgbd "${pictures[0]}" "${pictures[0]}" cloud.ply
+  expect_error "is not a 16-bit greyscale image" rangecast convert --rgbd "${pictures[0]}" "${pictures[0]}" cloud.ply
+}
+
+# As public data sets have them: counted from any number, named after the time, in several formats.
+test_rgbd_images_of_all_kinds_give_the_same_points () {
+  local format convert=(rangecast convert --depth-scale 0.0001 --rgbd)
+  mkdir colour depth
+  gst-launch-1.0 -q avatartestsrc num-buffers=2 ! rangesplit mask=false name=s s.colour ! queue ! videoconvert ! tee name=c \
+    c. ! queue ! pngenc ! multifilesink index=7 location=colour/%d.png c. ! queue ! pnmenc ! multifilesink index=7 location=colour/%d.ppm \
+    s.depth ! queue ! tee name=d d. ! queue ! pngenc ! multifilesink index=7 location=depth/%d.png \
+    d. ! queue ! videoconvert ! video/x-raw,format=GRAY16_BE ! multifilesink index=7 location=depth/%d.raw d. ! queue ! videoconvert ! video/x-raw,format=GRAY16_LE ! avenc_tiff ! multifilesink index=7 location=depth/%d.tiff
+  printf 'P5\n320 240\n65535\n' | cat - depth/8.raw >depth/8.pgm # pnmenc 1.22 swaps the bytes
+  "${convert[@]}" colour/%d.png depth/%d.png points-%d.ply
+  [ "$(ply_vertices points-7.ply)" -gt 15000 ] && [ "$(ply_vertices points-8.ply)" -gt 15000 ] || fail "$(ls)"
+  for format in pgm tiff; do
+    "${convert[@]}" colour/8.ppm "depth/8.$format" "$format.ply"
+    cmp "$format.ply" points-8.ply
+  done
+  # The list of TUM's associate.py, and that of ICL-NUIM, which begins with the depth.
+  mv colour/8.png colour/1305031102.1753.png
+  printf '# time\n0.1 colour/7.png 0.2 depth/7.png\n1305031102.1753 colour/1305031102.1753.png 0.4 depth/8.png\n' >associations.txt
+  awk '/^#/ { next } { print $3, $4, $1, $2 }' associations.txt >swapped.txt
+  for format in associations swapped; do
+    "${convert[@]}" "$format.txt" "$format-%d.ply"
+    cmp "$format-1.ply" points-8.ply
+  done
+  echo colour/7.png depth/9.png >broken.txt
+  expect_error "no file 'depth/9.png'" "${convert[@]}" broken.txt out-%d.ply
+  # 8 m do not fit into 16 bits at 0.1 mm.
+  "${convert[@]}" colour/7.png depth/7.png far.ply --far 8
+  [ "$(ply_vertices far.ply)" = "$(ply_vertices points-7.ply)" ] || fail "$(ply_vertices far.ply) points with --far 8"
+  "${convert[@]}" colour/7.png depth/7.png narrow.ply --focal-length 1920 2>&1 | grep -q "a field of view of 9.5 degrees" || fail "no warning"
 }
 
 test_stereo_pair_is_rendered_without_a_word () {
@@ -75,7 +109,7 @@ test_bunny_scans_go_through_everything () {
 test_people_are_cut_out_of_a_real_recording_without_their_shadows () {
   need_data luxonis_people_stereo/left.mp4
   local input=$data/luxonis_people_stereo empty n
-  rig-convert luxonis "$input/calib.json" rig.yaml --near 0.7 --far 4 --scale 0.5
+  rangecast import "$input/calib.json" --out rig.yaml --near 0.7 --far 4 --scale 0.5
   rangecast convert "$input/left.mp4" "$input/right.mp4" out --rig rig.yaml --size 640x400 --fps 5 --settle 17 --learn 8 \
     --person "shadow=0.1 highlight=8 depth-threshold=0.3 min-area=1000 max-hole=400"
   empty=$(stat -c %s out/00001.png) # learning: all black
@@ -102,19 +136,21 @@ test_raw_depth_from_a_pipe_joins_live_colour () {
   [ "$(grep -c ' [1-9][0-9]\{3,\} points' points.txt)" -ge 10 ] || fail "$(cat points.txt)"
 }
 
-# usage: adapt EXAMPLE: a copy that ends by itself and needs no window
+# usage: adapt EXAMPLE: a copy that ends by itself and needs neither a window nor a camera
+packed="avatartestsrc is-live=true name=c c.left ! video\\/x-raw,width=640,height=480 ! queue ! p.sink_0 c.right ! queue ! p.sink_1 \
+  compositor name=p sink_1::xpos=640"
 adapt () {
   [ "$(wc -l <"$pipelines/examples/$1.sh")" -le 20 ] || fail "$1.sh has more than 20 lines"
-  sed -e 's/exec gst-launch-1.0/exec timeout -s INT 60 gst-launch-1.0/' -e 's/glimagesink/fakesink num-buffers=5/' \
+  sed -e "s/v4l2src device=[^ ]*/$packed ! jpegenc/" -e 's/exec gst-launch-1.0/exec timeout -s INT 60 gst-launch-1.0/' -e 's/glimagesink/fakesink num-buffers=5/' \
     -e 's/avatartestsrc /avatartestsrc num-buffers=400 /' "$pipelines/examples/$1.sh" >"$1.sh"
 }
 
-# As they stand: camera host, parent, viewer and recorder together, then a player, and FEC.
+# As they stand: camera host, parent, viewer and recorder together, then a player, FEC and a webcam.
 test_examples_of_launch_strings_run () {
   need_gl
   local name
   gst-launch-1.0 -q avatartestsrc views=4 num-buffers=1 rig-export=rig.yaml ! fakesink
-  for name in camera-host parent-host viewer record play rtp-with-fec; do adapt $name; done
+  for name in camera-host parent-host viewer record play rtp-with-fec webcam; do adapt $name; done
   for name in camera-host parent-host; do sh $name.sh >$name.log 2>&1 & done
   sh viewer.sh >viewer.log 2>&1 || fail "$(tail -n 5 ./*.log)"
   grep -q 'Got EOS' viewer.log || fail "no five pictures: $(tail -n 5 ./*.log)"
@@ -126,4 +162,6 @@ test_examples_of_launch_strings_run () {
   wait $recorder || true
   sh play.sh >play.log 2>&1 && grep -q 'Got EOS' play.log || fail "$(tail -n 5 play.log)"
   sh rtp-with-fec.sh >fec.log 2>&1 && grep -q 'Got EOS' fec.log || fail "$(tail -n 5 fec.log)"
+  gst-launch-1.0 -q avatartestsrc num-buffers=1 rig-export=webcam.yaml ! video/x-range,width=640,height=480 ! fakesink
+  sh webcam.sh >webcam.log 2>&1 && grep -q 'Got EOS' webcam.log || fail "$(tail -n 5 webcam.log)"
 }

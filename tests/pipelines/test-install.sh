@@ -24,22 +24,15 @@ test_application_builds_against_the_installed_library () {
   expect_error "usage" ./count-points
 }
 
-test_python_reads_the_same_points_as_c () {
+test_python_reads_frame_sets_with_the_installed_library () {
   /usr/bin/python3 -c "import gi, numpy; gi.require_version('Gst', '1.0')" 2>/dev/null || skip "no PyGObject or NumPy"
   [[ "$(meson introspect --buildoptions "$build" | tr -d ' \n')" != *'"b_sanitize","value":"address'* ]] || skip "sanitized build"
   install_below_here
-  local typelib
+  local typelib overrides
   typelib=$(find "$prefix" -name GstRange-1.0.typelib)
-  [ -n "$typelib" ] || fail "no GstRange-1.0.typelib below $prefix"
-  "$build/pipelines/count-points" "$source_dir/tests/data/default.rcnc" >c.txt
-  GI_TYPELIB_PATH=$(dirname "$typelib") LD_LIBRARY_PATH=$(dirname "$(find "$prefix" -name 'libgstrange-1.0.so')") \
-    /usr/bin/python3 "$pipelines/examples/count-points.py" "$source_dir/tests/data/default.rcnc" >python.txt
-  grep -q "view 1: [1-9][0-9]* points" c.txt || fail "no points: $(cat c.txt)"
-  cmp c.txt python.txt || fail "C: $(cat c.txt) Python: $(cat python.txt)"
-  [ -f "$(dirname "$typelib")/../../../share/gir-1.0/GstRange-1.0.gir" ] || fail "no GstRange-1.0.gir below $prefix"
-  local overrides
   overrides=$(find "$prefix" -path '*/gi/overrides/GstRange.py')
-  [ -n "$overrides" ] || fail "no gi/overrides/GstRange.py below $prefix"
+  [ -n "$typelib" ] && [ -n "$overrides" ] || fail "no GstRange-1.0.typelib or gi/overrides/GstRange.py below $prefix"
+  [ -f "$(dirname "$typelib")/../../../share/gir-1.0/GstRange-1.0.gir" ] || fail "no GstRange-1.0.gir below $prefix"
   GI_TYPELIB_PATH=$(dirname "$typelib") LD_LIBRARY_PATH=$(dirname "$(find "$prefix" -name 'libgstrange-1.0.so')") \
     PYTHONPATH=${overrides%/gi/overrides/GstRange.py} PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 "$pipelines/examples/frames.py" \
     --source "filesrc location=$source_dir/tests/data/default.rcnc ! neighbourcodeparse ! neighbourcodedec" >frames.txt

@@ -33,7 +33,7 @@ test_each_list_belongs_to_a_package () {
 }
 
 test_what_is_missing_is_said () {
-  expect_error "expected one argument" "$pipelines/make-packages.sh"
+  expect_error "give one argument" "$pipelines/make-packages.sh"
   expect_error "unknown option '--x'" "$pipelines/make-packages.sh" --x
   touch file
   expect_error "cannot create" "$pipelines/make-packages.sh" file/out

@@ -55,10 +55,10 @@ END
 test_cameras_have_matrices () {
   check <<'END'
 k, pose = [[300, 0, 31], [0, 301, 22], [0, 0, 1]], [[0, 0, -1, 1], [0, -1, 0, 2], [-1, 0, 0, 3]]
-made = GstRange.new_caps([GstRange.new_camera(2, 64, 48, k, pose, depth_unit=0.002, near=0.5, far=2)], 29.97)
+made = GstRange.new_caps([GstRange.new_camera(2, 64, 48, k, pose, depth_unit=0.002, min_depth=0.5, max_depth=2)], 29.97)
 camera = GstRange.map_views(GstRange.new_buffer(made, {2: (depth, colour)}), made)[0].camera
 assert (camera.intrinsics == k).all() and (camera.pose == pose + [[0, 0, 0, 1]]).all()
-assert (camera.view_id, camera.depth_unit, camera.near, camera.far) == (2, 0.002, 0.5, 2)
+assert (camera.view_id, camera.depth_unit, camera.min_depth, camera.max_depth) == (2, 0.002, 0.5, 2)
 assert made.get_structure(0).get_value("framerate") == Gst.Fraction(2997, 100), made.to_string()
 assert GstRange.map_views(both(), caps)[1].camera.intrinsics[0, 0] == 113
 END
@@ -123,7 +123,7 @@ refused(ValueError, "views [4] are not in the caps, which have [3, 63]", make, (
 refused(ValueError, "neighbourcodedec", GstRange.map_views, both(), Gst.Caps.from_string("video/x-neighbour-code"))
 refused(ValueError, "with a rig", GstRange.map_views, both(), Gst.Caps.from_string("video/x-range,width=64,height=48,views=2"))
 refused(ValueError, "expected video/x-range, got None", GstRange.map_views, both())
-refused(GLib.Error, "expected 0 to 63", GstRange.new_caps, [GstRange.new_camera(64, 64, 48, 50)])
+refused(GLib.Error, "must be 0 to 63", GstRange.new_caps, [GstRange.new_camera(64, 64, 48, 50)])
 refused(GLib.Error, "used twice", GstRange.new_caps, cameras + cameras)
 refused(GLib.Error, "at least one camera", GstRange.new_caps, [])
 refused(ValueError, "[[fx, 0, cx]", GstRange.new_camera, 0, 64, 48, np.eye(4))
@@ -154,17 +154,17 @@ test_frames_saves_points_of_all_views () {
   grep -aq "^element vertex $points$" head.ply || fail "$(head -c 100 head.ply)"
   expect_file head.ply $((points * 15))
   expect_error "does-not-exist" $python "$examples/frames.py" --source "filesrc location=does-not-exist ! neighbourcodeparse ! neighbourcodedec"
-  expect_error "expected a name that ends in .ply or .npy" $python "$examples/frames.py" --save head.obj
+  expect_error "use a name that ends in .ply or .npy" $python "$examples/frames.py" --save head.obj
   expect_error "no element" $python "$examples/frames.py" --source no-such-element
   expect_error "no-such-device" $python "$examples/frames.py" --source "v4l2src device=/no-such-device ! d.left stereodepth name=d packing=side-by-side"
   expect_error "no frame set came" $python "$examples/frames.py" --source "avatartestsrc num-buffers=0"
-  expect_error "expected 1 or more" $python "$examples/frames.py" --frames 0
+  expect_error "--frames must be 1 or more, got 0" $python "$examples/frames.py" --frames 0
 }
 
 # What frame_source.py draws is 0.92 to 1.08 m before the camera, and round the world's origin.
 test_frame_source_records_what_frames_reads () {
   need_python
-  $python "$examples/frame_source.py" --frames 5 --sink "neighbourcodeenc ! neighbourcodeparse ! filesink location=$PWD/wave.rcnc"
+  $python "$examples/frame_source.py" --frames 5 --sink "neighbourcodeenc ! filesink location=$PWD/wave.rcnc"
   $python "$examples/frames.py" --frames 9 --source "filesrc location=$PWD/wave.rcnc ! neighbourcodeparse ! neighbourcodedec" --save "$PWD/wave.npy" >frames.txt
   [ "$(wc -l <frames.txt)" = 5 ] || fail "$(cat frames.txt)"
   grep -q "^0:00:00.1333" frames.txt || fail "$(cat frames.txt)"

@@ -13,10 +13,12 @@ refuses () {
 test_each_command_has_help () {
   local command
   rangecast --help >help.txt
-  for command in demo camera parent view record play webcam calibrate call serve convert check; do
+  for command in demo camera parent view record play webcam calibrate call serve convert import check; do
     grep -qE "^    $command( |$)" help.txt || fail "$command is not in: $(cat help.txt)"
     rangecast "$command" --help | grep -q "^usage: rangecast $command" || fail "no help of $command"
   done
+  expect_error "demo, camera, parent" rangecast
+  [ "$(rangecast --version)" = "rangecast $(sed -n "s/^ *version: '\(.*\)',/\1/p" "$source_dir/meson.build")" ] || fail "another version"
 }
 
 test_values_out_of_range_are_named () {
@@ -42,12 +44,13 @@ test_addresses_are_checked () {
 test_files_are_checked () {
   refuses "no folder 'nowhere'" record nowhere/x.rcnc
   refuses "'.' is a folder" record .
-  refuses "no file 'none.rcnc'" play none.rcnc --film x.webm
+  refuses "no file 'none.rcnc'" play none.rcnc --video x.webm
+  refuses "File name too long" play "$(printf %0300d 0)"
   refuses "no file 'none.yaml'" camera --view 0 --rig none.yaml --to 127.0.0.1:5000
   echo 123 >key
   refuses "'key' does not hold 60 hexadecimal digits" view --listen 5000 --key key
   echo "no recording" >text.rcnc
-  refuses "No access unit found" play text.rcnc --film film.webm
+  refuses "No valid frames found" play text.rcnc --video film.webm
   [ ! -e film.webm ] || fail "an empty film is left"
 }
 
@@ -70,7 +73,7 @@ test_options_that_need_each_other_say_so () {
   refuses "--rtx needs --feedback-port" "${camera[@]}" --rtx
   refuses "adaptive-bitrate needs --feedback-port" "${camera[@]}" --encoder adaptive-bitrate=true
   refuses "--loop is for --input avatar" "${camera[@]}" --loop 3 --input range
-  refuses "--views is 3, but the rig 'rig.yaml' has 2 views" "${camera[@]}" --views 3
+  refuses "--views is 3, but the rig 'rig.yaml' has 2" "${camera[@]}" --views 3
   refuses "--input: 'nowhere' is none of" "${camera[@]}" --input nowhere
   refuses "cameras= needs LEFT,RIGHT" "${camera[@]}" --input cameras=one
   refuses "127.0.0.1:6000, or the next port for RTCP, is in --to" "${camera[@]}" --microphone audiotestsrc --audio-to 127.0.0.1:6000
@@ -83,10 +86,23 @@ test_options_that_need_each_other_say_so () {
   refuses "--interface is for --multicast" view --listen 5000 --interface lo
   refuses "--echo-cancel needs" view --listen 5000 --echo-cancel
   refuses "options of RTP need --listen" record x.rcnc --audio-port 5000
+  refuses "options of RTP need --listen" record x.rcnc --interface lo
+  refuses "options of RTP need --listen" serve --fec
+  refuses "--repeat needs --file" serve --repeat
+  refuses "no certificate" serve --certificate rig.yaml
   refuses "exclude each other" serve --anonymous --token x
   refuses "--private-key needs --certificate" serve --private-key rig.yaml
   refuses "needs RECORDING OUT" convert one
   refuses "needs --rig, or --focal-length" convert rig.yaml rig.yaml out.png
+  refuses "a recording has its geometry" convert rig.yaml out.ply --fps 5
+  refuses "--views, --size and --frames are for the built-in figure" record x.rcnc --listen 5000 --frames 5
+  refuses "no rig file 'x.yaml' yet" import rig.yaml --append --out x.yaml
+  echo none >none.yaml
+  refuses "'none.yaml' has no views: it is no rig file" camera --view 0 --rig none.yaml --to 127.0.0.1:5000
+  refuses "--settle needs --learn" convert rig.yaml rig.yaml out --settle 3
+  refuses "--settle needs --learn" webcam --print --settle 3
+  refuses "not allowed with argument" webcam --print --device /dev/video1 --source videotestsrc
+  refuses "--right is given twice for view 0" calibrate --left a --right b --right c --out rig.yaml
   ! compgen -G 'x.rcnc*' || fail "a file was written"
 }
 
@@ -95,10 +111,34 @@ test_printed_strings_run_in_a_shell () {
   grep -q "^rangecast-run --drop-empty 'a b.rcnc'" string.sh || fail "$(cat string.sh)"
   bash string.sh
   expect_file "a b.rcnc" 500
+  rangecast serve --anonymous --title "c ! d" --print | grep -q 'title="c ! d"' || fail "the title is changed"
   rangecast convert "a b.rcnc" 'cloud-%d.ply' --print >string.sh
   grep -q '^gst-launch-1.0 -e ' string.sh || fail "$(cat string.sh)"
   bash string.sh >/dev/null
   expect_file cloud-3.ply 500
+}
+
+test_demo_and_call_print_the_strings_of_their_hosts () {
+  make_rig
+  rangecast demo --input range --views 2 --size 64x48 --window --print >demo.txt
+  [ "$(grep -cE '^[A-Z_=0-9a-z ]*rangecast-run ' demo.txt) $(find out -type f)" = "4 out/rig.yaml" ] || fail "$(cat demo.txt; find out)"
+  rangecast call --peer 127.0.0.1 --rig rig.yaml --print >call.txt
+  [ "$(grep -cE '^(rangecast-run|gst-launch-1.0) ' call.txt)" = 4 ] || fail "$(cat call.txt)"
+}
+
+test_a_printed_server_has_its_token_in_the_string_and_no_file () {
+  gst-inspect-1.0 rangewebsink >/dev/null 2>&1 || skip "built without rangewebsink"
+  mkdir temporary
+  TMPDIR=$PWD/temporary rangecast serve --address 0.0.0.0 --print >serve.txt
+  grep -q ' token=[^ ]' serve.txt || fail "no token: $(cat serve.txt)"
+  [ -z "$(ls temporary)" ] || fail "left: $(cat temporary/*)"
+  rangecast demo --input range --views 2 --size 64x48 --web --print | grep -q rangewebsink || fail "no server"
+}
+
+test_commands_without_a_pipeline_do_not_print_one () {
+  make_rig
+  refuses "unrecognized arguments: --print" check --print
+  refuses "unrecognized arguments: --print" import rig.yaml --out new.yaml --print
 }
 
 test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
@@ -122,7 +162,7 @@ s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", 20200))
 test_recordings_are_kept () {
   rangecast record good.rcnc --frames 3 --size 160x120 --views 1
   cp good.rcnc before.rcnc
-  refuses "'good.rcnc' is what is played" play good.rcnc --film good.rcnc
+  refuses "'good.rcnc' is what is played" play good.rcnc --video good.rcnc
   rangecast record good.rcnc --listen 20300 >record.log 2>&1 &
   until_true 60 takes_interrupt $!
   refuses "'good.rcnc' is being recorded by another program" record good.rcnc --listen 20301
@@ -154,10 +194,10 @@ test_bash_completes_commands_and_options () {
 
 test_a_film_of_a_stream_that_did_not_come_is_not_left () {
   need_gl
-  rangecast view --listen 20400 --out film --picture 160x120 >viewer.log 2>&1 &
+  rangecast view --listen 20400 --video film.webm --output-size 160x120 >viewer.log 2>&1 &
   until_true 60 takes_interrupt $!
-  until_true 60 test -e film/avatar.webm
+  until_true 60 test -e film.webm
   kill -INT $!
   ! wait $! || fail "nothing came, but no error"
-  [ ! -e film/avatar.webm ] || fail "an empty film is left"
+  [ ! -e film.webm ] || fail "an empty film is left"
 }

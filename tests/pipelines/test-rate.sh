@@ -17,7 +17,7 @@ start_viewer () { # port seconds name caps
 
 start_sender () { # port seconds name caps encoder
   # shellcheck disable=SC2086 # $5 is several properties
-  timeout -k 5 "$2" gst-launch-1.0 -m rtpbin name=r rtp-profile=avpf \
+  GST_DEBUG=neighbourcodeenc:5 GST_DEBUG_NO_COLOR=1 timeout -k 5 "$2" gst-launch-1.0 -m rtpbin name=r rtp-profile=avpf \
     avatartestsrc is-live=true range-person-only=true "views=${views:-2}" ! video/x-range,width=320,height=240,framerate=15/1 ! neighbourcodeenc profile=entropy $5 \
     ! rtpneighbourcodepay ! "$4" ! r.send_rtp_sink_0 \
     r.send_rtp_src_0 ! udpsink host=127.0.0.1 port="$1" sync=false async=false \
@@ -73,14 +73,13 @@ test_a_narrow_link_loses_little_where_the_rate_follows_the_receiver () {
   echo "lost: $fixed % as it is, $adaptive % with transport-wide feedback"
   [ "$fixed" -ge 20 ] || fail "the link is no obstacle: only $fixed % lost"
   [ "$adaptive" -le $((fixed / 3)) ] || fail "$adaptive % lost with feedback, $fixed % without"
-  grep -q 'neighbourcodeenc-adaptive-bitrate' adaptive-sender.log || fail "no message of the new bit rate"
 }
 
 test_below_the_worst_thresholds_frame_sets_are_left_out_before_slices_are_lost () {
   local views=1
   run_pair $((ports + 40)) 80 low "$caps,$twcc" 200 'adaptive-bitrate=true min-bitrate=50000 min-framerate=1/1'
   run_for 18 low
-  grep -qE 'adaptive-bitrate.* one-of=\(int\)([2-9]|[1-9][0-9])' low-sender.log || fail "all frame sets were sent: $(tail -n 3 low-sender.log)"
+  grep -q 'skipping a frame set' low-sender.log || fail "all frame sets were sent: $(tail -n 3 low-sender.log)"
   local lost
   lost=$(lost_of low 10)
   echo "lost: $lost %"
@@ -90,15 +89,12 @@ test_below_the_worst_thresholds_frame_sets_are_left_out_before_slices_are_lost (
 test_camera_host_with_feedback_follows_the_link () {
   timeout 60 gst-launch-1.0 -q avatartestsrc views=1 num-buffers=1 rig-export=rig.yaml ! fakesink
   udp-relay --listen $((ports + 50)) --to "127.0.0.1:$((ports + 51))" --bandwidth 500 >relay.log 2>&1 &
-  timeout -k 5 28 rangecast record out.rcnc --listen $((ports + 51)) --feedback-to "127.0.0.1:$((ports + 52))" >record.log 2>&1 &
+  timeout -k 5 80 rangecast record out.rcnc --listen $((ports + 51)) --feedback-to "127.0.0.1:$((ports + 52))" >record.log 2>&1 &
   rangecast camera --view 0 --views 1 --rig rig.yaml --input range --learn 5 \
     --to "127.0.0.1:$((ports + 50))" --feedback-port $((ports + 52)) --encoder "profile=entropy adaptive-bitrate=true" --print | sed 's/^gst-launch-1.0 -e/& -m/' >camera.sh
-  timeout -k 5 24 bash camera.sh >camera.log 2>&1 || true
+  GST_DEBUG=neighbourcodeenc:5 GST_DEBUG_NO_COLOR=1 timeout -k 5 80 bash camera.sh >camera.log 2>&1 &
+  adapted () { grep -qE 'colour-threshold [1-9][0-9]' camera.log && [ -e out.rcnc ] && [ "$(stat -c %s out.rcnc)" -ge 20000 ]; }
+  until_true 60 adapted
   jobs -p | xargs -r kill 2>/dev/null || true
   wait
-  local bitrate
-  bitrate=$(grep 'neighbourcodeenc-adaptive-bitrate,' camera.log | tail -n 1 | grep -oE 'estimated-bitrate=\(guint64\)[0-9]+' | grep -oE '[0-9]+$' || true)
-  [ -n "$bitrate" ] || fail "the rate never changed: $(tail -n 3 camera.log record.log)"
-  [ "$bitrate" -lt 700000 ] || fail "$bitrate bits/s for a link of 500000"
-  expect_file out.rcnc 20000
 }

@@ -42,6 +42,38 @@ test_setup_says_that_it_builds () {
   grep -q "2 of 2" terminal.txt || fail "no progress in a terminal: $(cat terminal.txt)"
 }
 
+test_setup_and_tests_print_their_usage () {
+  make_tree
+  run_setup --help | grep -q -- "--web " || fail "no usage of setup.sh"
+  "$source_dir/tests/run.sh" --help | grep -q -- "--fast " || fail "no usage of run.sh"
+  [ ! -e tree/build ] || fail "built"
+}
+
+test_setup_without_rights_prints_the_command_for_an_administrator () {
+  make_tree
+  printf '#!/bin/sh\n' >tree/bin/dpkg-query
+  printf '#!/bin/sh\necho 1000\n' >tree/bin/id
+  printf '#!/bin/sh\nexit 1\n' >tree/bin/sudo
+  chmod +x tree/bin/*
+  expect_error "an administrator can: apt-get install --no-install-recommends gcc g++ " run_setup --cameras
+  ! run_setup --cameras >said.txt 2>&1 || fail "no error"
+  grep -q "libaravis-dev" said.txt && ! grep -E "valgrind|chromium" said.txt || fail "$(cat said.txt)"
+}
+
+test_interrupted_setup_says_nothing () {
+  make_tree
+  sed -i '2s/echo/touch building; sleep 60; echo/' tree/build.ninja
+  local status=0
+  set -m # a group of its own, as in a terminal
+  run_setup >setup.txt 2>&1 &
+  set +m
+  until_true 60 test -e tree/build/building
+  kill -INT -- -$!
+  wait $! || status=$?
+  [ "$status" = 130 ] || fail "status $status: $(cat setup.txt)"
+  ! grep -q "failed" setup.txt || fail "$(cat setup.txt)"
+}
+
 test_setup_waits_for_another_setup () {
   make_tree
   sed -i '2s/echo/sleep 2 \&\& echo/' tree/build.ninja
@@ -82,12 +114,28 @@ test_env_says_that_the_build_is_missing_or_incomplete () {
   [ ! -s said.txt ] || fail "a complete build: $(cat said.txt)"
 }
 
+test_env_serves_any_shell_python_and_pkg_config () {
+  [ -f "$build/lib/gstrange/GstRange-1.0.typelib" ] || skip "no typelib"
+  mkdir tree
+  ln -s "$pipelines" "$source_dir/lib" "$build" tree
+  [ "$(basename "$build")" = build ] || skip "the build folder is not called build"
+  cd tree
+  local clean="env -i PATH=/usr/bin:/bin HOME=$HOME" shell
+  for shell in "dash -eu" "bash -eu" bash; do
+    $clean $shell -c '. ./pipelines/env.sh; gst-inspect-1.0 --exists --atleast-version=0.0.0 neighbourcodeenc; rangecast --version >&2; pkg-config --cflags gstrange-1.0
+      /usr/bin/python3 -c "from gi import require_version; require_version (\"GstRange\", \"1.0\")
+from gi.repository import GstRange; print (GstRange.map_views)"; set' >said.txt 2>error.txt || fail "$shell: $(cat error.txt)"
+    grep -q "function map_views" said.txt && grep -q "^-I.*gstrange" said.txt || fail "$shell: $(cat said.txt)"
+    ! grep -E '^(rangecast_|root=|[a-z_]+ [(][)])' said.txt || fail "$shell: left something behind"
+  done
+}
+
 test_python_examples_say_what_they_need () {
   mkdir gi # a PyGObject without typelibs, then none
   echo 'def require_version (name, version): raise ValueError ("Namespace %s not available" % name)' >gi/__init__.py
   local text example
   for text in "Namespace Gst not available" "No module named"; do
-    for example in count-points frames frame_source; do
+    for example in frames frame_source; do
       PYTHONPATH=$PWD expect_error "$text" /usr/bin/python3 "$pipelines/examples/$example.py" recording.rcnc
       ! PYTHONPATH=$PWD /usr/bin/python3 "$pipelines/examples/$example.py" recording.rcnc 2>said.txt || fail "no error"
       [ "$(wc -l <said.txt)" = 1 ] && grep -q "setup.sh" said.txt || fail "$(cat said.txt)"

@@ -21,12 +21,13 @@ stop_all () {
   wait "$@" 2>/dev/null || true
 }
 
-# The middle of the claps' differences, which must be there and small.
+# The claps' differences, which must be there and small in the better half: where the machine is busy or packets are lost, the first
+# picture or sound of a clap may be skipped.
 expect_in_step () { # claps.txt minimum
   [ "$(wc -l <"$1")" -ge "$2" ] || fail "$(wc -l <"$1") claps, expected at least $2: $(tail -n 5 ./*.log | grep -v '^\(picture\|sound\)')"
-  awk '{ print $2 }' "$1" | sort -n | awk '
+  awk '{ print $2 < 0 ? -$2 : $2 }' "$1" | sort -n | awk '
     { value[NR] = $1 }
-    END { middle = value[int ((NR + 1) / 2)]; print "sound after picture: " middle " ms"; exit middle < -40 || middle > 40 }
+    END { half = value[int ((NR + 1) / 2)]; print "sound beside picture: " half " ms"; exit half > 40 }
   ' || fail "$(cat "$1")"
 }
 
@@ -41,57 +42,34 @@ start_parent () { # port options...
   parent=$!
 }
 start_viewer () { # port options...
-  with_claps CLAP_LOG="$PWD/seen.log" rangecast view --listen $(($1 + 20)) --audio-port $(($1 + 22)) --picture 160x120 \
+  with_claps CLAP_LOG="$PWD/seen.log" rangecast view --listen $(($1 + 20)) --audio-port $(($1 + 22)) --output-size 160x120 \
     --speaker "$heard" "${@:2}" >viewer.log 2>&1 &
   viewer=$!
 }
 has_claps () { [ "$(claps seen.log 2>/dev/null | wc -l)" -ge "$1" ]; }
 
-test_speech_is_in_step_with_the_picture () {
-  need_gl
-  export_rig 1
-  start_viewer "$ports"
-  start_parent "$ports"
-  start_sender "$ports"
-  until_true 60 has_claps 6
-  stop_all "$camera" "$parent" "$viewer"
-  claps seen.log | tail -n +2 >claps.txt
-  expect_in_step claps.txt 4
-}
-
-# A third of the time of a clap may be lost in its beginning; the middle of several tells.
-test_speech_stays_in_step_with_loss_and_encryption () {
+test_audio_is_in_sync_with_loss_and_encryption_and_after_a_restart () {
   need_gl
   export_rig 1
   (umask 077 && head -c 30 /dev/urandom | od -An -tx1 | tr -d ' \n' >studio.key)
-  local p=$((ports + 50)) relay
+  local p=$((ports + 50)) relay before
   udp-relay --listen $((p + 20)) --to 127.0.0.1:$((p + 25)) --listen $((p + 22)) --to 127.0.0.1:$((p + 27)) --loss 0.05 --jitter 10 \
     >relay.log 2>&1 &
   relay=$!
   start_viewer $((p + 5)) --key studio.key
   start_parent "$p" --key studio.key
   start_sender "$p" --key studio.key
-  until_true 60 has_claps 8
-  stop_all "$camera" "$parent" "$viewer" "$relay"
-  claps seen.log | tail -n +2 >claps.txt
-  expect_in_step claps.txt 5
-}
-
-test_sender_that_is_restarted_is_heard_again () {
-  need_gl
-  export_rig 1
-  start_viewer $((ports + 100))
-  start_parent $((ports + 100))
-  start_sender $((ports + 100))
-  until_true 60 has_claps 3
+  until_true 60 has_claps 6
   kill -KILL "$camera"
   wait "$camera" 2>/dev/null || true
-  local before
   before=$(claps seen.log | wc -l)
-  start_sender $((ports + 100))
+  start_sender "$p" --key studio.key
   until_true 60 has_claps $((before + 4))
-  stop_all "$camera" "$parent" "$viewer"
-  claps seen.log | tail -n 3 >claps.txt
+  stop_all "$camera" "$parent" "$viewer" "$relay"
+  claps seen.log >all.txt
+  sed -n "2,${before}p" all.txt >claps.txt
+  expect_in_step claps.txt 4
+  tail -n 3 all.txt >claps.txt
   expect_in_step claps.txt 3
 }
 
@@ -100,7 +78,7 @@ play_claps () {
   rm -f played.log
   with_claps CLAP_LOG="$PWD/played.log" rangecast-run filesrc "location=$1.rcnc" ! neighbourcodeparse ! neighbourcodedec \
     ! fakesink name=snapshot filesrc "location=$1.opus" ! oggdemux ! opusdec ! audioconvert ! audioresample ! fakesink name=speaker
-  claps played.log --running
+  claps played.log
 }
 test_recording_has_speech_in_step_with_the_picture () {
   need_gl
@@ -115,26 +93,12 @@ test_recording_has_speech_in_step_with_the_picture () {
   stop_all "$recorder" "$camera" "$parent"
   play_claps talk >claps.txt
   expect_in_step claps.txt 2
-  rangecast play talk.rcnc --film talk.webm --picture 160x120 --orbit 0
+  rangecast play talk.rcnc --video talk.webm --output-size 160x120 --orbit 0
   rm -f film.log
   with_claps CLAP_LOG="$PWD/film.log" rangecast-run filesrc location=talk.webm ! matroskademux name=d \
     d. ! queue ! vp8dec ! fakesink name=snapshot d. ! queue ! opusdec ! audioconvert ! audioresample ! fakesink name=speaker
-  claps film.log --running >claps.txt
+  claps film.log >claps.txt
   expect_in_step claps.txt 2
-}
-
-test_recording_goes_on_without_speech () {
-  export_rig 1
-  local p=$((ports + 200)) recorder
-  rangecast record talk.rcnc --listen $((p + 20)) --audio-port $((p + 22)) >record.log 2>&1 &
-  recorder=$!
-  start_parent "$p"
-  rangecast camera --view 0 --rig rig.yaml --input range --size 160x120 --learn 5 --to "127.0.0.1:$p" >camera.log 2>&1 &
-  camera=$!
-  enough () { [ -f talk.rcnc ] && [ "$(stat -c %s talk.rcnc)" -gt 30000 ]; }
-  until_true 60 enough
-  stop_all "$recorder" "$camera" "$parent"
-  [ ! -e talk.opus ] || fail "$(ls -l)"
 }
 
 # RTCP says the same as the packets themselves: what other receivers go by.
@@ -169,58 +133,40 @@ END
   stop_all "$camera"
 }
 
-# The window's program: live, and a recording with speech beside it.
-view () { # seconds, pad that the speech passes, options...
-  env -u GST_GL_PLATFORM -u GST_GL_WINDOW GST_DEBUG=GST_SCHEDULING:5 GST_DEBUG_NO_COLOR=1 GST_DEBUG_FILE="$PWD/passed.txt" \
-    timeout -s INT "$1" xvfb-run -a rangecast-viewer --size 160x120 "${@:3}" >window.log 2>&1 || true
+# The window's program: live, and a recording with audio beside it.
+passed () { # pad
   local pad
-  for pad in striprender0:sink "$2"; do
-    [ "$(grep -c "<$pad> calling" passed.txt)" -gt 20 ] || fail "$pad: $(grep '^rangecast-viewer' window.log)"
-  done
+  [ -e passed.txt ] || return 1
+  for pad in render:sink "$1"; do [ "$(grep -c "<$pad> calling" passed.txt)" -gt 20 ] || return 1; done
+}
+view () { # pad that the audio passes, options...
+  rm -f passed.txt
+  env -u GST_GL_PLATFORM -u GST_GL_WINDOW GST_DEBUG=GST_SCHEDULING:5 GST_DEBUG_NO_COLOR=1 GST_DEBUG_FILE="$PWD/passed.txt" \
+    timeout -s INT 60 xvfb-run -a rangecast-viewer --size 160x120 "${@:2}" >window.log 2>&1 &
+  local window=$!
+  until_true 40 passed "$1"
+  stop_all $window
 }
 test_window_plays_speech () {
   command -v xvfb-run >/dev/null && command -v rangecast-viewer >/dev/null || skip "no Xvfb, or no rangecast-viewer"
   export_rig 1
   start_parent "$ports"
   start_sender "$ports"
-  view 12 opusdec0:sink --listen $((ports + 20)) --audio $((ports + 22))
+  view opusdec0:sink --listen $((ports + 20)) --audio $((ports + 22))
   stop_all "$camera" "$parent"
   gst-launch-1.0 -q avatartestsrc num-buffers=40 ! video/x-range,width=160,height=120 ! neighbourcodeenc ! filesink location=talk.rcnc
   gst-launch-1.0 -q audiotestsrc num-buffers=60 ! opusenc ! oggmux ! filesink location=talk.opus
-  view 30 volume0:sink talk.rcnc --once
-  mv talk.rcnc talk.rcnc~
-  mv talk.opus talk.opus~
-  view 30 volume0:sink talk.rcnc~ --once
-}
-
-# rtpsession 1.22 forgets to end its RTCP where it sends BYE quickly; transport.py works around it.
-test_senders_of_speech_end_at_once () {
-  local i senders=() late
-  export_rig 1
-  for i in 1 2 3 4 5 6; do
-    rangecast camera --view 0 --rig rig.yaml --input range --size 160x120 --learn 5 --to "127.0.0.1:$((ports + 60))" \
-      --microphone "$silence" --audio-to "127.0.0.1:$((ports + 70))" >"camera$i.log" 2>&1 &
-    senders+=($!)
-  done
-  for i in "${senders[@]}"; do until_true 60 takes_interrupt "$i"; done
-  sleep 2
-  kill -INT "${senders[@]}"
-  for ((i = 0; i < 40; i++)); do
-    late=$(ps -o pid= -p "$(IFS=,; echo "${senders[*]}")" | wc -l || true)
-    [ "$late" -gt 0 ] || break
-    sleep 0.25
-  done
-  [ "$late" = 0 ] || { kill -KILL "${senders[@]}" 2>/dev/null || true; fail "$late of 6 senders did not end"; }
+  view volume:sink talk.rcnc
 }
 
 test_speech_from_a_file_is_sent_at_its_own_pace () {
   export_rig 1
-  gst-launch-1.0 -q audiotestsrc num-buffers=600 ! wavenc ! filesink location="my speech.wav" # 14 s
+  gst-launch-1.0 -q audiotestsrc num-buffers=400 ! wavenc ! filesink location="my speech.wav" # 9 s
   rangecast camera --view 0 --rig rig.yaml --input range --size 160x120 --learn 5 --to "127.0.0.1:$((ports + 60))" \
     --microphone 'filesrc location="my speech.wav" ! decodebin' --audio-to "127.0.0.1:$((ports + 80))" >camera.log 2>&1 &
   camera=$!
-  timeout 20 gst-launch-1.0 -q udpsrc port=$((ports + 80)) num-buffers=150 ! filesink location=packets.bin || fail "$(tail -n 5 camera.log)"
-  kill -0 "$camera" || fail "150 packets of 20 ms came, and the file has ended"
+  timeout 20 gst-launch-1.0 -q udpsrc port=$((ports + 80)) num-buffers=100 ! filesink location=packets.bin || fail "$(tail -n 5 camera.log)"
+  kill -0 "$camera" || fail "100 packets of 20 ms came, and the file has ended"
   stop_all "$camera"
 }
 
@@ -236,11 +182,11 @@ test_speech_is_sent_without_any_to_hear () {
 test_recordings_are_kept () {
   rangecast record talk.rcnc --frames 3 --views 1 --size 64x48
   echo speech >talk.opus
-  expect_error "'talk.opus' is what is played" rangecast play talk.rcnc --film talk.opus
+  expect_error "'talk.opus' is what is played" rangecast play talk.rcnc --video talk.opus
   [ -s talk.opus ] || fail "speech is lost"
   cp talk.rcnc talk.rcnc~
   cp talk.opus talk.opus~
-  rangecast play talk.rcnc~ --film x.webm --print >launch.txt
+  rangecast play talk.rcnc~ --video x.webm --print >launch.txt
   ! grep -q 'location=talk.opus ' launch.txt || fail "$(cat launch.txt)"
 }
 
@@ -255,7 +201,7 @@ test_wrong_options_are_named () {
   expect_error "--microphone and --talk-to need each other" rangecast view --listen 6000 --talk-to 127.0.0.1:7000
   expect_error "127.0.0.1:4999, or the next port" "${camera[@]}" --microphone pulsesrc --audio-to 127.0.0.1:4999
   expect_error "does not end in .opus" rangecast record x.opus --listen 6000 --audio-port 6002
-  expect_error "--clock: expected system or HOST:PORT, got 'wall'" rangecast-run --clock wall fakesrc num-buffers=1 ! fakesink
+  expect_error "--clock: 'wall' is neither system nor HOST:PORT" rangecast-run --clock wall fakesrc num-buffers=1 ! fakesink
   expect_error "no element \"nosuchsrc\"" "${camera[@]}" --input range --microphone nosuchsrc --audio-to 127.0.0.1:5300
   echo none >empty.yaml
   expect_error "'empty.yaml' has no views" rangecast call --peer 127.0.0.1 --rig empty.yaml
@@ -278,7 +224,7 @@ test_speech_reaches_all_hosts_of_a_multicast_group () {
     --interface eth0 >parent.log 2>&1 &
   hosts+=($!)
   net_on one "${claps_env[@]}" CLAP_LOG="$PWD/seen.log" rangecast view --listen 6000 --audio-port 6002 \
-    --multicast $group --interface eth0 --picture 160x120 --speaker "$heard" >one.log 2>&1 &
+    --multicast $group --interface eth0 --output-size 160x120 --speaker "$heard" >one.log 2>&1 &
   hosts+=($!)
   net_on two rangecast record talk.rcnc --listen 6000 --audio-port 6002 --multicast $group --interface eth0 >two.log 2>&1 &
   hosts+=($!)
@@ -290,7 +236,6 @@ test_speech_reaches_all_hosts_of_a_multicast_group () {
   expect_in_step claps.txt 2
   net_close
 }
-
 
 open_two_hosts () {
   net_need
@@ -331,9 +276,9 @@ test_call_has_picture_and_sound_both_ways () {
   # Muted: the picture goes on, no clap is heard.
   echo m >&"$anna_keys"
   until_true 10 grep -q "microphone is muted" anna.log
-  sleep 3
+  sleep 1
   before=$(claps_of otto)
-  sleep 5
+  sleep 3
   [ "$(claps_of otto)" = "$before" ] || fail "heard while muted"
   echo m >&"$anna_keys"
   until_true 30 has_claps_of otto $((before + 2))
@@ -350,23 +295,3 @@ test_call_has_picture_and_sound_both_ways () {
 }
 has_ended () { ! kill -0 "$1" 2>/dev/null; }
 
-# The loudspeaker plays into the microphone: what comes back must be much quieter than without the filter.
-echo_level () { # elements before webrtcdsp's place: dB of what is sent while only the other end speaks
-  local level
-  level=$(timeout 60 gst-launch-1.0 -m audiotestsrc is-live=true num-buffers=600 samplesperbuffer=480 wave=red-noise volume=0.5 \
-    ! audio/x-raw,format=S16LE,rate=48000,channels=1 ! tee name=loudspeaker \
-    loudspeaker. ! queue ! webrtcechoprobe name=heard ! fakesink sync=true \
-    loudspeaker. ! queue min-threshold-time=30000000 max-size-time=3000000000 ! volume volume=0.4 $1 ! level interval=1000000000 ! fakesink sync=true |
-    grep -o 'rms=(GValueArray)< *[-0-9.]*' | tail -n 2 | grep -o '[-0-9.]*$' | sort -n | head -n 1)
-  echo "${level%.*}"
-}
-
-# By 11 to 13 dB, from one run to another.
-test_echo_is_cancelled () {
-  gst-inspect-1.0 --exists webrtcdsp || skip "no webrtcdsp (Debian package gstreamer1.0-plugins-bad)"
-  local with without
-  without=$(echo_level "")
-  with=$(echo_level "! webrtcdsp probe=heard")
-  echo "echo: $without dB without webrtcdsp, $with dB with it"
-  [ $((without - with)) -ge 6 ] || fail "echo is at $with dB, without the filter at $without dB"
-}

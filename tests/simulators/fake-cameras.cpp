@@ -4,6 +4,7 @@
 #include <arpa/inet.h>
 #include <glib-unix.h>
 
+#include <algorithm>
 #include <clocale>
 #include <cstdio>
 #include <cstdlib>
@@ -16,7 +17,6 @@
 #include <string>
 #include <vector>
 
-#include "fake-camera-options.hpp"
 #include "gige-camera.hpp"
 #include "gige-listener.hpp"
 #include "scene-pictures.hpp"
@@ -26,6 +26,122 @@ namespace {
 using rangecast::SceneCamera;
 using rangecast::Status;
 using rangecast::StatusCode;
+
+/* The command line, checked. */
+struct FakeCameraOptions {
+  rangecast::SceneSettings scene;
+  GigeCameraSettings camera;               ///< the same for all, but address and serial
+  std::uint32_t address_base = 0x7f000101; ///< of view0-left; the others follow
+  gint third = 0, empty_frames = 25, loop = 0;
+  std::string only;            ///< comma-separated names; empty: all
+  std::string rig_export, log; ///< files to write; empty: none
+
+  [[nodiscard]] bool serves (const std::string &name) const
+  {
+    return only.empty () || ("," + only + ",").find ("," + name + ",") != only.npos;
+  }
+  /** @return false after printing an error */
+  bool read (int *argc, char ***argv);
+
+private:
+  bool check (
+      double loss, const std::string &size, const std::string &colour, const std::string &address);
+};
+
+bool
+FakeCameraOptions::read (int *argc, char ***argv)
+{
+  gchar *size = nullptr, *address = nullptr, *colour = nullptr, *rig = nullptr, *model = nullptr,
+        *names = nullptr, *log_file = nullptr;
+  gint views = 4;
+  gdouble fps = 15, loss = 0;
+  const GOptionEntry entries[] = {
+      {"views", 0, 0, G_OPTION_ARG_INT, &views, "number of stereo cameras (default 4)", "N"},
+      {"third", 0, 0, G_OPTION_ARG_NONE, &third, "add a third camera to each", nullptr},
+      {"size", 0, 0, G_OPTION_ARG_STRING, &size, "sensor size (default 320x240)", "WxH"},
+      {"fps", 0, 0, G_OPTION_ARG_DOUBLE, &fps,
+          "initial free-running rate; triggers within half a period show the same moment (default "
+          "15)",
+          "F"},
+      {"colour", 0, 0, G_OPTION_ARG_STRING, &colour,
+          "initial pixel format: rgb8 (default), bayer or mono8", "FORMAT"},
+      {"address-base", 0, 0, G_OPTION_ARG_STRING, &address,
+          "address of view0-left; other cameras have the following ones (default 127.0.1.1)",
+          "ADDRESS"},
+      {"only", 0, 0, G_OPTION_ARG_STRING, &names,
+          "serve only these cameras of the rig, e.g. view0-left,view0-right", "NAMES"},
+      {"rig-export", 0, 0, G_OPTION_ARG_FILENAME, &rig, "write the rig file", "FILE"},
+      {"log", 0, 0, G_OPTION_ARG_FILENAME, &log_file,
+          "write a line for each exposure: camera, frame number, time of day in ns", "FILE"},
+      {"model", 0, 0, G_OPTION_ARG_FILENAME, &model,
+          "glTF or OBJ model instead of the built-in figure", "FILE"},
+      {"empty-frames", 0, 0, G_OPTION_ARG_INT, &empty_frames,
+          "the person appears after N frame periods, and not before N pictures (default 25)", "N"},
+      {"loop", 0, 0, G_OPTION_ARG_INT, &loop,
+          "draw N moments in advance and repeat them (default 0: draw each)", "N"},
+      {"loss", 0, 0, G_OPTION_ARG_DOUBLE, &loss, "lose N of a thousand image packets (default 0)",
+          "N"},
+      {nullptr, 0, 0, G_OPTION_ARG_NONE, nullptr, nullptr, nullptr},
+  };
+  GOptionContext *context = g_option_context_new ("- GigE Vision cameras round a moving figure");
+  g_option_context_add_main_entries (context, entries, nullptr);
+  GError *error = nullptr;
+  bool good = g_option_context_parse (context, argc, argv, &error);
+  g_option_context_free (context);
+  if (!good)
+    g_printerr ("fake-cameras: %s\n", error->message);
+  g_clear_error (&error);
+  const auto take = [] (gchar *text, const char *otherwise = "") {
+    std::string copy = text ? text : otherwise;
+    g_free (text);
+    return copy;
+  };
+  scene.views = views;
+  camera.fps = fps;
+  camera.loss = loss / 1000;
+  rig_export = take (rig);
+  log = take (log_file);
+  scene.model = take (model);
+  only = take (names);
+  const std::string size_text = take (size, "320x240"), colour_text = take (colour, "rgb8"),
+                    address_text = take (address, "127.0.1.1");
+  if (good && *argc > 1) {
+    g_printerr ("fake-cameras: unknown argument '%s'\n", (*argv)[1]);
+    good = false;
+  }
+  return good && check (loss, size_text, colour_text, address_text);
+}
+
+bool
+FakeCameraOptions::check (
+    double loss, const std::string &size, const std::string &colour, const std::string &address)
+{
+  const auto need = [] (bool good, const char *what) {
+    if (!good)
+      g_printerr ("fake-cameras: %s\n", what);
+    return good;
+  };
+  char more = 0;
+  in_addr base{};
+  const bool has_size =
+      std::sscanf (size.c_str (), "%5dx%5d%c", &scene.width, &scene.height, &more) == 2;
+  camera.width = scene.width;
+  camera.height = scene.height;
+  camera.pixel_format = colour == "rgb8" ? kRgb8 : colour == "bayer" ? kBayerRg8 : kMono8;
+  const bool is_address = inet_pton (AF_INET, address.c_str (), &base) == 1;
+  address_base = ntohl (base.s_addr);
+  return need (scene.views >= 1 && scene.views <= 64, "--views takes 1 to 64") &&
+         need (camera.fps >= 0.1 && camera.fps <= 1000, "--fps takes 0.1 to 1000") &&
+         need (loss >= 0 && loss <= 1000, "--loss takes 0 to 1000 packets of a thousand") &&
+         need (empty_frames >= 0 && empty_frames <= 1000000, "--empty-frames takes 0 to 1000000") &&
+         need (loop >= 0 && loop <= 1000, "--loop takes 0 to 1000 frames") &&
+         need (has_size && std::min (scene.width, scene.height) >= 16 &&
+                   std::max (scene.width, scene.height) <= 4096,
+             "--size takes WIDTHxHEIGHT, 16x16 to 4096x4096") &&
+         need (colour == "rgb8" || colour == "bayer" || colour == "mono8",
+             "--colour takes rgb8, bayer or mono8") &&
+         need (is_address, "--address-base takes an IPv4 address of this machine");
+}
 
 /* One stereo camera of the rig. */
 struct ViewCameras {
@@ -221,8 +337,8 @@ main (int argc, char **argv)
 {
   setlocale (LC_CTYPE, ""); /* arguments are in the user's encoding */
   FakeCameraOptions options;
-  if (const int status = read_fake_camera_options (argc, argv, options); status >= 0)
-    return status;
+  if (!options.read (&argc, &argv))
+    return 2;
   FakeRig rig;
   if (Status s = rig.create (options); !s.ok ()) {
     g_printerr ("fake-cameras: %s\n", s.message ().c_str ());

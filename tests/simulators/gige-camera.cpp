@@ -22,8 +22,7 @@ using rangecast::Status;
 using rangecast::StatusCode;
 
 constexpr std::int64_t kSecond = 1000000000;
-constexpr std::size_t kFramesKept = 4, kMaxScheduled = 64;
-constexpr std::uint64_t kLatestAction = std::uint64_t (1) << 62; /* ns; so sums stay numbers */
+constexpr std::size_t kFramesKept = 4;
 
 } // namespace
 
@@ -215,11 +214,11 @@ GigeCamera::frame_period_ns () const
   return std::clamp<std::int64_t> (us, 1000, 10000000) * 1000;
 }
 
-/* Cameras with PTP have one clock, this machine's; others count from when they were switched on. */
+/* It counts from when the camera was switched on. */
 std::uint64_t
 GigeCamera::camera_time (std::int64_t now_ns) const
 {
-  return std::uint64_t (get (kRegisterPtpEnable) ? now_ns : now_ns - born_ns_);
+  return std::uint64_t (now_ns - born_ns_);
 }
 
 bool
@@ -272,9 +271,6 @@ GigeCamera::wrote (std::uint32_t address, std::uint32_t value, const sockaddr_in
       set (address, 0);
       if (value != 0 && is_triggered_by (kTriggerBySoftware))
         expose (now ());
-      break;
-    case kRegisterPtpEnable:
-      set (kRegisterPtpStatus, value != 0 ? kPtpSlave : kPtpDisabled);
       break;
     default:
       break;
@@ -416,16 +412,15 @@ void
 GigeCamera::handle_action (const GvcpCommand &command, const sockaddr_in &from)
 {
   ActionCommand action;
-  if (!parse_action (command, action) || action.time_ns > kLatestAction)
+  if (!parse_action (command, action))
     return refuse (command, from, GvcpStatus::kInvalidParameter);
   {
     std::lock_guard guard (lock_);
     if (action.device_key != device_key_ || action.group_key != group_key_ ||
         (action.group_mask & group_mask_) == 0)
       return; /* meant for other cameras: no answer either */
-    if (scheduled_ns_.size () < kMaxScheduled)
-      scheduled_ns_.push_back (std::int64_t (action.time_ns));
   }
+  action_ = true;
   eventfd_write (wake_, 1);
   if (command.wants_ack ())
     answer (from, gvcp_ack (command, GvcpStatus::kSuccess, 0));
@@ -477,19 +472,16 @@ GigeCamera::check_heartbeat (std::int64_t now_ns)
 void
 GigeCamera::drain_wake_ups (std::int64_t now_ns)
 {
-  bool due = false;
   {
     std::lock_guard guard (lock_);
     for (const auto &[address, value] : regulated_)
       set (address, value);
     regulated_.clear ();
-    const auto time = std::int64_t (camera_time (now_ns));
-    due = std::erase_if (scheduled_ns_, [&] (std::int64_t at) { return at <= time; }) > 0;
   }
-  if (due && is_triggered_by (kTriggerByAction))
-    expose (now_ns);
-  if (line_.exchange (false) &&
-      (is_triggered_by (kTriggerByLine) || is_triggered_by (kTriggerByLine1)))
+  const bool by_action = action_.exchange (false) && is_triggered_by (kTriggerByAction);
+  const bool by_line = line_.exchange (false) &&
+                       (is_triggered_by (kTriggerByLine) || is_triggered_by (kTriggerByLine1));
+  if (by_action || by_line)
     expose (now_ns);
 }
 
@@ -503,10 +495,6 @@ GigeCamera::next_wake (std::int64_t now_ns)
       next_frame_ns_ = (now_ns / period + 1) * period;
     next = std::min (next, next_frame_ns_);
   }
-  std::lock_guard guard (lock_);
-  const auto offset = now_ns - std::int64_t (camera_time (now_ns));
-  for (const std::int64_t at : scheduled_ns_)
-    next = std::min (next, at + offset);
   return next;
 }
 

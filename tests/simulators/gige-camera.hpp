@@ -61,8 +61,7 @@ public:
 
   /** Answers a discovery command that came by broadcast. */
   void answer_discovery (const GvcpCommand &command, const sockaddr_in &from);
-  /** An action command that came by broadcast. @return whether the camera obeys, and acknowledges
-   */
+  /** An action command that came by broadcast. */
   void handle_action (const GvcpCommand &command, const sockaddr_in &from);
   /** The signal on the input line. */
   void line_rises ();
@@ -117,15 +116,14 @@ private:
   ArvFakeCamera *registers_ = nullptr;
   std::vector<std::uint8_t> discovery_data_;
   int control_ = -1, stream_ = -1, wake_ = -1;
-  std::atomic<bool> ending_{false}, line_{false};
+  std::atomic<bool> ending_{false}, line_{false}, action_{false};
   std::atomic<std::uint64_t> pictures_{0};
   std::thread thread_;
 
   std::atomic<std::int64_t> stamp_off_ns_{0};
 
-  std::mutex lock_;                                                /* guards the three below */
+  std::mutex lock_;                                                /* guards the two below */
   std::vector<std::pair<std::uint32_t, std::uint32_t>> regulated_; /* registers and values */
-  std::vector<std::int64_t> scheduled_ns_;
   std::uint32_t device_key_ = 0, group_key_ = 0, group_mask_ = 0;
 
   /* the camera's thread */

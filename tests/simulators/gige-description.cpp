@@ -95,11 +95,6 @@ more_features ()
          integer_node ("ActionDeviceKey", kRegisterActionDeviceKey) +
          integer_node ("ActionGroupKey", kRegisterActionGroupKey) +
          integer_node ("ActionGroupMask", kRegisterActionGroupMask) +
-         "<Boolean Name=\"PtpEnable\" NameSpace=\"Standard\"><pValue>PtpEnableRegister</pValue>"
-         "<OnValue>1</OnValue><OffValue>0</OffValue></Boolean>\n" +
-         register_node ("PtpEnableRegister", kRegisterPtpEnable) +
-         enumeration_node ("PtpStatus", kRegisterPtpStatus,
-             entry ("Disabled", kPtpDisabled) + entry ("Slave", kPtpSlave)) +
          "<Boolean Name=\"GevSCPSFireTestPacket\" NameSpace=\"Standard\">"
          "<pValue>FireTestPacketRegister</pValue><OnValue>1</OnValue><OffValue>0</OffValue>"
          "</Boolean>\n" +
@@ -131,7 +126,6 @@ description ()
   insert (xml, "<Enumeration Name=\"TriggerSource\"", "<EnumEntry",
       entry ("Action1", kTriggerByAction) + entry ("Line1", kTriggerByLine1));
   insert (xml, "<Category Name=\"TransportLayerControl\"", "<pFeature",
-      "<pFeature>PtpEnable</pFeature><pFeature>PtpStatus</pFeature>"
       "<pFeature>ActionDeviceKey</pFeature><pFeature>ActionGroupKey</pFeature>"
       "<pFeature>ActionGroupMask</pFeature>\n");
   insert (

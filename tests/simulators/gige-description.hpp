@@ -7,12 +7,10 @@
 #include <string>
 
 /** Registers and values of what our GenICam description has more than that of Aravis. */
-inline constexpr std::uint32_t kRegisterPtpEnable = 0x400, kRegisterPtpStatus = 0x404;
-inline constexpr std::uint32_t kPtpDisabled = 0, kPtpSlave = 1;
 inline constexpr std::uint32_t kTriggerByLine = 0, kTriggerBySoftware = 1, kTriggerByAction = 2,
                                kTriggerByLine1 = 3;
 inline constexpr std::uint32_t kSingleFrame = 2;
 
-/** Aravis' fake camera with action commands, PTP and its output line described.
+/** Aravis' fake camera with action commands and its output line described.
  *  @return registers and description, owned */
 ArvFakeCamera *make_fake_camera (const std::string &serial);

@@ -40,15 +40,11 @@ parse_gvcp (std::span<const std::uint8_t> packet, GvcpCommand &command)
 bool
 parse_action (const GvcpCommand &command, ActionCommand &action)
 {
-  const bool scheduled = command.is_scheduled ();
-  if (command.data.size () < (scheduled ? 20u : 12u))
+  if (command.data.size () < 12)
     return false;
   action.device_key = read_u32 (&command.data[0]);
   action.group_key = read_u32 (&command.data[4]);
   action.group_mask = read_u32 (&command.data[8]);
-  action.time_ns =
-      scheduled ? std::uint64_t (read_u32 (&command.data[12])) << 32 | read_u32 (&command.data[16])
-                : 0;
   return true;
 }
 

@@ -56,8 +56,6 @@ struct GvcpCommand {
   std::span<const std::uint8_t> data;
 
   [[nodiscard]] bool wants_ack () const { return (flags & 0x01) != 0; }
-  /** At the end of data: the time of a scheduled action. */
-  [[nodiscard]] bool is_scheduled () const { return (flags & 0x80) != 0; }
 };
 
 /** @return false if that is no GVCP command */
@@ -66,7 +64,6 @@ bool parse_gvcp (std::span<const std::uint8_t> packet, GvcpCommand &command);
 /** The fields of an ACTION_CMD, or those that a camera compares it with. */
 struct ActionCommand {
   std::uint32_t device_key = 0, group_key = 0, group_mask = 0;
-  std::uint64_t time_ns = 0; ///< of the camera's clock; 0: at once
 };
 
 /** @return false if it is too short */

@@ -2,6 +2,7 @@
 #include "scene-pictures.hpp"
 
 #include <algorithm>
+#include <span>
 
 namespace {
 
@@ -21,8 +22,6 @@ bytes_per_pixel (std::uint32_t format)
     case kBayerGb8:
     case kBayerBg8:
       return 1;
-    case kMono16:
-      return 2;
     case kRgb8:
       return 3;
     default:
@@ -98,28 +97,17 @@ paint_bayer (ImageView<const Rgbx> in, std::uint32_t format, std::uint8_t *out)
 }
 
 void
-paint_mono16 (ImageView<const Rgbx> in, std::uint8_t *out)
-{
-  const std::size_t pixels = std::size_t (in.width) * in.height;
-  rangecast::convert_pixels (in, rangecast::PixelFormat::kGray, out, in.width);
-  for (std::size_t i = pixels; i-- > 0;) { /* from the end: in place */
-    out[2 * i + 1] = out[i];
-    out[2 * i] = 0;
-  }
-}
-
-void
 paint_pixels (ImageView<const Rgbx> in, std::uint32_t format, std::uint8_t *out)
 {
-  if (format == kRgb8)
-    rangecast::convert_pixels (
-        in, rangecast::PixelFormat::kRgb, out, 3 * std::ptrdiff_t (in.width));
-  else if (format == kMono8)
-    rangecast::convert_pixels (in, rangecast::PixelFormat::kGray, out, in.width);
-  else if (format == kMono16)
-    paint_mono16 (in, out);
-  else
-    paint_bayer (in, format, out);
+  if (format != kRgb8 && format != kMono8)
+    return paint_bayer (in, format, out);
+  for (int y = 0; y < in.height; y++)
+    for (const Rgbx &pixel : std::span (in.row (y), std::size_t (in.width)))
+      if (format == kRgb8)
+        for (const std::uint8_t channel : {pixel.r, pixel.g, pixel.b})
+          *out++ = channel;
+      else /* 0.299, 0.587, 0.114 in 1/256 */
+        *out++ = static_cast<std::uint8_t> ((77 * pixel.r + 150 * pixel.g + 29 * pixel.b) >> 8);
 }
 
 } // namespace

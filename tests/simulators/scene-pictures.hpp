@@ -11,7 +11,6 @@
 /** GenICam's names (PFNC) for how pixels lie in memory. */
 enum GenicamFormat : std::uint32_t {
   kMono8 = 0x01080001,
-  kMono16 = 0x01100007,
   kBayerGr8 = 0x01080008,
   kBayerRg8 = 0x01080009,
   kBayerGb8 = 0x0108000a,

@@ -28,8 +28,7 @@ const char *const kUsage =
     "usage: udp-relay --listen PORT --to HOST:PORT [--listen PORT --to HOST:PORT ...] [options]\n"
     "       udp-relay --between INTERFACE,INTERFACE [options]\n"
     "Relays packets that arrive at a UDP port, and the answers; or, as root, bridges two network\n"
-    "interfaces, with faults for UDP over IPv4 (--protocols all: and for TCP). Faults apply to "
-    "both\n"
+    "interfaces, with faults for UDP over IPv4. Faults apply to both\n"
     "directions. Prints its counters at SIGINT or SIGTERM.\n";
 
 int64_t
@@ -53,17 +52,10 @@ refuse_with_reason (const std::string &what)
   refuse (what + ": " + std::strerror (errno));
 }
 
-/** Which packets have faults. */
-enum class Faulty {
-  kPackets,         /* all, of UDP sockets */
-  kUdpFrames,       /* of a cable, UDP */
-  kUdpAndTcpFrames, /* of a cable */
-};
-
 /** One direction: from a socket, through the faults, into another one. */
 struct Direction {
   int from, to;
-  Faulty faulty;
+  bool cable;                 /* only its frames of UDP have faults */
   sockaddr_storage *heard;    /* where packets come from, for answers; may be nullptr */
   sockaddr_storage *receiver; /* nullptr: the socket is connected or a cable */
   NetworkFaults faults;
@@ -78,14 +70,13 @@ constexpr std::size_t kOffloadHeader = 10;
 bool
 suffers (const Direction &direction, std::size_t size)
 {
-  if (direction.faulty == Faulty::kPackets)
+  if (!direction.cable)
     return true;
   const std::size_t ether = kOffloadHeader;
   const uint8_t *frame = direction.buffer.data () + ether;
   if (size < ether + 34 || frame[12] != 0x08 || frame[13] != 0x00)
     return false;
-  return frame[23] == IPPROTO_UDP ||
-         (direction.faulty == Faulty::kUdpAndTcpFrames && frame[23] == IPPROTO_TCP);
+  return frame[23] == IPPROTO_UDP;
 }
 
 void
@@ -163,7 +154,7 @@ cable_end (const std::string &interface)
   ifreq request = {};
   interface.copy (request.ifr_name, sizeof request.ifr_name - 1);
   if (ioctl (fd, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_LOOPBACK))
-    refuse ("--between " + interface + ": is the loopback interface; expected a network interface");
+    refuse ("--between " + interface + ": is the loopback interface; use a network interface");
   sockaddr_ll address = {};
   address.sll_family = AF_PACKET;
   address.sll_protocol = htons (ETH_P_ALL);
@@ -187,7 +178,6 @@ cable_end (const std::string &interface)
 struct Settings {
   std::vector<std::pair<int, std::string>> links; /* port, HOST:PORT */
   std::vector<std::string> cable;
-  Faulty faulty_frames = Faulty::kUdpFrames;
   FaultSettings faults;
 };
 
@@ -228,10 +218,6 @@ read_options (int argc, char **argv)
       settings.links.back ().second = value;
     } else if (name == "--between") {
       settings.cable = read_cable (value);
-    } else if (name == "--protocols") {
-      if (value != "udp" && value != "all")
-        refuse ("--protocols " + value + ": expected udp or all");
-      settings.faulty_frames = value == "all" ? Faulty::kUdpAndTcpFrames : Faulty::kUdpFrames;
     } else if (!read_fault_option (name, value, settings.faults, problem)) {
       refuse ("unknown option '" + name + "' (--help lists the options)");
     }
@@ -251,14 +237,13 @@ read_options (int argc, char **argv)
 using Directions = std::vector<std::unique_ptr<Direction>>;
 
 void
-add_pair (Directions &directions, int a, int b, Faulty faulty, const FaultSettings &faults)
+add_pair (Directions &directions, int a, int b, bool cable, const FaultSettings &faults)
 {
   FaultSettings back = faults;
   back.seed += 0x9e3779b97f4a7c15; /* other chances than those of the way there */
-  sockaddr_storage *client =
-      faulty != Faulty::kPackets ? nullptr : new sockaddr_storage (); /* lives as the program */
-  directions.emplace_back (new Direction{a, b, faulty, client, nullptr, NetworkFaults (faults)});
-  directions.emplace_back (new Direction{b, a, faulty, nullptr, client, NetworkFaults (back)});
+  sockaddr_storage *client = cable ? nullptr : new sockaddr_storage (); /* lives as the program */
+  directions.emplace_back (new Direction{a, b, cable, client, nullptr, NetworkFaults (faults)});
+  directions.emplace_back (new Direction{b, a, cable, nullptr, client, NetworkFaults (back)});
 }
 
 /* Until a signal comes. */
@@ -301,11 +286,11 @@ main (int argc, char **argv)
 
   Directions directions;
   for (const auto &[port, target] : settings.links)
-    add_pair (directions, listening_socket (port), connected_socket (target), Faulty::kPackets,
-        settings.faults);
+    add_pair (
+        directions, listening_socket (port), connected_socket (target), false, settings.faults);
   if (!settings.cable.empty ())
-    add_pair (directions, cable_end (settings.cable[0]), cable_end (settings.cable[1]),
-        settings.faulty_frames, settings.faults);
+    add_pair (directions, cable_end (settings.cable[0]), cable_end (settings.cable[1]), true,
+        settings.faults);
   std::printf ("ready\n");
   std::fflush (stdout);
   relay (directions, signals);

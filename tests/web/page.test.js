@@ -15,12 +15,9 @@ const prepareFolder = () => {
   const folder = path.join (work, 'served');
   fs.rmSync (folder, { recursive: true, force: true });
   fs.cpSync (path.join (build, 'pipelines/web'), folder, { recursive: true, filter: (from) => !/\.[od]$/.test (from) });
-  for (const name of ['scene.rcnc', 'moving.rcnc', ...fs.readdirSync (work).filter ((file) => /^native-.*\.png$/.test (file))])
+  for (const name of ['scene.rcnc', 'moving.rcnc', 'slow.rcnc', ...fs.readdirSync (work).filter ((file) => /^native-.*\.png$/.test (file))])
     fs.copyFileSync (path.join (work, name), path.join (folder, name));
-  fs.writeFileSync (path.join (folder, 'foreign.rcnc'), 'this is a text, and no recording\n'.repeat (100));
-  const scene = fs.readFileSync (path.join (work, 'moving.rcnc'));
-  fs.writeFileSync (path.join (folder, 'joined.rcnc'), Buffer.concat ([scene, scene]));
-  fs.writeFileSync (path.join (folder, 'cut.rcnc'), scene.subarray (0, scene.length - 20));
+  fs.writeFileSync (path.join (folder, 'cut.rcnc'), fs.readFileSync (path.join (work, 'moving.rcnc')).subarray (0, -20));
   return folder;
 };
 
@@ -75,7 +72,7 @@ const compare = (page, ours, theirs) => page.evaluate (async (a, b) => {
   return { difference: x.length === y.length ? mean ((i) => Math.abs (x[i] - y[i])) : NaN, shown: mean ((i) => Number (Math.abs (x[i] - x[0]) > 4)) };
 }, ours, theirs);
 
-for (const angle of [0, -30, 45, 100, 180])
+for (const angle of [-30, 100])
   test (`the picture at ${angle} degrees is striprender's`, async () => {
     const page = await open (`src=scene.rcnc&paused&azimuth=${angle}`);
     await framesShown (page, 1);
@@ -87,12 +84,6 @@ for (const angle of [0, -30, 45, 100, 180])
     assert.ok (result.difference <= 0.1, JSON.stringify (result));
     await page.close ();
   });
-
-test ('a foreign file gives its sentence', async () => {
-  const page = await open ('src=foreign.rcnc');
-  await messageMatches (page, '^This is no recording of gst-rangecast \\(\\.rcnc\\)\\.$');
-  await page.close ();
-});
 
 test ('a recording that is cut off is shown to its end, and says so', async () => {
   const page = await open ('src=cut.rcnc');
@@ -117,10 +108,10 @@ test ('a file that is dropped onto the page is played, and the button and the sp
   await page.waitForSelector ('#welcome:not([hidden])');
   await page.evaluate (async () => {
     const dropped = new DataTransfer ();
-    dropped.items.add (new File ([await (await fetch ('moving.rcnc')).blob ()], 'moving.rcnc'));
+    dropped.items.add (new File ([await (await fetch ('slow.rcnc')).blob ()], 'slow.rcnc'));
     document.dispatchEvent (new DragEvent ('drop', { dataTransfer: dropped, bubbles: true, cancelable: true }));
   });
-  await framesShown (page, 3);
+  await framesShown (page, 2);
   const stateIs = (state) => page.waitForFunction ((wanted) => document.body.dataset.state === wanted, {}, state);
   await stateIs ('playing');
   await page.click ('#play');
@@ -128,24 +119,6 @@ test ('a file that is dropped onto the page is played, and the button and the sp
   await page.focus ('#picture');
   await page.keyboard.press ('Space');
   await stateIs ('playing');
-  await page.close ();
-});
-
-test ('the takes of a joined recording follow one another', async () => {
-  const page = await open ('src=joined.rcnc', undefined, (made) => made.evaluateOnNewDocument (() => { window.times = []; }));
-  await page.waitForFunction (() => window.rangecastPage);
-  await page.evaluate (() => {
-    const { rangecastPage: shown } = window, { position } = shown;
-    shown.position = function (message) {
-      window.times.push (message.time);
-      return position.call (this, message);
-    };
-  });
-  await page.waitForFunction (() => document.body.dataset.state === 'paused' && window.times.length > 10);
-  const times = await page.evaluate (() => window.times);
-  assert.ok (times.every ((time, i) => i === 0 || time >= times[i - 1]), `${times}`);
-  assert.ok (times.at (-1) > 5000, `${times.at (-1)} ms of two takes of 2.7 s`);
-  assert.equal (await message (page), '');
   await page.close ();
 });
 
@@ -240,70 +213,5 @@ test ('a context that is lost and restored within a picture does not stop the pa
   await page.waitForFunction (() => !window.rangecastPage.renderer.gl.isContextLost ());
   await page.click ('#play');
   await framesShown (page, 4);
-  await page.close ();
-});
-
-// No headset is here: this one stands in for it, with two eyes 64 mm apart whose pictures of 320x320 pixels see 90 degrees.
-const standInHeadset = () => {
-  const projection = Float32Array.of (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1.007, -1, 0, 0, -0.2007, 0);
-  const views = [-0.032, 0.032].map ((x, i) => ({ eye: i ? 'right' : 'left', projectionMatrix: projection,
-    transform: { inverse: { matrix: Float32Array.of (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, 0, 0, 1) } } }));
-  window.XRWebGLLayer = class {
-    constructor (session, gl) {
-      this.framebuffer = gl.createFramebuffer ();
-      this.framebufferWidth = 640;
-      this.framebufferHeight = 320;
-      const colour = gl.createTexture (), depth = gl.createRenderbuffer ();
-      gl.bindTexture (gl.TEXTURE_2D, colour);
-      gl.texStorage2D (gl.TEXTURE_2D, 1, gl.RGBA8, 640, 320);
-      gl.bindRenderbuffer (gl.RENDERBUFFER, depth);
-      gl.renderbufferStorage (gl.RENDERBUFFER, gl.DEPTH_COMPONENT24, 640, 320);
-      gl.bindFramebuffer (gl.FRAMEBUFFER, this.framebuffer);
-      gl.framebufferTexture2D (gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, colour, 0);
-      gl.framebufferRenderbuffer (gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
-      window.headsetLayer = this;
-    }
-    getViewport (view) { return { x: view.eye === 'left' ? 0 : 320, y: 0, width: 320, height: 320 }; }
-  };
-  WebGL2RenderingContext.prototype.makeXRCompatible = async () => {};
-  const requestSession = async () => {
-    let ended = () => {}, over = false;
-    return { addEventListener: (name, action) => { ended = action; }, updateRenderState () {}, requestReferenceSpace: async () => 'space',
-      requestAnimationFrame: (draw) => over || setTimeout (() => over || draw (0, { getViewerPose: () => { window.headsetPictures = (window.headsetPictures ?? 0) + 1; return { views }; } }), 200),
-      end: async () => { over = true; ended (); } };
-  };
-  Object.defineProperty (navigator, 'xr', { value: { isSessionSupported: async () => true, requestSession } });
-};
-
-test ('a headset shows both eyes of one frame set', async () => {
-  const page = await open ('src=scene.rcnc&paused', undefined, (made) => made.evaluateOnNewDocument (standInHeadset));
-  await framesShown (page, 1);
-  await page.waitForSelector ('#headset:not([hidden])');
-  await page.click ('#headset');
-  await page.waitForFunction (() => window.headsetPictures > 2);
-  const eyes = await page.evaluate (() => {
-    const { gl } = window.rangecastPage.renderer, pixels = new Uint8Array (4 * 640 * 320);
-    gl.bindFramebuffer (gl.FRAMEBUFFER, window.headsetLayer.framebuffer);
-    gl.readPixels (0, 0, 640, 320, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-    return [0, 320].map ((left) => {
-      let count = 0, sum = 0;
-      for (let y = 0; y < 320; y++)
-        for (let x = 0; x < 320; x++) {
-          const at = 4 * (y * 640 + left + x);
-          if (Math.abs (pixels[at] - 0x20) + Math.abs (pixels[at + 1] - 0x24) + Math.abs (pixels[at + 2] - 0x2a) > 24) {
-            count++;
-            sum += x;
-          }
-        }
-      return { count, middle: sum / count };
-    });
-  });
-  assert.equal (await message (page), '');
-  const [left, right] = eyes;
-  assert.ok (left.count > 1000 && right.count > 1000, `a person is there: ${JSON.stringify (eyes)}`);
-  // 160 pixels of focal length * 0.064 m / 1.5 m
-  assert.ok (Math.abs (left.middle - right.middle - 6.8) < 2, JSON.stringify (eyes));
-  await page.click ('#headset');
-  await page.waitForFunction (() => document.getElementById ('headset').textContent === 'VR');
   await page.close ();
 });

@@ -2,7 +2,6 @@
 // rangewebsink in a launch string of its own process, and clients of it without a page.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import fs from 'node:fs';
 import net from 'node:net';
 import { required, sleep } from './browser.js';
 
@@ -47,7 +46,6 @@ export const freePort = () => new Promise ((resolve) => {
     probe.close (() => resolve (port));
   });
 });
-export const memory = (server) => Number (/VmRSS:\s+(\d+)/.exec (fs.readFileSync (`/proc/${server.process.pid}/status`, 'utf8'))[1]) * 1024;
 
 // A client without a page. acknowledges: how it answers frame sets
 export const client = (address, { hello = { type: 'hello', version: 1 }, acknowledges = true, ...options } = {}) => {

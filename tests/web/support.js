@@ -23,19 +23,18 @@ export const play = (bytes, core = new Core (wasm)) => {
   return core;
 };
 
-const START_CODE = [0x00, 0x52, 0x43, 0x55];
 const u16 = (bytes, at) => bytes[at] | bytes[at + 1] << 8;
 
 // Access units of a sound byte stream, each a list of its units without the access-unit unit.
 export const accessUnits = (bytes) => {
   const all = [];
   for (let at = 0; at < bytes.length;) {
-    const size = u16 (bytes, at + 6), length = new DataView (bytes.buffer, bytes.byteOffset + at + 8).getUint32 (0, true);
+    const size = u16 (bytes, at + 2), length = new DataView (bytes.buffer, bytes.byteOffset + at + 8).getUint32 (0, true);
     const units = [];
-    for (let unit = at + 4 + size; unit < at + 4 + size + length; unit += u16 (bytes, unit + 2))
+    for (let unit = at + size; unit < at + size + length; unit += u16 (bytes, unit + 2))
       units.push (bytes.slice (unit, unit + u16 (bytes, unit + 2)));
     all.push (units);
-    at += 4 + size + length;
+    at += size + length;
   }
   return all;
 };
@@ -67,9 +66,9 @@ export const changedRigView = (unit, { number, total, id, width, height }) => {
 
 // A byte stream of access units that are lists of units.
 export const byteStream = (units) => joined (units.flatMap ((list, i) => {
-  const header = new Uint8Array (24), view = new DataView (header.buffer);
-  header.set ([0x33, 1, 24, 0]);
-  view.setUint32 (4, list.reduce ((sum, unit) => sum + unit.length, 0), true);
-  view.setBigUint64 (8, BigInt (i) * 40000000n, true);
-  return [new Uint8Array (START_CODE), header, ...list];
+  const header = new Uint8Array (28), view = new DataView (header.buffer);
+  header.set ([0x43, 1, 28, 0, 0x00, 0x52, 0x43, 0x55]);
+  view.setUint32 (8, list.reduce ((sum, unit) => sum + unit.length, 0), true);
+  view.setBigUint64 (12, BigInt (i) * 40000000n, true);
+  return [header, ...list];
 }));

@@ -3,38 +3,18 @@
 
 #include <algorithm>
 
-namespace {
-
-/* GigE Vision 2.0, chapter GVCP: command packets begin with a key, flags, the command, the length
- * of the payload and the request id; all numbers are big-endian. */
-constexpr std::uint8_t kCommandKey = 0x42;
-constexpr std::uint8_t kFlagAcknowledge = 0x01;
-constexpr std::uint8_t kFlagScheduled = 0x80; /* a time follows the masks */
-constexpr std::uint16_t kActionCommand = 0x0100;
-constexpr std::size_t kHeaderSize = 8;
-
-} // namespace
-
-ActionCommandBytes
-action_command_bytes (const ActionCommand &command)
+/* GigE Vision 2.0, chapter GVCP: command packets begin with a key, flags (here none: no
+ * acknowledge, no time), the command, the length of the payload and the request id; all numbers are
+ * big-endian. */
+std::array<std::uint8_t, 20>
+action_command_bytes (std::uint32_t device_key, std::uint16_t request_id)
 {
-  ActionCommandBytes packet;
-  const auto put = [&] (std::uint64_t value, int n_bytes) {
-    for (int shift = 8 * (n_bytes - 1); shift >= 0; shift -= 8)
-      packet.bytes[packet.size++] = static_cast<std::uint8_t> (value >> shift);
+  const auto byte = [] (std::uint32_t value, int shift) {
+    return static_cast<std::uint8_t> (value >> shift);
   };
-  put (kCommandKey, 1);
-  put ((command.acknowledge ? kFlagAcknowledge : 0) | (command.time_ns ? kFlagScheduled : 0), 1);
-  put (kActionCommand, 2);
-  put (command.time_ns ? 20 : 12, 2);
-  put (command.request_id, 2);
-  put (command.device_key, 4);
-  put (command.group_key, 4);
-  put (command.group_mask, 4);
-  if (command.time_ns)
-    put (*command.time_ns, 8);
-  g_assert (packet.size == kHeaderSize + (command.time_ns ? 20 : 12));
-  return packet;
+  return {0x42, 0, 0x01, 0x00, 0, 12, byte (request_id, 8), byte (request_id, 0),
+      byte (device_key, 24), byte (device_key, 16), byte (device_key, 8), byte (device_key, 0), 0,
+      0, 0, 1, 0, 0, 0, 1};
 }
 
 CameraStatus
@@ -61,7 +41,7 @@ ActionSender::open (std::span<const std::string> interfaces, std::uint16_t port)
     if (!socket || error) {
       CameraStatus status (CameraFault::kFailed,
           "action commands: cannot send from '" + interface +
-              "': " + (error ? error->message : "expected an IPv4 address of this host"));
+              "': " + (error ? error->message : "it is no IP address of this host"));
       g_clear_error (&error);
       g_clear_object (&socket);
       close ();
@@ -86,17 +66,16 @@ ActionSender::close ()
 }
 
 CameraStatus
-ActionSender::send (ActionCommand command)
+ActionSender::send (std::uint32_t device_key)
 {
   if (++last_id_ == 0)
     last_id_ = 1;
-  command.request_id = last_id_;
-  const ActionCommandBytes packet = action_command_bytes (command);
+  const auto packet = action_command_bytes (device_key, last_id_);
   CameraStatus status;
   for (const Route &route : routes_) {
     GError *error = nullptr;
     g_socket_send_to (route.socket, route.destination,
-        reinterpret_cast<const gchar *> (packet.bytes.data ()), packet.size, nullptr, &error);
+        reinterpret_cast<const gchar *> (packet.data ()), packet.size (), nullptr, &error);
     if (error && status.ok ())
       status = {CameraFault::kFailed,
           "action commands: cannot send from '" + route.interface + "': " + error->message};

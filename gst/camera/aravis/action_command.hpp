@@ -1,34 +1,24 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The GigE Vision action command: one datagram that triggers all cameras of a group. */
+/* The GigE Vision action command: one datagram that triggers all cameras of a key. */
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <optional>
+#include <gio/gio.h>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "gvcp.hpp"
-#include "status.hpp"
+#include "types.hpp"
 
-/** GigE Vision 2.0, ACTION_CMD. A camera reacts if `device_key` is its ActionDeviceKey, `group_key`
- *  its ActionGroupKey, and `group_mask` AND its ActionGroupMask is not 0. */
-struct ActionCommand {
-  std::uint32_t device_key = 0, group_key = 0, group_mask = 0;
-  std::optional<std::uint64_t> time_ns; ///< on the cameras' IEEE 1588 clock; absent: now
-  bool acknowledge = false;             ///< cameras answer with an ACTION_ACK
-  std::uint16_t request_id = 1; ///< never 0; cameras ignore a second command with the same one
-};
+/** UDP port of GVCP, the GigE Vision control protocol. */
+inline constexpr std::uint16_t kGvcpPort = 3956;
 
-/** The bytes on the wire. */
-struct ActionCommandBytes {
-  std::array<std::uint8_t, 28> bytes{};
-  std::size_t size = 0; ///< 20, or 28 with a time
-
-  [[nodiscard]] std::span<const std::uint8_t> span () const { return {bytes.data (), size}; }
-};
-[[nodiscard]] ActionCommandBytes action_command_bytes (const ActionCommand &command);
+/** ACTION_CMD of GigE Vision 2.0 on the wire, for cameras with that ActionDeviceKey,
+ *  ActionGroupKey 1 and bit 0 in their ActionGroupMask, to be executed immediately.
+ *  @param request_id  never 0; cameras ignore a second command with the same one */
+[[nodiscard]] std::array<std::uint8_t, 20> action_command_bytes (
+    std::uint32_t device_key, std::uint16_t request_id);
 
 /** Sends action commands by broadcast from this host's interfaces. Not thread-safe. */
 class ActionSender {
@@ -45,7 +35,7 @@ public:
   void close ();
   /** Sends the command from every interface, with a new request id. Does not wait for answers.
    *  @return kFailed: the text names the interface; the others have sent it */
-  CameraStatus send (ActionCommand command);
+  CameraStatus send (std::uint32_t device_key);
 
 private:
   struct Route {

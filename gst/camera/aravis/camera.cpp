@@ -1,27 +1,32 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Every call to a camera that does not answer takes seconds, so streams and control are released in
- * a TeardownQueue, for which nobody waits longer than a second. */
 #include "camera.hpp"
 
 #include <arv.h>
 #include <atomic>
 #include <mutex>
 
-#include "acquisition.hpp"
-#include "clock_reading.hpp"
 #include "control.hpp"
 #include "discovery.hpp"
-#include "format.hpp"
-#include "receive_buffer.hpp"
 #include "setup.hpp"
-#include "teardown_queue.hpp"
+#include "stream.hpp"
 
 namespace {
 
 constexpr std::size_t kMinSocketBuffer = 1 << 20; /* bytes */
-constexpr guint kPacketTimeout_us = 20000;        /* then a packet counts as missing */
-constexpr guint kFrameRetention_us = 100000;      /* then an incomplete image is given up */
-constexpr std::size_t kMaxChunkBytes = 1 << 20;   /* that chunk data may add to an image */
+/* Then a packet counts as missing. Aravis looks for images to give up in pauses of this length,
+ * else with the first packet of an image: one that gets the only free buffer after it is
+ * incomplete, too, and so on. */
+constexpr guint kPacketTimeout_us = 5000;
+constexpr guint kFrameRetention_us = 100000;    /* then an incomplete image is given up */
+constexpr std::size_t kMaxChunkBytes = 1 << 20; /* that chunk data may add to an image */
+
+std::string
+lost_text (const std::string &label)
+{
+  return label +
+         ": the camera no longer responds; check power and cable, and that no other program "
+         "controls it";
+}
 
 /* Handles the device's signal control-lost, which may be emitted while the camera is deleted. */
 struct LossWatch {
@@ -48,10 +53,8 @@ struct Camera::Impl {
   std::unique_ptr<CameraControl> control;
   CameraSettings settings;
   CameraFormat format;
-  int packet_size = 0;
   std::shared_ptr<LossWatch> watch = std::make_shared<LossWatch> ();
   gulong watch_handler = 0;
-  TeardownQueue teardown;
 
   std::mutex run_lock; /* guards what follows */
   std::shared_ptr<CameraRun> run;
@@ -62,13 +65,16 @@ struct Camera::Impl {
    * for one feature at a time. */
   std::mutex imaging_lock;
   ImagingParameters written;
-  guint64 tick_frequency = 0; /* of the camera's clock, Hz; 0: not yet read */
 
   void describe ();
   CameraStatus create_stream (const std::shared_ptr<CameraRun> &run);
   void set_stream_properties (ArvStream *stream) const;
   CameraStatus fill (CameraRun &run);
-  void end (const std::shared_ptr<CameraRun> &run);
+  [[nodiscard]] CameraStatus check_not_lost () const
+  {
+    return watch->lost ? CameraStatus (CameraFault::kLost, lost_text (control->label ()))
+                       : CameraStatus ();
+  }
   /* Any fault of a camera that was lost is the loss. */
   CameraStatus classify (CameraStatus status) const
   {
@@ -110,9 +116,6 @@ CameraStatus
 Camera::open (const std::string &name, std::unique_ptr<Camera> &camera, CameraInfo *seen)
 {
   auto impl = std::make_unique<Impl> ();
-  if (const GError *no_thread = impl->teardown.error ())
-    return {CameraFault::kFailed,
-        "could not start the thread that releases the camera: " + std::string (no_thread->message)};
   ArvDevice *device = nullptr;
   CameraStatus status = open_camera_device (name, device, impl->info);
   if (seen)
@@ -129,9 +132,8 @@ Camera::open (const std::string &name, std::unique_ptr<Camera> &camera, CameraIn
     return status;
   }
   g_clear_error (&error);
-  const std::string called = name.empty () ? impl->info.id : name;
-  std::string label = "camera '" + valid_utf8 (called) + "'";
-  if (!impl->info.model.empty () && impl->info.id != called)
+  std::string label = "camera '" + valid_utf8 (name) + "'";
+  if (!impl->info.model.empty () && impl->info.id != name)
     label +=
         " (" + impl->info.vendor + " " + impl->info.model + ", serial " + impl->info.serial + ")";
   impl->control = std::make_unique<CameraControl> (arv, label);
@@ -154,9 +156,6 @@ Camera::~Camera ()
 {
   stop ();
   g_signal_handler_disconnect (impl_->control->device (), impl_->watch_handler);
-  impl_->teardown.run ([control = std::shared_ptr<CameraControl> (
-                            std::move (impl_->control))] () mutable { control.reset (); },
-      !is_lost ());
 }
 
 const CameraInfo &
@@ -169,12 +168,6 @@ const std::string &
 Camera::label () const
 {
   return impl_->control->label ();
-}
-
-bool
-Camera::is_gige () const
-{
-  return ARV_IS_GV_DEVICE (impl_->control->device ());
 }
 
 const std::string &
@@ -195,38 +188,19 @@ CameraStatus
 Camera::configure (const CameraSettings &settings)
 {
   CameraControl &control = *impl_->control;
-  if (settings.n_buffers < 2)
-    return control.refuse (CameraFault::kBadSetting,
-        std::to_string (settings.n_buffers) + " buffers: expected at least 2");
-  double frame_rate = 0;
   impl_->settings = settings;
   CameraStatus status = set_transport (control, settings);
   if (status.ok ())
-    status = set_image (control, settings);
+    status = set_image (control, settings, impl_->format);
   if (status.ok ())
     status = set_trigger (control, settings);
   if (status.ok ())
-    status = set_imaging (control, settings, frame_rate);
+    status = set_imaging (control, settings);
   if (status.ok ())
-    status = set_features (control, settings.features);
-  if (status.ok ())
-    status = read_format (control, impl_->format);
-  impl_->format.frame_rate = frame_rate;
+    status = control.assign_features (settings.features);
   std::lock_guard guard (impl_->imaging_lock);
   impl_->written = {};
   return impl_->classify (status);
-}
-
-const CameraFormat &
-Camera::format () const
-{
-  return impl_->format;
-}
-
-int
-Camera::packet_size () const
-{
-  return impl_->packet_size;
 }
 
 /* ---- streaming ---- */
@@ -245,7 +219,6 @@ Camera::Impl::set_stream_properties (ArvStream *stream) const
   const int bytes = int (std::min<std::size_t> (wanted, G_MAXINT));
   g_object_set (stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
       bytes, nullptr);
-  (void)enlarge_receive_buffer (arv_gv_stream_get_port (ARV_GV_STREAM (stream)), bytes);
 }
 
 CameraStatus
@@ -259,7 +232,7 @@ Camera::Impl::create_stream (const std::shared_ptr<CameraRun> &run)
         if (type == ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE)
           static_cast<CameraRun *> (data)->on_done ();
       },
-      run.get (), nullptr, &error); /* end() keeps the run until the stream is deleted */
+      run.get (), nullptr, &error); /* which lives until the stream is deleted */
   if (!stream)
     return error ? control->status ("stream", error, CameraFault::kFailed)
                  : control->refuse (CameraFault::kFailed, "the camera does not provide a stream");
@@ -280,15 +253,12 @@ Camera::Impl::fill (CameraRun &run)
   CameraStatus status = control->status ("payload size", error, CameraFault::kFailed);
   if (status.ok () && (payload < format.size () || payload > 2 * format.size () + kMaxChunkBytes))
     status = control->refuse (CameraFault::kUnsupported,
-        "the camera sends " + std::to_string (payload) + " bytes an image; expected " +
-            std::to_string (format.size ()) + " for " + std::to_string (format.width) + "x" +
-            std::to_string (format.height) + " " + format.pixel_format);
+        "the camera sends " + std::to_string (payload) + " bytes an image, not the " +
+            std::to_string (format.size ()) + " of " + std::to_string (format.width) + "x" +
+            std::to_string (format.height) + " " + settings.pixel_format);
   if (!status.ok ())
     return status;
   run.store->fill (settings.n_buffers, payload);
-  packet_size = 0;
-  if (arv_camera_is_gv_device (control->camera ()))
-    packet_size = int (arv_camera_gv_get_packet_size (control->camera (), nullptr));
   return {};
 }
 
@@ -296,19 +266,14 @@ CameraStatus
 Camera::start (Arrived arrived, Lost lost)
 {
   CameraControl &control = *impl_->control;
-  if (impl_->format.width == 0)
-    return control.refuse (
-        CameraFault::kBadSetting, "the camera was started before it was configured");
-  if (impl_->watch->lost)
-    return control.refuse (CameraFault::kLost, "the camera was lost; it must be opened again");
+  if (CameraStatus lost = impl_->check_not_lost (); !lost.ok ())
+    return lost;
   stop ();
-  if (!impl_->teardown.wait (TeardownQueue::kMaxWait))
-    return control.refuse (CameraFault::kTimedOut, "the camera is still stopping");
   auto run = std::make_shared<CameraRun> ();
   run->arrived = std::move (arrived);
   run->format = impl_->format;
-  run->code = find_pixel_format (impl_->format.pixel_format)->code;
-  run->counter = FrameCounter (is_gige () ? FrameCounter::Ids::kGigE : FrameCounter::Ids::kUsb);
+  run->counter = FrameCounter (
+      ARV_IS_GV_DEVICE (control.device ()) ? FrameCounter::Ids::kGigE : FrameCounter::Ids::kUsb);
   CameraStatus status = impl_->create_stream (run);
   if (!status.ok ())
     return impl_->classify (status);
@@ -335,21 +300,6 @@ Camera::start (Arrived arrived, Lost lost)
 
 /* Stops acquisition, then the receiving thread, then releases the buffers. */
 void
-Camera::Impl::end (const std::shared_ptr<CameraRun> &run)
-{
-  const bool answers = !watch->lost;
-  teardown.run (
-      [control = control.get (), run, answers] {
-        if (answers) {
-          const auto guard = control->lock ();
-          arv_camera_stop_acquisition (control->camera (), nullptr);
-        }
-        g_object_unref (run->stream); /* stops its thread, which must not be stopped twice */
-      },
-      answers);
-}
-
-void
 Camera::stop ()
 {
   {
@@ -363,7 +313,7 @@ Camera::stop ()
     impl_->run = nullptr;
     if (!run)
       return;
-    impl_->last_statistics = count_stream (run->stream);
+    impl_->last_statistics = run->statistics ();
   }
   {
     std::lock_guard guard (run->lock);
@@ -371,19 +321,21 @@ Camera::stop ()
     run->arrived = nullptr;
   }
   run->store->close ();
-  impl_->end (run);
+  if (!impl_->watch->lost) {
+    const auto guard = impl_->control->lock ();
+    arv_camera_stop_acquisition (impl_->control->camera (), nullptr);
+  }
+  g_object_unref (run->stream);
 }
 
-void
-Camera::give_up ()
+CameraStatus
+Camera::loss_or_fault (const CameraStatus &status)
 {
+  const CameraFault fault = status.fault ();
+  if (fault != CameraFault::kTimedOut && fault != CameraFault::kLost && fault != CameraFault::kBusy)
+    return status;
   impl_->watch->lost = true;
-}
-
-bool
-Camera::is_lost () const
-{
-  return impl_->watch->lost;
+  return impl_->check_not_lost ();
 }
 
 CameraStatistics
@@ -392,7 +344,7 @@ Camera::statistics () const
   std::lock_guard guard (impl_->run_lock);
   if (!impl_->run)
     return impl_->last_statistics;
-  CameraStatistics numbers = count_stream (impl_->run->stream);
+  CameraStatistics numbers = impl_->run->statistics ();
   numbers.buffers_out = impl_->run->store->out ();
   return numbers;
 }
@@ -403,8 +355,8 @@ CameraStatus
 Camera::trigger_software ()
 {
   CameraControl &control = *impl_->control;
-  if (is_lost ())
-    return control.refuse (CameraFault::kLost, "the camera cannot be triggered: it was lost");
+  if (CameraStatus lost = impl_->check_not_lost (); !lost.ok ())
+    return lost;
   const auto guard = control.lock ();
   GError *error = nullptr;
   arv_camera_software_trigger (control.camera (), &error);
@@ -414,8 +366,8 @@ Camera::trigger_software ()
 CameraStatus
 Camera::read_imaging (ImagingParameters &parameters)
 {
-  if (is_lost ())
-    return impl_->control->refuse (CameraFault::kLost, "the camera was lost");
+  if (CameraStatus lost = impl_->check_not_lost (); !lost.ok ())
+    return lost;
   std::lock_guard guard (impl_->imaging_lock);
   return impl_->classify (::read_imaging (*impl_->control, parameters));
 }
@@ -423,35 +375,17 @@ Camera::read_imaging (ImagingParameters &parameters)
 CameraStatus
 Camera::write_imaging (const ImagingParameters &parameters)
 {
-  if (is_lost ())
-    return impl_->control->refuse (CameraFault::kLost, "the camera was lost");
+  if (CameraStatus lost = impl_->check_not_lost (); !lost.ok ())
+    return lost;
   std::lock_guard guard (impl_->imaging_lock);
   return impl_->classify (::write_imaging (*impl_->control, parameters, impl_->written));
-}
-
-bool
-Camera::clock_is_ptp ()
-{
-  std::string status;
-  CameraControl &control = *impl_->control;
-  if (is_lost () ||
-      !(control.read ("PtpStatus", status) || control.read ("GevIEEE1588Status", status)))
-    return false;
-  return status == "Slave" || status == "Master";
 }
 
 CameraStatus
 Camera::read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us)
 {
-  CameraControl &control = *impl_->control;
-  camera_time_ns = 0;
-  if (is_lost ())
-    return control.refuse (CameraFault::kLost, "the camera was lost");
+  if (CameraStatus lost = impl_->check_not_lost (); !lost.ok ())
+    return lost;
   std::lock_guard guard (impl_->imaging_lock);
-  CameraStatus status =
-      is_gige () ? read_gige_clock (control, impl_->tick_frequency, camera_time_ns, read_at_us)
-                 : read_usb_clock (control, camera_time_ns, read_at_us);
-  if (status.ok () && (camera_time_ns == 0 || camera_time_ns >= kMaxCameraTime_ns))
-    return control.refuse (CameraFault::kFailed, "the camera has no readable clock");
-  return impl_->classify (status);
+  return impl_->classify (::read_clock (*impl_->control, camera_time_ns, read_at_us));
 }

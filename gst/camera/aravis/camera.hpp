@@ -17,25 +17,18 @@
 #include <string>
 #include <vector>
 
-#include "camera_info.hpp"
-#include "frame.hpp"
-#include "settings.hpp"
-#include "status.hpp"
+#include "types.hpp"
 
 /** The format of a configured camera's images. */
 struct CameraFormat {
-  std::string pixel_format; ///< GenICam's name, as "BayerRG8"
+  std::uint32_t code = 0; ///< GenICam's number of the pixel format
   GstVideoFormat video_format =
       GST_VIDEO_FORMAT_UNKNOWN; ///< GRAY8, RGB, BGR; UNKNOWN if it is Bayer
-  std::string bayer;            ///< "rggb", "bggr", "gbrg", "grbg"; empty if it is not Bayer
   int width = 0, height = 0;    ///< pixels
   int stride = 0;               ///< bytes from row to row: cameras do not pad rows
-  double frame_rate = 0;        ///< frames per second; 0: triggered or unknown
 
   /** Bytes of an image. */
   [[nodiscard]] std::size_t size () const { return std::size_t (stride) * height; }
-  /** video/x-raw or video/x-bayer with width and height, without a frame rate. Transfer full. */
-  [[nodiscard]] GstCaps *caps () const;
 };
 
 /** What a camera can be configured to, for caps. */
@@ -48,19 +41,19 @@ struct CameraAbilities {
   double max_frame_rate = 0; ///< frames per second at the current settings; 0: not settable
 };
 
-/** The caps of all supported pixel formats: GRAY8, RGB, BGR and 8-bit Bayer. Transfer full. */
-GstCaps *camera_caps ();
+/** The caps of a pixel format by GenICam's name, or of all supported ones: GRAY8, RGB, BGR and
+ *  8-bit Bayer. Transfer full. */
+GstCaps *camera_caps (const std::string &name = "");
 /** GenICam's name of the first pixel format in `has` whose caps intersect these; empty: none. */
 std::string pixel_format_for_caps (const GstCaps *caps, const std::vector<std::string> &has);
 
 /** Counters since start(). */
 struct CameraStatistics {
-  std::uint64_t completed = 0;       ///< images that arrived complete
-  std::uint64_t failures = 0;        ///< images that did not
-  std::uint64_t underruns = 0;       ///< images for which no buffer was free
-  std::uint64_t resent_packets = 0;  ///< GigE: packets that came after a resend request
-  std::uint64_t missing_packets = 0; ///< GigE: packets that never came
-  int buffers_out = 0;               ///< images that are downstream now
+  std::uint64_t completed = 0;      ///< images that arrived complete
+  std::uint64_t failures = 0;       ///< images that did not
+  std::uint64_t underruns = 0;      ///< images for which no buffer was free
+  std::uint64_t resent_packets = 0; ///< GigE: packets that came after a resend request
+  int buffers_out = 0;              ///< images that are downstream now
 };
 
 /** The values that a camera can adjust by itself, to copy them to another one. Absent: it has no
@@ -80,7 +73,7 @@ public:
 
   /** Finds, opens and takes control of a camera.
    *  @param name  its serial number, Aravis id (as "Aravis-Fake-GV01"), MAC address, IP address,
-   *  user-defined name (GigE), or host name with a dot in it. Empty: the only camera.
+   *  user-defined name (GigE), or host name with a dot in it.
    *  @param[out] camera  set if ok
    *  @return kNotFound (the text says which cameras answered), kBusy (another program has control),
    *  kNoPermission (USB, the text says which udev rule), kTimedOut, kFailed. Any thread; calls wait
@@ -97,31 +90,25 @@ public:
   [[nodiscard]] const CameraInfo &info () const;
   /** For messages: the name it was opened by, and vendor, model and serial number. */
   [[nodiscard]] const std::string &label () const;
-  [[nodiscard]] bool is_gige () const;
   /** GigE: the address of this host's interface to it; empty for others. */
   [[nodiscard]] const std::string &interface_address () const;
 
   CameraStatus abilities (CameraAbilities &abilities);
 
   /** Applies the settings, while stopped. What was applied before a failure stays.
-   *  @return kBadSetting (the text names feature, value and what the camera accepts), kUnsupported,
-   *  kTimedOut, kLost */
+   *  @return kBadSetting (the text names feature and value), kUnsupported, kTimedOut, kLost */
   CameraStatus configure (const CameraSettings &settings);
-  /** Valid after configure(). */
-  [[nodiscard]] const CameraFormat &format () const;
-  /** Bytes per packet, as negotiated; 0 for USB, and before start(). */
-  [[nodiscard]] int packet_size () const;
 
-  /** Starts streaming; frame numbers begin at 0.
+  /** Starts streaming, once configured; frame numbers begin at 0.
    *  @param arrived  a frame came, or was given up; in order of `number`
    *  @param lost     at most once: the camera no longer responds, or another program took
-   *  control. With GigE that takes up to 6 s; class Heartbeat is quicker. */
+   *  control. With GigE that takes up to 8 s. */
   CameraStatus start (Arrived arrived, Lost lost);
   /** No callback runs or comes after it. */
   void stop ();
-  [[nodiscard]] bool is_lost () const; ///< any thread
-  /** Any thread: marks the camera as lost, so that nothing waits for it any more. */
-  void give_up ();
+  /** Any thread: the fault of a call, or, where the camera does not answer or another program
+   *  controls it, its loss: then it is given up, and no later call waits for it. */
+  CameraStatus loss_or_fault (const CameraStatus &status);
 
   /** Any thread: captures one image (TriggerMode::kSoftware). Returns when the camera has
    *  acknowledged, usually within a millisecond. */
@@ -133,10 +120,8 @@ public:
    *  than a thousandth from what was last written. Automatic adjustment must be off
    *  (AutoMode::kManual). */
   CameraStatus write_imaging (const ImagingParameters &parameters);
-  /** Any thread: whether the camera's clock follows IEEE 1588 now (PtpStatus Slave or Master). */
-  bool clock_is_ptp ();
   /** Any thread: the camera's clock, ns, and when it was read (g_get_monotonic_time, middle of the
-   *  round trip, microseconds), to compare clocks of cameras that do not follow IEEE 1588. */
+   *  round trip, microseconds), to compare the clocks of cameras. */
   CameraStatus read_clock (std::uint64_t &camera_time_ns, std::int64_t &read_at_us);
 
 private:

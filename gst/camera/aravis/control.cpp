@@ -47,11 +47,8 @@ number_text (double value)
 CameraControl::CameraControl (ArvCamera *camera, std::string label)
     : camera_ (camera), label_ (std::move (label))
 {
-}
-
-CameraControl::~CameraControl ()
-{
-  g_object_unref (camera_);
+  /* else cameras round or ignore values without a word */
+  arv_camera_set_range_check_policy (camera_, ARV_RANGE_CHECK_POLICY_ENABLE);
 }
 
 CameraStatus
@@ -89,69 +86,38 @@ CameraControl::entries (const char *feature) const
   return words;
 }
 
-bool
-CameraControl::has_entry (const char *feature, const std::string &entry) const
+/* Aravis takes what follows a number, or stands in its place, for nothing. */
+static bool
+is_number (ArvGcNode *node, const std::string &text)
 {
-  const std::vector<std::string> all = entries (feature);
-  return std::find (all.begin (), all.end (), entry) != all.end ();
-}
-
-CameraStatus
-CameraControl::writable (const std::string &feature, ArvGcNode *&node) const
-{
-  node = arv_device_get_feature (device (), feature.c_str ());
-  if (!ARV_IS_GC_FEATURE_NODE (node) || ARV_IS_GC_CATEGORY (node))
-    return refuse (CameraFault::kBadSetting, "the camera has no feature '" + feature + "'");
-  if (!arv_device_is_feature_available (device (), feature.c_str (), nullptr))
-    return refuse (CameraFault::kBadSetting, "feature '" + feature +
-                                                 "' is not available as the camera is set now; "
-                                                 "another feature before it may change that");
-  if (arv_device_get_feature_access_mode (device (), feature.c_str ()) == ARV_GC_ACCESS_MODE_RO)
-    return refuse (CameraFault::kBadSetting, "feature '" + feature + "' can only be read");
-  return {};
-}
-
-CameraStatus
-CameraControl::execute (const std::string &feature)
-{
-  const auto guard = lock ();
-  ArvGcNode *node = nullptr;
-  CameraStatus found = writable (feature, node);
-  if (!found.ok ())
-    return found;
-  if (!ARV_IS_GC_COMMAND (node))
-    return refuse (CameraFault::kBadSetting,
-        "feature '" + feature + "' is not a command; give it a value: " + feature + "=...");
-  GError *error = nullptr;
-  arv_device_execute_command (device (), feature.c_str (), &error);
-  return status ("command " + feature, error);
+  gchar *end = nullptr;
+  if (ARV_IS_GC_FLOAT (node))
+    return std::isfinite (g_ascii_strtod (text.c_str (), &end)) && !text.empty () && !*end;
+  (void)g_ascii_strtoll (text.c_str (), &end, 0);
+  return !text.empty () && !*end;
 }
 
 CameraStatus
 CameraControl::assign (const std::string &feature, const std::string &value)
 {
   const auto guard = lock ();
-  ArvGcNode *node = nullptr;
-  CameraStatus found = writable (feature, node);
-  if (!found.ok ())
-    return found;
-  if (ARV_IS_GC_ENUMERATION (node)) /* before the others: it is an integer and a string, too */
-    return assign_enumeration (feature, value);
-  if (ARV_IS_GC_BOOLEAN (node))
-    return assign_boolean (feature, value);
+  const auto bad = CameraFault::kBadSetting;
+  const std::string what = "feature " + feature + "=" + value;
+  ArvGcNode *node = arv_device_get_feature (device (), feature.c_str ());
+  if (!ARV_IS_GC_FEATURE_NODE (node) || ARV_IS_GC_CATEGORY (node))
+    return refuse (bad, "the camera has no feature '" + feature + "'");
   if (ARV_IS_GC_COMMAND (node))
-    return refuse (CameraFault::kBadSetting,
-        "feature '" + feature + "' is a command and takes no value: write only its name");
-  if (ARV_IS_GC_FLOAT (node))
-    return assign_float (feature, value);
-  if (ARV_IS_GC_INTEGER (node))
-    return assign_integer (feature, value);
-  if (ARV_IS_GC_STRING (node)) {
-    GError *error = nullptr;
-    arv_device_set_string_feature_value (device (), feature.c_str (), value.c_str (), &error);
-    return status ("feature " + feature + "=" + value, error);
+    return refuse (bad, what + ": it is a command and takes no value");
+  if (ARV_IS_GC_ENUMERATION (node)) { /* before the others: it is an integer, too */
+    const std::vector<std::string> all = entries (feature.c_str ());
+    if (std::ranges::find (all, value) == all.end ())
+      return refuse (bad, what + ": the camera accepts " + joined (all));
+  } else if ((ARV_IS_GC_FLOAT (node) || ARV_IS_GC_INTEGER (node)) && !is_number (node, value)) {
+    return refuse (bad, what + ": it takes a number");
   }
-  return refuse (CameraFault::kBadSetting, "feature '" + feature + "' has no value to set");
+  GError *error = nullptr;
+  arv_gc_feature_node_set_value_from_string (ARV_GC_FEATURE_NODE (node), value.c_str (), &error);
+  return status (what, error);
 }
 
 CameraStatus
@@ -166,93 +132,41 @@ CameraControl::assign_all (
 }
 
 CameraStatus
-CameraControl::assign_if_there (
-    std::initializer_list<const char *> features, const std::string &value)
+CameraControl::assign_if_there (const char *feature, const std::string &value)
 {
-  for (const char *feature : features)
-    if (has (feature))
-      return assign (feature, value);
-  return {};
+  return has (feature) ? assign (feature, value) : CameraStatus ();
 }
 
 CameraStatus
-CameraControl::assign_enumeration (const std::string &feature, const std::string &value)
+CameraControl::execute (const std::string &feature)
 {
-  if (!has_entry (feature.c_str (), value))
-    return refuse (CameraFault::kBadSetting, "feature " + feature + "=" + value +
-                                                 ": the camera accepts " +
-                                                 joined (entries (feature.c_str ())));
-  GError *error = nullptr;
-  arv_device_set_string_feature_value (device (), feature.c_str (), value.c_str (), &error);
-  return status ("feature " + feature + "=" + value, error);
-}
-
-CameraStatus
-CameraControl::assign_boolean (const std::string &feature, const std::string &value)
-{
-  gboolean on = FALSE;
-  const std::string low = [&] {
-    std::string text = value;
-    for (char &c : text)
-      c = g_ascii_tolower (c);
-    return text;
-  }();
-  if (low == "true" || low == "1" || low == "on" || low == "yes")
-    on = TRUE;
-  else if (low != "false" && low != "0" && low != "off" && low != "no")
+  const auto guard = lock ();
+  if (!ARV_IS_GC_COMMAND (arv_device_get_feature (device (), feature.c_str ())))
     return refuse (CameraFault::kBadSetting,
-        "feature " + feature + "=" + value + ": the camera accepts true and false");
+        "features: the camera has no command '" + feature + "' (a value is set by NAME=VALUE)");
   GError *error = nullptr;
-  arv_device_set_boolean_feature_value (device (), feature.c_str (), on, &error);
-  return status ("feature " + feature + "=" + value, error);
+  arv_device_execute_command (device (), feature.c_str (), &error);
+  return status ("command " + feature, error);
 }
 
 CameraStatus
-CameraControl::assign_integer (const std::string &feature, const std::string &value)
+CameraControl::assign_features (const std::string &features)
 {
-  gchar *end = nullptr;
-  errno = 0;
-  const std::int64_t number = g_ascii_strtoll (value.c_str (), &end, 0);
-  const std::string what = "feature " + feature + "=" + value;
-  if (value.empty () || *end || errno)
-    return refuse (CameraFault::kBadSetting, what + ": expected an integer, as 10 or 0x0a");
-  gint64 low = G_MININT64, high = G_MAXINT64, step = 1;
+  gchar **words = nullptr;
   GError *error = nullptr;
-  arv_device_get_integer_feature_bounds (device (), feature.c_str (), &low, &high, &error);
-  if (error) {
-    low = G_MININT64;
-    high = G_MAXINT64;
+  g_shell_parse_argv (features.c_str (), nullptr, &words, &error);
+  if (g_error_matches (error, G_SHELL_ERROR, G_SHELL_ERROR_EMPTY_STRING))
+    g_clear_error (&error);
+  CameraStatus status = this->status ("features \"" + features + "\"", error);
+  for (gchar **word = words; word && *word && status.ok (); word++) {
+    const std::string text = *word;
+    const std::size_t equals = text.find ('=');
+    status = equals == std::string::npos
+                 ? execute (text)
+                 : assign (text.substr (0, equals), text.substr (equals + 1));
   }
-  g_clear_error (&error);
-  step = arv_device_get_integer_feature_increment (device (), feature.c_str (), nullptr);
-  step = std::max<gint64> (step, 1);
-  const guint64 above = guint64 (number) - guint64 (low); /* wraps only where it is below anyway */
-  if (number < low || number > high || (step > 1 && above % guint64 (step) != 0))
-    return refuse (CameraFault::kBadSetting,
-        what + ": the camera accepts " + std::to_string (low) + " to " + std::to_string (high) +
-            (step > 1 ? " in steps of " + std::to_string (step) : ""));
-  arv_device_set_integer_feature_value (device (), feature.c_str (), number, &error);
-  return status (what, error);
-}
-
-CameraStatus
-CameraControl::assign_float (const std::string &feature, const std::string &value)
-{
-  gchar *end = nullptr;
-  const double number = g_ascii_strtod (value.c_str (), &end);
-  const std::string what = "feature " + feature + "=" + value;
-  if (value.empty () || *end || !std::isfinite (number))
-    return refuse (CameraFault::kBadSetting, what + ": expected a number, as 2.5");
-  double low = -G_MAXDOUBLE, high = G_MAXDOUBLE;
-  GError *error = nullptr;
-  arv_device_get_float_feature_bounds (device (), feature.c_str (), &low, &high, &error);
-  const bool bounded = !error && low <= high;
-  g_clear_error (&error);
-  if (bounded && (number < low || number > high))
-    return refuse (CameraFault::kBadSetting,
-        what + ": the camera accepts " + number_text (low) + " to " + number_text (high));
-  arv_device_set_float_feature_value (device (), feature.c_str (), number, &error);
-  return status (what, error);
+  g_strfreev (words);
+  return status;
 }
 
 bool
@@ -269,36 +183,6 @@ CameraControl::read (const char *feature, double &value) const
   else
     return false;
   const bool fine = !error && std::isfinite (got);
-  g_clear_error (&error);
-  if (fine)
-    value = got;
-  return fine;
-}
-
-bool
-CameraControl::read (const char *feature, std::int64_t &value) const
-{
-  const auto guard = lock ();
-  if (!ARV_IS_GC_INTEGER (arv_device_get_feature (device (), feature)))
-    return false;
-  GError *error = nullptr;
-  const gint64 got = arv_device_get_integer_feature_value (device (), feature, &error);
-  const bool fine = !error;
-  g_clear_error (&error);
-  if (fine)
-    value = got;
-  return fine;
-}
-
-bool
-CameraControl::read (const char *feature, std::string &value) const
-{
-  const auto guard = lock ();
-  if (!ARV_IS_GC_STRING (arv_device_get_feature (device (), feature)))
-    return false;
-  GError *error = nullptr;
-  const char *got = arv_device_get_string_feature_value (device (), feature, &error);
-  const bool fine = !error && got;
   g_clear_error (&error);
   if (fine)
     value = got;

@@ -7,11 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "status.hpp"
+#include "types.hpp"
 
-/** Reads and writes the features of one camera. Faults name the camera, the feature, the value and
- *  what the camera accepts. Any thread; the lock admits one at a time, since GenICam nodes have
- *  state. */
+/** Reads and writes the features of one camera. Faults name the camera, the feature and the value.
+ *  Any thread; the lock admits one at a time, since GenICam nodes have state. */
 class CameraControl {
 public:
   /** @param camera  transfer full
@@ -19,7 +18,7 @@ public:
   CameraControl (ArvCamera *camera, std::string label);
   CameraControl (const CameraControl &) = delete;
   CameraControl &operator= (const CameraControl &) = delete;
-  ~CameraControl ();
+  ~CameraControl () { g_object_unref (camera_); }
 
   [[nodiscard]] ArvCamera *camera () const { return camera_; }
   [[nodiscard]] ArvDevice *device () const { return arv_camera_get_device (camera_); }
@@ -33,21 +32,19 @@ public:
   [[nodiscard]] bool has (const char *feature) const;
   /** The entries that an enumeration accepts now; empty if the feature is no enumeration. */
   [[nodiscard]] std::vector<std::string> entries (const char *feature) const;
-  [[nodiscard]] bool has_entry (const char *feature, const std::string &entry) const;
 
   /** @param value  text as in a features string, whatever the feature's type */
   CameraStatus assign (const std::string &feature, const std::string &value);
   /** One after the other, until one fails. */
   CameraStatus assign_all (
       std::initializer_list<std::pair<const char *, std::string>> features_and_values);
+  /** Does nothing if the camera does not have the feature. */
+  CameraStatus assign_if_there (const char *feature, const std::string &value);
   CameraStatus execute (const std::string &feature);
-  /** Sets the first of these features that the camera has; ok if it has none. */
-  CameraStatus assign_if_there (
-      std::initializer_list<const char *> features, const std::string &value);
+  /** @param features  "Name=Value Command ...", quoted as in a shell */
+  CameraStatus assign_features (const std::string &features);
 
   [[nodiscard]] bool read (const char *feature, double &value) const;
-  [[nodiscard]] bool read (const char *feature, std::int64_t &value) const;
-  [[nodiscard]] bool read (const char *feature, std::string &value) const;
 
   /** A status of this camera.
    *  @param what       what was tried, as "exposure of 300 us"
@@ -61,12 +58,6 @@ public:
   }
 
 private:
-  CameraStatus assign_enumeration (const std::string &feature, const std::string &value);
-  CameraStatus assign_integer (const std::string &feature, const std::string &value);
-  CameraStatus assign_float (const std::string &feature, const std::string &value);
-  CameraStatus assign_boolean (const std::string &feature, const std::string &value);
-  CameraStatus writable (const std::string &feature, ArvGcNode *&node) const;
-
   ArvCamera *camera_;
   std::string label_;
   mutable std::recursive_mutex lock_;

@@ -9,7 +9,6 @@
 #include <fstream>
 #include <mutex>
 #include <unistd.h>
-#include <utility>
 
 #include "control.hpp"
 #include "user_name.hpp"
@@ -22,16 +21,11 @@ std::mutex list_lock;
 constexpr std::int64_t kListLifetime_us = 3'000'000;
 constexpr guint64 kControlRegister = 0x0a00; /* GigE Vision: control channel privilege */
 
-struct ListedCamera {
-  CameraInfo info;
-  bool was_asked = false; /* for its user-defined name */
-};
-
 /* With list_lock, also while the list is used. */
-std::vector<ListedCamera> &
+const std::vector<CameraInfo> &
 discover (bool afresh)
 {
-  static auto &list = *new std::vector<ListedCamera>; /* threads may outlive main() */
+  static auto &list = *new std::vector<CameraInfo>; /* threads may outlive main() */
   static std::int64_t listed_at = G_MININT64 / 2;
   if (!afresh && g_get_monotonic_time () - listed_at < kListLifetime_us)
     return list;
@@ -46,8 +40,10 @@ discover (bool afresh)
     info.address = valid_utf8 (arv_get_device_address (i));
     info.physical_id = valid_utf8 (arv_get_device_physical_id (i));
     info.protocol = valid_utf8 (arv_get_device_protocol (i));
+    if (info.is_gige ())
+      info.user_name = valid_utf8 (read_user_name (info.address));
     if (info.protocol != "Fake") /* Aravis' own, which only sends test patterns */
-      list.push_back ({std::move (info)});
+      list.push_back (std::move (info));
   }
   listed_at = g_get_monotonic_time ();
   return list;
@@ -59,9 +55,8 @@ std::vector<CameraInfo>
 list_cameras ()
 {
   std::lock_guard guard (list_lock);
-  std::vector<CameraInfo> cameras;
-  for (const ListedCamera &camera : discover (true))
-    cameras.push_back (camera.info);
+  std::vector<CameraInfo> cameras = discover (true);
+  std::ranges::move (forbidden_usb_cameras (), std::back_inserter (cameras));
   return cameras;
 }
 
@@ -112,8 +107,10 @@ forbidden_usb_cameras (const std::string &devices, const std::string &nodes)
       camera.serial = first_line (device / "serial");
       camera.address = node;
       camera.protocol = "USB3Vision";
-      camera.problem =
-          permission_problem (camera.address + " (" + camera.model + " " + camera.serial + ")");
+      camera.problem = "no permission to open " + camera.address + " (" + camera.model + " " +
+                       camera.serial +
+                       "): copy docs/70-usb3vision.rules to /etc/udev/rules.d, then plug the "
+                       "camera in again";
       found.push_back (std::move (camera));
     }
     g_free (node);
@@ -126,23 +123,21 @@ forbidden_usb_cameras (const std::string &devices, const std::string &nodes)
 namespace {
 
 std::string
-describe (const std::vector<ListedCamera> &list)
+describe (const std::vector<CameraInfo> &list)
 {
   std::vector<std::string> words;
-  for (const auto &[info, asked] : list)
+  for (const CameraInfo &info : list)
     words.push_back (info.id + " (" + info.address + ", serial " + info.serial + ")");
   return words.empty () ? "no camera answers" : "these answer: " + joined (words);
 }
 
 CameraStatus
-not_found (const std::string &name, const std::vector<ListedCamera> &list)
+not_found (const std::string &name, const std::vector<CameraInfo> &list)
 {
-  std::string text = name.empty () ? "no camera found: " : "no camera '" + name + "' found: ";
-  text += describe (list);
+  std::string text = "no camera '" + name + "' found: " + describe (list);
   for (const CameraInfo &camera : forbidden_usb_cameras ()) {
     if (list.empty () || name == camera.serial)
-      return {CameraFault::kNoPermission,
-          (name.empty () ? "" : "camera '" + name + "': ") + camera.problem};
+      return {CameraFault::kNoPermission, "camera '" + name + "': " + camera.problem};
     text += "; besides, " + camera.problem;
   }
   return {CameraFault::kNotFound, text};
@@ -202,51 +197,25 @@ open_by_id (const std::string &name, const std::string &id, ArvDevice *&device)
   return status;
 }
 
-/* Opens the camera of that name in the list, as it is or afresh.
+/* Opens the camera of that name in the list.
  * @return kNotFound: nothing in the list is called so */
 CameraStatus
-open_listed (const std::string &name, bool afresh, ArvDevice *&device, CameraInfo &info)
+open_listed (const std::string &name, const std::vector<CameraInfo> &list, ArvDevice *&device,
+    CameraInfo &info)
 {
-  const std::vector<ListedCamera> &list = discover (afresh);
   const CameraInfo *chosen = nullptr;
-  for (const ListedCamera &camera : list) {
-    if (!name.empty () && !camera.info.is_listed_as (name))
+  for (const CameraInfo &camera : list) {
+    if (!camera.is_called (name))
       continue;
     if (chosen)
       return {CameraFault::kBadSetting,
-          (name.empty () ? "several cameras answer; name one of them"
-                         : "several cameras are called '" + name + "'; use their ids") +
-              std::string (": ") + describe (list)};
-    chosen = &camera.info;
+          "several cameras are called '" + name + "'; use their ids: " + describe (list)};
+    chosen = &camera;
   }
   if (!chosen)
-    return {CameraFault::kNotFound, ""};
-  info = *chosen;
-  return open_by_id (name.empty () ? info.id : name, info.id, device);
-}
-
-/* By its user-defined name, for which each GigE camera of the list is asked once, or by a host
- * name. Host names have a dot: others would cost a DNS query for each camera that is not there. */
-CameraStatus
-open_by_other_name (
-    const std::string &name, std::vector<ListedCamera> &list, ArvDevice *&device, CameraInfo &info)
-{
-  for (ListedCamera &camera : list) {
-    if (!std::exchange (camera.was_asked, true) && camera.info.is_gige ())
-      camera.info.user_name = read_user_name (camera.info.address);
-    if (camera.info.user_name == name) {
-      info = camera.info;
-      return open_by_id (name, info.id, device);
-    }
-  }
-  info = {};
-  if (name.find ('.') == std::string::npos || name.find (' ') != std::string::npos)
     return not_found (name, list);
-  const CameraStatus status = open_by_id (name, name, device);
-  if (g_hostname_is_ip_address (name.c_str ()))
-    info.address = name;
-  info.protocol = !device || ARV_IS_GV_DEVICE (device) ? "GigEVision" : "USB3Vision";
-  return status.fault () == CameraFault::kNotFound ? not_found (name, list) : status;
+  info = *chosen;
+  return open_by_id (name, info.id, device);
 }
 
 } // namespace
@@ -258,17 +227,20 @@ open_camera_device (const std::string &name, ArvDevice *&device, CameraInfo &inf
   device = nullptr;
   info = {};
   /* A recent list need not be made again, but its cameras may be gone. */
-  CameraStatus status (CameraFault::kNotFound, "");
-  if (!name.empty ())
-    status = open_listed (name, false, device, info);
+  CameraStatus status = open_listed (name, discover (false), device, info);
   if (status.ok () || status.fault () == CameraFault::kBusy)
     return status;
-  if (!g_hostname_is_ip_address (name.c_str ())) { /* an address may lie behind a router */
-    status = open_listed (name, true, device, info);
-    if (status.fault () != CameraFault::kNotFound)
-      return status;
-    if (name.empty ())
-      return not_found (name, discover (false));
-  }
-  return open_by_other_name (name, discover (false), device, info);
+  const bool is_address = g_hostname_is_ip_address (name.c_str ()); /* perhaps behind a router */
+  if (!is_address)
+    status = open_listed (name, discover (true), device, info);
+  /* Host names have a dot: others would cost a DNS query for each camera that is not there. */
+  if (status.fault () != CameraFault::kNotFound || name.find ('.') == std::string::npos ||
+      name.find (' ') != std::string::npos)
+    return status;
+  info = {};
+  status = open_by_id (name, name, device);
+  if (is_address)
+    info.address = name;
+  info.protocol = !device || ARV_IS_GV_DEVICE (device) ? "GigEVision" : "USB3Vision";
+  return status.fault () == CameraFault::kNotFound ? not_found (name, discover (false)) : status;
 }

@@ -10,6 +10,11 @@
  *  @param[out] info    all that discovery and the device tell, also if it is busy */
 CameraStatus open_camera_device (const std::string &name, ArvDevice *&device, CameraInfo &info);
 
+/** All cameras that answer now, and those on USB that may not be opened, with their problem. Takes
+ *  about a second, searches every network interface and USB. Any thread; calls wait for each other
+ *  and for Camera::open(). */
+std::vector<CameraInfo> list_cameras ();
+
 /** The USB3 Vision cameras on this host that this process may not open, with their problem.
  *  @param devices  where sysfs lists USB devices
  *  @param nodes    folder of their device nodes */

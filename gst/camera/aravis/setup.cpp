@@ -6,9 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "features.hpp"
-#include "format.hpp"
-
 namespace {
 
 /* Cameras decide how much memory is allocated, within this. */
@@ -16,6 +13,43 @@ constexpr std::uint64_t kMaxImageBytes = 512 << 20;
 constexpr int kMaxSide = 65535;     /* pixels */
 constexpr int kMinGigEPacket = 576; /* bytes; GigE Vision */
 constexpr int kMaxGigEPacket = 16384;
+
+/* A supported pixel format. */
+struct PixelFormat {
+  ArvPixelFormat code;         ///< GenICam's number
+  const char *name;            ///< GenICam's name
+  GstVideoFormat video_format; ///< UNKNOWN: Bayer
+  const char *bayer;           ///< format of video/x-bayer
+  int bytes;                   ///< per pixel
+};
+const PixelFormat kFormats[] = {
+    {ARV_PIXEL_FORMAT_MONO_8, "Mono8", GST_VIDEO_FORMAT_GRAY8, "", 1},
+    {ARV_PIXEL_FORMAT_RGB_8_PACKED, "RGB8", GST_VIDEO_FORMAT_RGB, "", 3},
+    {ARV_PIXEL_FORMAT_BGR_8_PACKED, "BGR8", GST_VIDEO_FORMAT_BGR, "", 3},
+    {ARV_PIXEL_FORMAT_BAYER_RG_8, "BayerRG8", GST_VIDEO_FORMAT_UNKNOWN, "rggb", 1},
+    {ARV_PIXEL_FORMAT_BAYER_BG_8, "BayerBG8", GST_VIDEO_FORMAT_UNKNOWN, "bggr", 1},
+    {ARV_PIXEL_FORMAT_BAYER_GB_8, "BayerGB8", GST_VIDEO_FORMAT_UNKNOWN, "gbrg", 1},
+    {ARV_PIXEL_FORMAT_BAYER_GR_8, "BayerGR8", GST_VIDEO_FORMAT_UNKNOWN, "grbg", 1},
+};
+
+/* By GenICam's name ("RGB8Packed", as older cameras say, is "RGB8"); null: not supported. */
+const PixelFormat *
+find_pixel_format (const std::string &name)
+{
+  const std::string plain = name.ends_with ("8Packed") ? name.substr (0, name.size () - 6) : name;
+  const auto *found = std::ranges::find (kFormats, plain, &PixelFormat::name);
+  return found == std::end (kFormats) ? nullptr : found;
+}
+
+GstCaps *
+caps_of (const PixelFormat &format)
+{
+  const bool bayer = format.video_format == GST_VIDEO_FORMAT_UNKNOWN;
+  return gst_caps_new_simple (bayer ? "video/x-bayer" : "video/x-raw", "format", G_TYPE_STRING,
+      bayer ? format.bayer : gst_video_format_to_string (format.video_format), "width",
+      GST_TYPE_INT_RANGE, 1, G_MAXINT, "height", GST_TYPE_INT_RANGE, 1, G_MAXINT, "framerate",
+      GST_TYPE_FRACTION_RANGE, 0, 1, G_MAXINT, 1, nullptr);
+}
 
 void
 read_sizes (CameraControl &control, CameraAbilities &abilities)
@@ -30,7 +64,7 @@ read_sizes (CameraControl &control, CameraAbilities &abilities)
   arv_camera_get_height_bounds (camera, &low, &high, nullptr);
   abilities.min_height = low;
   abilities.max_height = std::max (abilities.max_height, high);
-  std::int64_t whole = 0; /* with binning, less than the sensor has */
+  double whole = 0; /* with binning, less than the sensor has */
   if (control.read ("WidthMax", whole) && whole > 0 && whole <= G_MAXINT)
     abilities.max_width = int (whole);
   if (control.read ("HeightMax", whole) && whole > 0 && whole <= G_MAXINT)
@@ -46,6 +80,34 @@ read_sizes (CameraControl &control, CameraAbilities &abilities)
 }
 
 } // namespace
+
+GstCaps *
+camera_caps (const std::string &name)
+{
+  GstCaps *caps = gst_caps_new_empty ();
+  for (const PixelFormat &format : kFormats)
+    if (name.empty () || &format == find_pixel_format (name))
+      gst_caps_append (caps, caps_of (format));
+  return caps;
+}
+
+std::string
+pixel_format_for_caps (const GstCaps *caps, const std::vector<std::string> &has)
+{
+  for (const std::string &name : has) {
+    const PixelFormat *format = find_pixel_format (name);
+    if (!format)
+      continue;
+    GstCaps *mine = caps_of (*format);
+    const bool fits = gst_caps_can_intersect (mine, caps);
+    gst_caps_unref (mine);
+    if (fits)
+      return name;
+  }
+  return "";
+}
+
+/* ---- abilities ---- */
 
 CameraStatus
 read_abilities (CameraControl &control, CameraAbilities &abilities)
@@ -74,61 +136,7 @@ read_abilities (CameraControl &control, CameraAbilities &abilities)
 
 namespace {
 
-CameraStatus
-choose_pixel_format (CameraControl &control, const std::string &wanted, std::string &name)
-{
-  CameraAbilities abilities;
-  CameraStatus status = read_abilities (control, abilities);
-  if (!status.ok ())
-    return status;
-  const std::vector<std::string> &fit = abilities.pixel_formats;
-  std::vector<std::string> all = fit;
-  all.insert (all.end (), abilities.other_formats.begin (), abilities.other_formats.end ());
-  if (fit.empty ())
-    return control.refuse (CameraFault::kUnsupported,
-        "none of the camera's pixel formats is supported: it has " + joined (all) +
-            "; expected Mono8, RGB8, BGR8 or an 8-bit Bayer format");
-  name = wanted;
-  if (wanted.empty () && (!control.read ("PixelFormat", name) || !find_pixel_format (name)))
-    name = fit.front ();
-  const auto same = [&] (const std::string &other) {
-    return find_pixel_format (other) == find_pixel_format (name);
-  };
-  const auto found = std::find_if (fit.begin (), fit.end (), same);
-  if (!find_pixel_format (name))
-    return control.refuse (CameraFault::kUnsupported,
-        "pixel format " + name +
-            " is not supported; supported formats of this camera: " + joined (fit));
-  if (found == fit.end ())
-    return control.refuse (CameraFault::kBadSetting,
-        "the camera has no pixel format " + name + "; it has " + joined (all));
-  name = *found; /* as this camera writes it */
-  return {};
-}
-
-/* One side of the region. Steps and limits are checked here because cameras round silently. */
-CameraStatus
-check_side (CameraControl &control, const char *what, int sensor, int smallest, int step, int begin,
-    int &size, int &offset)
-{
-  const std::string side = what;
-  if (size <= 0) {
-    size = sensor - std::max (begin, 0);
-    size -= size % step;
-  }
-  if (size < smallest || size > sensor || size % step != 0)
-    return control.refuse (CameraFault::kBadSetting,
-        side + " of " + std::to_string (size) + " pixels: the camera accepts " +
-            std::to_string (smallest) + " to " + std::to_string (sensor) +
-            (step > 1 ? " in steps of " + std::to_string (step) : ""));
-  offset = begin >= 0 ? begin : (sensor - size) / 2;
-  if (offset + size > sensor)
-    return control.refuse (CameraFault::kBadSetting,
-        side + " of " + std::to_string (size) + " pixels from " + std::to_string (offset) +
-            ": the sensor ends at " + std::to_string (sensor));
-  return {};
-}
-
+/* Cameras round silently, so the region is read again. */
 CameraStatus
 set_region (CameraControl &control, const CameraSettings &settings)
 {
@@ -136,77 +144,56 @@ set_region (CameraControl &control, const CameraSettings &settings)
   const auto guard = control.lock ();
   ArvCamera *camera = control.camera ();
   read_sizes (control, a);
-  int x = 0, y = 0, width = settings.width, height = settings.height;
-  CameraStatus status =
-      check_side (control, "width", a.max_width, a.min_width, a.width_step, settings.x, width, x);
-  if (status.ok ())
-    status = check_side (
-        control, "height", a.max_height, a.min_height, a.height_step, settings.y, height, y);
-  if (!status.ok ())
-    return status;
+  int x = settings.x, y = settings.y;
+  if (x < 0) /* near the middle, in the steps of the camera */
+    x = std::max (a.max_width - settings.width, 0) / 2;
+  if (y < 0)
+    y = std::max (a.max_height - settings.height, 0) / 2;
+  x -= x % std::max (1, arv_camera_get_x_offset_increment (camera, nullptr));
+  y -= y % std::max (1, arv_camera_get_y_offset_increment (camera, nullptr));
+  const auto text = [] (int left, int top, int width, int height) {
+    return std::to_string (width) + "x" + std::to_string (height) + " at " + std::to_string (left) +
+           "," + std::to_string (top);
+  };
+  const std::string what = "region of " + text (x, y, settings.width, settings.height),
+                    sensor = std::to_string (a.max_width) + "x" + std::to_string (a.max_height);
+  if (x + settings.width > a.max_width || y + settings.height > a.max_height)
+    return control.refuse (CameraFault::kBadSetting, what + ": the sensor has " + sensor);
   GError *error = nullptr;
-  if (settings.x < 0) /* near the middle, in the steps of the camera */
-    x -= x % std::max (1, arv_camera_get_x_offset_increment (camera, nullptr));
-  if (settings.y < 0)
-    y -= y % std::max (1, arv_camera_get_y_offset_increment (camera, nullptr));
-  arv_camera_set_region (camera, x, y, width, height, &error);
-  const std::string what = "region of " + std::to_string (width) + "x" + std::to_string (height) +
-                           " at " + std::to_string (x) + "," + std::to_string (y);
-  status = control.status (what, error);
-  if (!status.ok ())
-    return status;
-  gint got_x = 0, got_y = 0, got_width = 0, got_height = 0;
-  error = nullptr;
-  arv_camera_get_region (camera, &got_x, &got_y, &got_width, &got_height, &error);
-  status = control.status ("region", error, CameraFault::kFailed);
-  if (status.ok () && (got_width != width || got_height != height))
-    return control.refuse (CameraFault::kBadSetting, what + ": the camera made it " +
-                                                         std::to_string (got_width) + "x" +
-                                                         std::to_string (got_height));
+  gint got_x = 0, got_y = 0, width = 0, height = 0;
+  arv_camera_set_region (camera, x, y, settings.width, settings.height, &error);
+  if (!error)
+    arv_camera_get_region (camera, &got_x, &got_y, &width, &height, &error);
+  CameraStatus status = control.status (what, error);
+  const std::string got = text (got_x, got_y, width, height);
+  if (status.ok () && what != "region of " + got)
+    return control.refuse (
+        CameraFault::kBadSetting, what + ": the camera made it " + got + " of " + sensor);
   return status;
 }
 
 } // namespace
 
 CameraStatus
-set_image (CameraControl &control, const CameraSettings &settings)
+set_image (CameraControl &control, const CameraSettings &settings, CameraFormat &format)
 {
-  std::string name;
-  CameraStatus status = choose_pixel_format (control, settings.pixel_format, name);
-  if (status.ok ())
-    status = control.assign ("PixelFormat", name);
-  if (status.ok ())
-    status = set_region (control, settings);
-  return status;
-}
-
-CameraStatus
-read_format (CameraControl &control, CameraFormat &format)
-{
-  const auto guard = control.lock ();
-  format = {};
-  GError *error = nullptr;
-  gint x = 0, y = 0;
-  arv_camera_get_region (control.camera (), &x, &y, &format.width, &format.height, &error);
-  CameraStatus status = control.status ("region", error, CameraFault::kFailed);
-  if (!status.ok ())
-    return status;
-  if (!control.read ("PixelFormat", format.pixel_format))
-    return control.refuse (CameraFault::kFailed, "the camera does not report its pixel format");
-  const PixelFormat *pixel = find_pixel_format (format.pixel_format);
-  if (!pixel || format.width < 1 || format.height < 1 || format.width > kMaxSide ||
-      format.height > kMaxSide)
-    return control.refuse (CameraFault::kUnsupported,
-        "images of " + std::to_string (format.width) + "x" + std::to_string (format.height) + " " +
-            format.pixel_format + " are not supported");
-  format.video_format = pixel->video_format;
-  format.bayer = pixel->bayer;
-  if (std::uint64_t (format.width) * format.height * pixel->bytes > kMaxImageBytes)
-    return control.refuse (CameraFault::kUnsupported,
-        "images of " + std::to_string (format.width) + "x" + std::to_string (format.height) +
-            " are too large: expected at most " + std::to_string (kMaxImageBytes) + " bytes");
-  format.stride = format.width * pixel->bytes;
-  return {};
+  const PixelFormat *pixel = find_pixel_format (settings.pixel_format);
+  const std::string size = std::to_string (settings.width) + "x" + std::to_string (settings.height);
+  if (!pixel)
+    return control.refuse (
+        CameraFault::kUnsupported, "pixel format " + settings.pixel_format + " is not supported");
+  if (settings.width < 1 || settings.height < 1 ||
+      std::uint64_t (settings.width) * settings.height > kMaxImageBytes / pixel->bytes)
+    return control.refuse (CameraFault::kUnsupported, "images of " + size + " have more than " +
+                                                          std::to_string (kMaxImageBytes) +
+                                                          " bytes, or none");
+  format = {.code = pixel->code,
+      .video_format = pixel->video_format,
+      .width = settings.width,
+      .height = settings.height,
+      .stride = settings.width * pixel->bytes};
+  CameraStatus status = control.assign ("PixelFormat", settings.pixel_format);
+  return status.ok () ? set_region (control, settings) : status;
 }
 
 /* ---- trigger ---- */
@@ -216,37 +203,30 @@ namespace {
 CameraStatus
 enable_trigger (CameraControl &control, const std::string &source)
 {
-  const std::vector<std::string> sources = control.entries ("TriggerSource");
-  if (std::find (sources.begin (), sources.end (), source) == sources.end ())
-    return control.refuse (
-        CameraFault::kBadSetting, "the camera has no trigger source " + source + "; it has " +
-                                      (sources.empty () ? "none at all" : joined (sources)));
-  CameraStatus status = control.assign_if_there ({"AcquisitionFrameRateEnable"}, "false");
+  const std::vector<std::string> selectors = control.entries ("TriggerSelector");
+  const bool frame_start = std::ranges::find (selectors, "FrameStart") != selectors.end ();
+  CameraStatus status = control.assign_if_there ("AcquisitionFrameRateEnable", "false");
   if (status.ok ())
-    status = control.assign_if_there ({"TriggerSelector"},
-        control.has_entry ("TriggerSelector", "FrameStart") ? "FrameStart" : "AcquisitionStart");
+    status = control.assign_if_there (
+        "TriggerSelector", frame_start ? "FrameStart" : "AcquisitionStart");
   if (status.ok ())
     status = control.assign_all ({{"TriggerSource", source}, {"TriggerMode", "On"}});
   return status;
 }
 
 CameraStatus
-output_exposure (CameraControl &control, const LineTrigger &line)
+output_exposure (CameraControl &control, const std::string &line)
 {
-  if (!control.has ("LineSelector") || !control.has ("LineSource"))
-    return control.refuse (CameraFault::kBadSetting,
-        "the camera cannot be the master of a line trigger: it has no "
-        "feature LineSelector or LineSource");
-  CameraStatus status = control.assign ("LineSelector", line.output_line);
+  CameraStatus status = control.assign ("LineSelector", line);
   if (status.ok ())
-    status = control.assign_if_there ({"LineMode"}, "Output");
+    status = control.assign_if_there ("LineMode", "Output");
   if (status.ok ())
     status = control.assign ("LineSource", "ExposureActive");
   return status;
 }
 
 CameraStatus
-enable_actions (CameraControl &control, const ActionTrigger &action)
+enable_actions (CameraControl &control, std::uint32_t key)
 {
   const std::vector<std::string> sources = control.entries ("TriggerSource");
   const auto source = std::ranges::find_if (
@@ -258,16 +238,10 @@ enable_actions (CameraControl &control, const ActionTrigger &action)
                                       joined (sources));
   /* "Action1" is selected by its number, 0 or 1 for the first */
   const std::string number = source->substr (std::string_view ("Action").size ());
-  CameraStatus status = control.assign_if_there ({"ActionSelector"}, number);
+  CameraStatus status = control.assign_if_there ("ActionSelector", number);
   if (status.ok ())
-    status = control.assign_all ({{"ActionDeviceKey", std::to_string (action.device_key)},
-        {"ActionGroupKey", std::to_string (action.group_key)},
-        {"ActionGroupMask", std::to_string (action.group_mask)}});
-  if (status.ok () && action.ptp && !control.has ("PtpEnable") && !control.has ("GevIEEE1588"))
-    return control.refuse (CameraFault::kBadSetting,
-        "the camera does not support IEEE 1588, which scheduled action commands require");
-  if (status.ok () && action.ptp)
-    status = control.assign_if_there ({"PtpEnable", "GevIEEE1588"}, "true");
+    status = control.assign_all ({{"ActionDeviceKey", std::to_string (key)},
+        {"ActionGroupKey", "1"}, {"ActionGroupMask", "1"}});
   return status.ok () ? enable_trigger (control, *source) : status;
 }
 
@@ -292,15 +266,15 @@ set_trigger (CameraControl &control, const CameraSettings &settings)
     case TriggerMode::kSoftware:
       return enable_trigger (control, "Software");
     case TriggerMode::kAction:
-      return enable_actions (control, settings.action);
+      return enable_actions (control, settings.action_key);
     case TriggerMode::kHardware:
       break;
   }
-  if (settings.line.master)
-    return output_exposure (control, settings.line);
-  status = enable_trigger (control, settings.line.source);
+  if (!settings.output_line.empty ())
+    return output_exposure (control, settings.output_line);
+  status = enable_trigger (control, settings.trigger_line);
   if (status.ok ())
-    status = control.assign_if_there ({"TriggerActivation"}, "RisingEdge");
+    status = control.assign_if_there ("TriggerActivation", "RisingEdge");
   return status;
 }
 
@@ -344,17 +318,9 @@ set_value (CameraControl &control, const AdjustableValue &value, AutoMode mode,
   CameraStatus status = control.status ("automatic " + name, error);
   if (!status.ok () || automatic || !wanted)
     return status;
-  double low = 0, high = 0;
-  const std::string what = name + " of " + number_text (*wanted) + value.unit;
   error = nullptr;
-  value.get_bounds (camera, &low, &high, &error);
-  if (!error && low < high && (*wanted < low || *wanted > high))
-    return control.refuse (CameraFault::kBadSetting, what + ": the camera accepts " +
-                                                         number_text (low) + " to " +
-                                                         number_text (high) + value.unit);
-  g_clear_error (&error); /* a camera without bounds */
   value.set (camera, *wanted, &error);
-  return control.status (what, error);
+  return control.status (name + " of " + number_text (*wanted) + value.unit, error);
 }
 
 CameraStatus
@@ -374,7 +340,7 @@ bool
 runs_freely (const CameraSettings &settings)
 {
   return settings.trigger == TriggerMode::kFreeRun ||
-         (settings.trigger == TriggerMode::kHardware && settings.line.master);
+         (settings.trigger == TriggerMode::kHardware && !settings.output_line.empty ());
 }
 
 CameraStatus
@@ -387,17 +353,14 @@ set_frame_rate (CameraControl &control, const CameraSettings &settings)
   if (!arv_camera_is_frame_rate_available (camera, nullptr))
     return control.refuse (
         CameraFault::kBadSetting, what + ": the camera's frame rate cannot be set");
-  GError *error = nullptr;
-  arv_camera_set_frame_rate (camera, settings.frame_rate, &error);
-  CameraStatus status = control.status (what, error);
-  if (!status.ok () && status.fault () != CameraFault::kBadSetting)
-    return status;
   double low = 0, high = 0;
-  error = nullptr;
-  arv_camera_get_frame_rate_bounds (camera, &low, &high, &error);
-  const bool known = !error && low < high;
-  g_clear_error (&error);
-  if (known && (settings.frame_rate < low * 0.999 || settings.frame_rate > high * 1.001))
+  GError *error = nullptr;
+  arv_camera_set_frame_rate (camera, settings.frame_rate, &error); /* clamps */
+  if (!error)
+    arv_camera_get_frame_rate_bounds (camera, &low, &high, &error);
+  CameraStatus status = control.status (what, error);
+  if (status.ok () && low < high &&
+      (settings.frame_rate < low * 0.999 || settings.frame_rate > high * 1.001))
     return control.refuse (
         CameraFault::kBadSetting, what + ": the camera accepts " + number_text (low) + " to " +
                                       number_text (high) + " at this size and exposure");
@@ -407,7 +370,7 @@ set_frame_rate (CameraControl &control, const CameraSettings &settings)
 } // namespace
 
 CameraStatus
-set_imaging (CameraControl &control, const CameraSettings &settings, double &frame_rate)
+set_imaging (CameraControl &control, const CameraSettings &settings)
 {
   const auto guard = control.lock ();
   /* A long exposure limits the rate of some cameras, and a high rate the exposure: a rate that is
@@ -423,14 +386,10 @@ set_imaging (CameraControl &control, const CameraSettings &settings, double &fra
     status = set_value (control, kGain, settings.gain_mode, settings.gain);
   if (status.ok ())
     status = set_white_balance (control, settings.white_balance_mode);
-  frame_rate = 0;
-  if (status.ok () && runs_freely (settings) &&
-      arv_camera_is_frame_rate_available (control.camera (), nullptr))
-    frame_rate = std::max (0.0, arv_camera_get_frame_rate (control.camera (), nullptr));
   return status;
 }
 
-/* ---- transport and other features ---- */
+/* ---- transport ---- */
 
 CameraStatus
 set_transport (CameraControl &control, const CameraSettings &settings)
@@ -459,18 +418,6 @@ set_transport (CameraControl &control, const CameraSettings &settings)
     arv_camera_gv_set_packet_delay (camera, settings.packet_delay_ns, &error);
   return control.status (
       "delay of " + std::to_string (settings.packet_delay_ns) + " ns between packets", error);
-}
-
-CameraStatus
-set_features (CameraControl &control, const std::string &features)
-{
-  std::vector<CameraFeature> list;
-  CameraStatus status = parse_camera_features (features, list);
-  for (const CameraFeature &feature : list)
-    if (status.ok ())
-      status = feature.command ? control.execute (feature.name)
-                               : control.assign (feature.name, feature.value);
-  return status;
 }
 
 /* ---- imaging parameters while streaming: one feature at a time, since triggers wait for the
@@ -536,8 +483,7 @@ read_imaging (CameraControl &control, ImagingParameters &parameters)
   const char *ratio = status.ok () ? balance_feature (control) : nullptr;
   for (int colour = 0; ratio && colour < 3; colour++) {
     double value = 0;
-    if (control.has_entry ("BalanceRatioSelector", kBalanceColours[colour]) &&
-        control.assign ("BalanceRatioSelector", kBalanceColours[colour]).ok () &&
+    if (control.assign ("BalanceRatioSelector", kBalanceColours[colour]).ok () &&
         control.read (ratio, value))
       parameters.white_balance[colour] = value;
   }
@@ -562,5 +508,74 @@ write_imaging (
     if (status.ok ())
       written.white_balance[colour] = wanted;
   }
+  return status;
+}
+
+/* ---- clock ---- */
+
+namespace {
+
+/* Bootstrap registers of GigE Vision, which every camera has. The latch holds the clock for
+ * reading.
+ */
+constexpr guint64 kTimestampControl = 0x0944, kTimestampHigh = 0x0948, kTimestampLow = 0x094c;
+constexpr guint32 kTimestampLatch = 2;
+
+std::uint64_t
+ticks_to_ns (std::uint64_t ticks, std::uint64_t frequency)
+{
+  constexpr std::uint64_t kSecond = 1'000'000'000;
+  if (frequency == 0)
+    return 0;
+  return ticks / frequency * kSecond +
+         gst_util_uint64_scale (ticks % frequency, kSecond, frequency);
+}
+
+} // namespace
+
+/* Registers need no lock, unlike features. */
+static CameraStatus
+read_gige_clock (CameraControl &control, std::uint64_t &time_ns, std::int64_t &read_at_us)
+{
+  ArvDevice *device = control.device ();
+  GError *error = nullptr;
+  guint32 high = 0, low = 0;
+  const guint64 frequency =
+      arv_gv_device_get_timestamp_tick_frequency (ARV_GV_DEVICE (device), &error);
+  const std::int64_t before = g_get_monotonic_time ();
+  if (!error)
+    arv_device_write_register (device, kTimestampControl, kTimestampLatch, &error);
+  read_at_us = (before + g_get_monotonic_time ()) / 2;
+  if (!error)
+    arv_device_read_register (device, kTimestampHigh, &high, &error);
+  if (!error)
+    arv_device_read_register (device, kTimestampLow, &low, &error);
+  if (!error)
+    time_ns = ticks_to_ns (std::uint64_t (high) << 32 | low, frequency);
+  return control.status ("its clock", error, CameraFault::kFailed);
+}
+
+static CameraStatus
+read_usb_clock (CameraControl &control, std::uint64_t &time_ns, std::int64_t &read_at_us)
+{
+  double ticks = 0; /* ns in USB3 Vision: those of a clock since 1970 are rounded to 256 */
+  const std::int64_t before = g_get_monotonic_time ();
+  CameraStatus status = control.execute ("TimestampLatch");
+  read_at_us = (before + g_get_monotonic_time ()) / 2;
+  if (status.ok () && !control.read ("TimestampLatchValue", ticks))
+    return control.refuse (CameraFault::kFailed, "the camera has no feature 'TimestampLatchValue'");
+  time_ns = static_cast<std::uint64_t> (std::clamp (ticks, 0., double (kMaxCameraTime_ns)));
+  return status;
+}
+
+CameraStatus
+read_clock (CameraControl &control, std::uint64_t &time_ns, std::int64_t &read_at_us)
+{
+  time_ns = 0;
+  CameraStatus status = ARV_IS_GV_DEVICE (control.device ())
+                            ? read_gige_clock (control, time_ns, read_at_us)
+                            : read_usb_clock (control, time_ns, read_at_us);
+  if (status.ok () && (time_ns == 0 || time_ns >= kMaxCameraTime_ns))
+    return control.refuse (CameraFault::kFailed, "the camera has no readable clock");
   return status;
 }

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "user_name.hpp"
 
-#include "gvcp.hpp"
+#include <gio/gio.h>
+
+#include "action_command.hpp"
 
 namespace {
 
@@ -9,6 +11,25 @@ namespace {
 constexpr std::uint8_t kUserNameRegister = 0xe8;
 constexpr std::size_t kHeaderSize = 8, kAnswerSize = kHeaderSize + 4 + kUserNameSize;
 constexpr std::uint16_t kReadAnswer = 0x0085;
+
+/* A non-blocking socket that exchanges datagrams with the camera at that address alone. Null: no IP
+ * address, or no route to it. Transfer full. */
+GSocket *
+connect_gvcp (const std::string &address)
+{
+  GSocketAddress *camera = g_inet_socket_address_new_from_string (address.c_str (), kGvcpPort);
+  if (!camera)
+    return nullptr;
+  GSocket *socket = g_socket_new (
+      g_socket_address_get_family (camera), G_SOCKET_TYPE_DATAGRAM, G_SOCKET_PROTOCOL_UDP, nullptr);
+  if (socket) {
+    g_socket_set_blocking (socket, FALSE);
+    if (!g_socket_connect (socket, camera, nullptr, nullptr))
+      g_clear_object (&socket);
+  }
+  g_object_unref (camera);
+  return socket;
+}
 
 } // namespace
 
@@ -35,23 +56,24 @@ user_name_in (std::span<const std::uint8_t> answer, std::uint16_t request_id)
   return name;
 }
 
-std::optional<std::string>
+std::string
 read_user_name (const std::string &address)
 {
   constexpr std::uint16_t kRequest = 1;
-  const SocketPtr socket = connect_gvcp (address);
+  GSocket *socket = connect_gvcp (address);
   const auto request = user_name_request (kRequest);
-  for (int attempt = 0; socket && attempt < 3; attempt++) {
-    g_socket_send (socket.get (), reinterpret_cast<const gchar *> (request.data ()),
-        request.size (), nullptr, nullptr);
-    if (!g_socket_condition_timed_wait (socket.get (), G_IO_IN, 100'000, nullptr, nullptr))
+  std::optional<std::string> name;
+  for (int attempt = 0; socket && !name && attempt < 3; attempt++) {
+    g_socket_send (socket, reinterpret_cast<const gchar *> (request.data ()), request.size (),
+        nullptr, nullptr);
+    if (!g_socket_condition_timed_wait (socket, G_IO_IN, 100'000, nullptr, nullptr))
       continue;
     std::array<std::uint8_t, 64> answer;
-    const gssize size = g_socket_receive (socket.get (), reinterpret_cast<gchar *> (answer.data ()),
-        answer.size (), nullptr, nullptr);
+    const gssize size = g_socket_receive (
+        socket, reinterpret_cast<gchar *> (answer.data ()), answer.size (), nullptr, nullptr);
     if (size > 0)
-      if (auto name = user_name_in (std::span (answer).first (std::size_t (size)), kRequest))
-        return name;
+      name = user_name_in (std::span (answer).first (std::size_t (size)), kRequest);
   }
-  return std::nullopt;
+  g_clear_object (&socket);
+  return name.value_or ("");
 }

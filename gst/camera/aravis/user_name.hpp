@@ -18,5 +18,5 @@ std::array<std::uint8_t, 16> user_name_request (std::uint16_t request_id);
 std::optional<std::string> user_name_in (
     std::span<const std::uint8_t> answer, std::uint16_t request_id);
 
-/** Asks the camera at that address; absent if it does not answer within 0.3 s, or is no camera. */
-std::optional<std::string> read_user_name (const std::string &address);
+/** Asks the camera at that address; empty if it does not answer within 0.3 s, or is no camera. */
+std::string read_user_name (const std::string &address);

@@ -3,7 +3,7 @@
 
 #include <gst/gst.h>
 
-#include "camera/aravis/camera_info.hpp"
+#include "camera/aravis/types.hpp"
 #include "knownrigs.hpp"
 
 /** A device of class Source/Video that aravissrc opens. Its properties: device.api, device.bus,

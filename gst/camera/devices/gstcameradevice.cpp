@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "gstcameradevice.h"
+#include "cameradevices.hpp"
 
 #include "camera/aravis/camera.hpp"
-#include "cameradevices.hpp"
+
+#define GST_TYPE_CAMERA_DEVICE (gst_camera_device_get_type ())
+G_DECLARE_FINAL_TYPE (GstCameraDevice, gst_camera_device, GST, CAMERA_DEVICE, GstDevice)
 
 /* What the device monitor lists: one camera, or a stereo pair of a known rig. */
 struct _GstCameraDevice {

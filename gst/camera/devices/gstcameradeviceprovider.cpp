@@ -3,9 +3,9 @@
  * SECTION:provider-rangecastdeviceprovider
  * @title: rangecastdeviceprovider
  *
- * Lists machine-vision cameras, GigE Vision by Aravis' discovery and USB3 Vision by libusb, and the
- * stereo pairs of known rigs whose cameras are all there. While it is started, USB cameras appear
- * and disappear as they are plugged; the networks are asked again every 3 to 12 seconds.
+ * Lists the GigE Vision and USB3 Vision cameras that Aravis finds, and the stereo pairs of known
+ * rigs whose cameras are all there. While it is started, it searches every 3 to 12 seconds, and
+ * when libusb reports that a device was plugged in or unplugged.
  *
  * ## Example launch line
  * |[
@@ -14,37 +14,38 @@
  *
  * Since: 0.1
  */
-#include "gstcameradeviceprovider.h"
+#include "cameradevices.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <libusb.h>
 #include <mutex>
 #include <set>
-#include <system_error>
-#include <thread>
 #include <utility>
 
 #include "camera/aravis/camera.hpp"
-#include "camera/aravis/user_name.hpp"
-#include "cameradevices.hpp"
-#include "usbcameras.hpp"
+#include "camera/aravis/discovery.hpp"
+
+#define GST_TYPE_CAMERA_DEVICE_PROVIDER (gst_camera_device_provider_get_type ())
+G_DECLARE_FINAL_TYPE (GstCameraDeviceProvider, gst_camera_device_provider, GST,
+    CAMERA_DEVICE_PROVIDER, GstDeviceProvider)
 
 GST_DEBUG_CATEGORY_STATIC (gst_camera_device_provider_debug);
 #define GST_CAT_DEFAULT gst_camera_device_provider_debug
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 /* The networks are searched often while cameras come and go, seldom where nothing happens: each
  * search is a broadcast, and keeps this process from opening cameras for a second. */
-constexpr Clock::duration kMinPeriod = std::chrono::seconds (3);
-constexpr Clock::duration kMaxPeriod = std::chrono::seconds (12);
+constexpr std::chrono::microseconds kMinPeriod = std::chrono::seconds (3);
+constexpr std::chrono::microseconds kMaxPeriod = std::chrono::seconds (12);
 /* A search takes about a second, more on a host with many networks; an application that starts a
  * monitor gets what was found by then, and the rest as messages. */
 constexpr auto kMaxStart = std::chrono::milliseconds (1500);
-constexpr int kMaxMisses = 1; // answers to discovery are UDP and may be lost
+/* After a USB device appeared: until udev has set its permissions. */
+constexpr auto kUsbSettle = std::chrono::milliseconds (300);
 
 /** What devices are made from. */
 struct Present {
@@ -58,25 +59,69 @@ template <typename Source> struct Announced {
   GstDevice *device; // the provider's list owns it
 };
 
+/** Waits for USB devices that are plugged in or unplugged. */
+class UsbHotplug {
+public:
+  UsbHotplug (const UsbHotplug &) = delete;
+  UsbHotplug &operator= (const UsbHotplug &) = delete;
+  UsbHotplug ()
+  {
+    if (libusb_init (&context_) != LIBUSB_SUCCESS)
+      context_ = nullptr; // a host without USB
+    constexpr auto both = LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED | LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT;
+    const auto on_event = [] (libusb_context *, libusb_device *, libusb_hotplug_event, void *self) {
+      static_cast<UsbHotplug *> (self)->changed_ = 1;
+      return 0;
+    };
+    if (context_)
+      libusb_hotplug_register_callback (context_, both, LIBUSB_HOTPLUG_NO_FLAGS,
+          LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY, on_event,
+          this, nullptr);
+  }
+  ~UsbHotplug ()
+  {
+    if (context_)
+      libusb_exit (context_);
+  }
+
+  [[nodiscard]] bool works () const { return context_ && !failed_; }
+  /** @return whether a device came or went; false after `time` or wake(), which may come first, or
+   *  when it no longer works */
+  bool wait (std::chrono::microseconds time)
+  {
+    timeval tv{time.count () / 1'000'000, time.count () % 1'000'000};
+    changed_ = 0;
+    const int result = libusb_handle_events_timeout_completed (context_, &tv, &changed_);
+    failed_ = result != LIBUSB_SUCCESS && result != LIBUSB_ERROR_INTERRUPTED;
+    return changed_ != 0;
+  }
+  void wake ()
+  {
+    if (context_)
+      libusb_interrupt_event_handler (context_);
+  }
+
+private:
+  libusb_context *context_ = nullptr;
+  int changed_ = 0; // this and the next: thread that waits only
+  bool failed_ = false;
+};
+
 /** The search from start to stop, in a thread of its own because each one blocks for a second.
  *  Everything except what `lock` guards belongs to that thread. */
 struct Watch {
   GstDeviceProvider *provider = nullptr;
-  std::thread thread;
-  std::vector<CameraInfo> gige, usb_cameras;
-  std::vector<int> gige_misses; // in a row, per camera of `gige`
+  GThread *thread = nullptr;
+  std::vector<CameraInfo> last_found; // by the last search
   std::vector<Announced<CameraInfo>> cameras;
   std::vector<Announced<KnownPair>> pairs;
   std::set<std::string> reported; // problems, each once
-  KnownRigs rigs;
+  UsbHotplug usb;
 
   std::mutex lock; // guards what follows; never held while searching or announcing
   std::condition_variable changed;
-  bool is_over = false;
-  bool has_usb_changed = false;
-  bool is_listed = false; // the first search has ended
-
-  std::unique_ptr<UsbCameras> usb; // destroyed first: its thread uses the above
+  std::atomic<bool> is_over = false; // read without lock while libusb waits
+  bool is_listed = false;            // the first search has ended
 };
 
 } // namespace
@@ -92,49 +137,13 @@ GST_DEVICE_PROVIDER_REGISTER_DEFINE (rangecastdeviceprovider, "rangecastdevicepr
 
 namespace {
 
-/** A camera's user-defined name, which is not part of discovery. A camera is asked until it
- *  answers, and then no more while it stays. */
-std::optional<std::string>
-user_name_of (const CameraInfo &info, const std::vector<CameraInfo> &known)
-{
-  const auto is_same = [&] (const CameraInfo &camera) {
-    return camera.id == info.id && camera.address == info.address;
-  };
-  const auto at = std::ranges::find_if (known, is_same);
-  return at != known.end () && at->user_name ? at->user_name : read_user_name (info.address);
-}
-
-/** The GigE Vision cameras that answer, in about a second. USB cameras come from libusb, which has
- *  hotplug and permissions. @param known  those that answered before */
-std::vector<CameraInfo>
-find_gige_cameras (const std::vector<CameraInfo> &known)
-{
-  std::vector<CameraInfo> found;
-  for (auto &info : list_cameras ())
-    if (info.is_gige ()) {
-      info.user_name = user_name_of (info, known);
-      found.push_back (std::move (info));
-    }
-  return found;
-}
-
-std::unique_ptr<UsbCameras>
-open_usb (GstDeviceProvider *provider)
-{
-  std::string why;
-  auto usb = UsbCameras::open (why);
-  if (!usb)
-    GST_WARNING_OBJECT (provider, "no USB cameras: %s", why.c_str ());
-  return usb;
-}
-
 /** Adds the pairs of known rigs, and logs problems, which users have to solve, once each. */
 Present
-find_pairs (GstDeviceProvider *provider, KnownRigs &rigs, std::vector<CameraInfo> cameras,
-    std::set<std::string> &reported)
+find_pairs (
+    GstDeviceProvider *provider, std::vector<CameraInfo> cameras, std::set<std::string> &reported)
 {
   std::vector<std::string> problems;
-  auto pairs = rigs.pairs (known_rig_files (), cameras, problems);
+  auto pairs = find_known_pairs (known_rig_files (), cameras, problems);
   for (const auto &camera : cameras)
     problems.push_back (camera.problem);
   for (const auto &problem : problems)
@@ -148,12 +157,8 @@ find_pairs (GstDeviceProvider *provider, KnownRigs &rigs, std::vector<CameraInfo
 static GList *
 gst_camera_device_provider_probe (GstDeviceProvider *provider)
 {
-  auto cameras = find_gige_cameras ({});
-  if (auto usb = open_usb (provider))
-    std::ranges::copy (usb->list (), std::back_inserter (cameras));
   std::set<std::string> reported;
-  KnownRigs rigs;
-  const auto now = find_pairs (provider, rigs, std::move (cameras), reported);
+  const auto now = find_pairs (provider, list_cameras (), reported);
 
   GList *devices = nullptr;
   for (const auto &camera : now.cameras)
@@ -188,69 +193,53 @@ announce (GstDeviceProvider *provider, std::vector<Announced<Source>> &announced
     }
 }
 
-/** Lists the cameras that answered, and those that missed no more than kMaxMisses searches.
- *  @return whether nothing has changed */
+/** Announces the cameras that answered this search or the last one, since answers are UDP and may
+ *  be lost. @return whether nothing has changed */
 bool
-discover_gige (Watch &watch)
+search (Watch &watch)
 {
-  auto answered = find_gige_cameras (watch.gige);
-  std::vector<int> misses (answered.size (), 0);
-  for (std::size_t i = 0; i < watch.gige.size (); ++i) {
-    const auto is_same = [&] (const CameraInfo &camera) { return camera.id == watch.gige[i].id; };
-    if (std::ranges::none_of (answered, is_same) && watch.gige_misses[i] < kMaxMisses) {
-      answered.push_back (watch.gige[i]);
-      misses.push_back (watch.gige_misses[i] + 1);
-    }
-  }
-  const bool is_same =
-      answered == watch.gige && std::ranges::count (misses, 0) == std::ssize (misses);
-  watch.gige = std::move (answered);
-  watch.gige_misses = std::move (misses);
+  auto found = list_cameras ();
+  auto present = found;
+  for (const auto &last : watch.last_found)
+    if (std::ranges::none_of (found, [&] (const auto &camera) { return camera.id == last.id; }))
+      present.push_back (last);
+  const bool is_same = found == watch.last_found && present.size () == found.size ();
+  watch.last_found = std::move (found);
+  const auto now = find_pairs (watch.provider, std::move (present), watch.reported);
+  announce (watch.provider, watch.cameras, now.cameras, new_camera_device);
+  announce (watch.provider, watch.pairs, now.pairs, new_pair_device);
   return is_same;
 }
 
 void
-update (Watch &watch)
+wait_for_next_search (Watch &watch, std::chrono::microseconds period)
 {
-  auto cameras = watch.gige;
-  std::ranges::copy (watch.usb_cameras, std::back_inserter (cameras));
-  const auto now = find_pairs (watch.provider, watch.rigs, std::move (cameras), watch.reported);
-  announce (watch.provider, watch.cameras, now.cameras, new_camera_device);
-  announce (watch.provider, watch.pairs, now.pairs, new_pair_device);
-}
-
-/** Waits until it is time to search.
- *  @param[out] is_usb  whether USB devices came or went
- *  @return false if the provider stops */
-bool
-wait_for_change (Watch &watch, Clock::time_point until, bool &is_usb)
-{
+  if (watch.usb.works ()) {
+    if (watch.usb.wait (period) && !watch.is_over)
+      watch.usb.wait (kUsbSettle);
+    return;
+  }
   std::unique_lock guard (watch.lock);
-  watch.changed.wait_until (guard, until, [&] { return watch.is_over || watch.has_usb_changed; });
-  is_usb = std::exchange (watch.has_usb_changed, false);
-  return !watch.is_over;
+  watch.changed.wait_for (guard, period, [&] { return watch.is_over.load (); });
 }
 
-void
-run_watch (Watch &watch)
+gpointer
+run_watch (gpointer data)
 {
+  auto &watch = *static_cast<Watch *> (data);
   auto period = kMinPeriod;
-  auto next_discovery = Clock::now ();
-  bool is_usb = true;
-  do {
-    if (is_usb && watch.usb)
-      watch.usb_cameras = watch.usb->list ();
-    if (Clock::now () >= next_discovery) {
-      period = discover_gige (watch) ? std::min (2 * period, kMaxPeriod) : kMinPeriod;
-      next_discovery = Clock::now () + period;
-    }
-    update (watch);
-    {
-      const std::lock_guard guard (watch.lock);
-      watch.is_listed = true;
-    }
+  std::unique_lock guard (watch.lock);
+  while (!watch.is_over) {
+    guard.unlock ();
+    period = search (watch) ? std::min (2 * period, kMaxPeriod) : kMinPeriod;
+    guard.lock ();
+    watch.is_listed = true;
     watch.changed.notify_all ();
-  } while (wait_for_change (watch, next_discovery, is_usb));
+    guard.unlock ();
+    wait_for_next_search (watch, period);
+    guard.lock ();
+  }
+  return nullptr;
 }
 
 } // namespace
@@ -262,18 +251,9 @@ gst_camera_device_provider_start (GstDeviceProvider *provider)
   self->watch = new Watch;
   auto &watch = *self->watch;
   watch.provider = provider;
-  watch.usb = open_usb (provider);
-  const auto on_usb = [&watch] {
-    const std::lock_guard guard (watch.lock);
-    watch.has_usb_changed = true;
-    watch.changed.notify_all ();
-  };
-  if (watch.usb && !watch.usb->watch (on_usb))
-    GST_WARNING_OBJECT (provider, "libusb does not support hotplug on this host");
-  try {
-    watch.thread = std::thread ([&watch] { run_watch (watch); });
-  } catch (const std::system_error &error) {
-    GST_ERROR_OBJECT (provider, "could not start the camera discovery thread: %s", error.what ());
+  watch.thread = g_thread_try_new ("camera-discovery", run_watch, &watch, nullptr);
+  if (!watch.thread) {
+    GST_ERROR_OBJECT (provider, "could not start the camera discovery thread");
     delete std::exchange (self->watch, nullptr);
     return FALSE;
   }
@@ -293,8 +273,8 @@ gst_camera_device_provider_stop (GstDeviceProvider *provider)
     self->watch->is_over = true;
   }
   self->watch->changed.notify_all ();
-  self->watch->thread.join ();
-  self->watch->usb.reset (); // its thread uses the watch
+  self->watch->usb.wake ();
+  g_thread_join (self->watch->thread);
   delete std::exchange (self->watch, nullptr);
 }
 

@@ -2,6 +2,7 @@
 #include "knownrigs.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <glib.h>
 #include <rangecast/rigfile/rig_file.hpp>
 
@@ -60,37 +61,18 @@ known_rig_files ()
   return files;
 }
 
-const KnownRigs::RigFile &
-KnownRigs::read (const std::string &path)
-{
-  std::error_code error;
-  const auto written = fs::last_write_time (path, error);
-  const auto size = fs::file_size (path, error);
-  const auto at = files_.find (path);
-  if (!error && at != files_.end () && at->second.written == written && at->second.size == size)
-    return at->second;
-  RigFile &file = files_[path];
-  file = {.written = written, .size = size, .rig = {}, .problem = {}};
-  reads_++;
-  if (const auto status = rangecast::load_rig (path, file.rig); !status.ok ())
-    file.problem = status.message ();
-  return file;
-}
-
 std::vector<KnownPair>
-KnownRigs::pairs (const std::vector<std::string> &files, const std::vector<CameraInfo> &found,
+find_known_pairs (const std::vector<std::string> &files, const std::vector<CameraInfo> &found,
     std::vector<std::string> &problems)
 {
-  std::erase_if (files_,
-      [&] (const auto &known) { return std::ranges::find (files, known.first) == files.end (); });
   std::vector<KnownPair> pairs;
   for (const auto &path : files) {
-    const RigFile &file = read (path);
-    if (!file.problem.empty ()) {
-      problems.push_back (file.problem);
+    rangecast::Rig rig;
+    if (const auto status = rangecast::load_rig (path, rig); !status.ok ()) {
+      problems.push_back (status.message ());
       continue;
     }
-    for (const auto &view : file.rig.views) {
+    for (const auto &view : rig.views) {
       const CameraNames names = camera_names (view);
       const auto name = view.name.empty () ? "view " + std::to_string (view.id) : view.name;
       if (is_complete (names, found))

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "../geometry/rig.hpp"
-#include "../geometry/view_pairs.hpp"
 #include "../geometry/world_points.hpp"
+#include "view_pairs.hpp"
 
 namespace rangecast {
 

@@ -9,8 +9,8 @@
 
 #include "../geometry/range_image.hpp"
 #include "../geometry/rig.hpp"
-#include "../geometry/view_pairs.hpp"
 #include "surface_planes.hpp"
+#include "view_pairs.hpp"
 
 namespace rangecast {
 

@@ -20,8 +20,7 @@ check_extension (const std::string &path, std::span<const std::string_view> exte
                 : i + 1 < extensions.size () ? ", "
                                              : " or ") +
             std::string (extensions[i]);
-  return {StatusCode::kBadValue,
-      path + ": cannot be written; expected a file name that ends in " + list};
+  return {StatusCode::kBadValue, path + ": cannot be written; use a name that ends in " + list};
 }
 
 Status
@@ -32,7 +31,7 @@ check_output_path (const std::string &path, std::span<const std::string_view> ex
   std::error_code error;
   const fs::file_status there = fs::status (path, error);
   if (fs::is_directory (there))
-    return {StatusCode::kBadValue, path + ": is a folder; expected a file name"};
+    return {StatusCode::kBadValue, path + ": is a folder"};
   if (fs::exists (there) && !fs::is_regular_file (there))
     return {}; /* to open a pipe would wait for its reader */
   const fs::path folder = fs::path (path).parent_path ();

@@ -4,9 +4,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/aruco/charuco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
+/* OpenCV 4.7 moved ArUco from the contributed modules to objdetect, with another interface. */
+#if CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR < 7
+#define RANGECAST_CONTRIBUTED_ARUCO 1
+#include <opencv2/aruco/charuco.hpp>
+#else
+#include <opencv2/objdetect/charuco_detector.hpp>
+#endif
 
 namespace rangecast {
 namespace {
@@ -18,7 +24,7 @@ constexpr int kSearchSide = 1024;
 
 struct NamedDictionary {
   std::string_view name;
-  cv::aruco::PREDEFINED_DICTIONARY_NAME opencv;
+  int opencv;
 };
 constexpr NamedDictionary kDictionaries[] = {
     {"4x4-50", cv::aruco::DICT_4X4_50},
@@ -51,13 +57,69 @@ marker_of (const BoardSpec &board)
   return board.marker_m > 0 ? board.marker_m : 0.75 * board.square_m;
 }
 
-cv::Ptr<cv::aruco::CharucoBoard>
+using Board = cv::Ptr<cv::aruco::CharucoBoard>;
+using Markers = std::vector<std::vector<cv::Point2f>>;
+
+#ifdef RANGECAST_CONTRIBUTED_ARUCO
+auto
+dictionary_of (const BoardSpec &board)
+{
+  return cv::aruco::getPredefinedDictionary (kDictionaries[board.dictionary].opencv);
+}
+
+Board
 charuco_board (const BoardSpec &board)
 {
   return cv::aruco::CharucoBoard::create (board.columns + 1, board.rows + 1, float (board.square_m),
-      float (marker_of (board)),
+      float (marker_of (board)), dictionary_of (board));
+}
+
+void
+draw_charuco (const Board &board, cv::Size size, cv::Mat &to)
+{
+  board->draw (size, to);
+}
+
+void
+detect_charuco (
+    const cv::Mat &picture, const Board &board, Markers &markers, cv::Mat &points, cv::Mat &ids)
+{
+  std::vector<int> marker_ids;
+  cv::aruco::detectMarkers (picture, board->dictionary, markers, marker_ids);
+  if (!marker_ids.empty ())
+    cv::aruco::interpolateCornersCharuco (markers, marker_ids, picture, board, points, ids);
+}
+#else
+auto
+dictionary_of (const BoardSpec &board)
+{
+  return cv::makePtr<cv::aruco::Dictionary> (
       cv::aruco::getPredefinedDictionary (kDictionaries[board.dictionary].opencv));
 }
+
+Board
+charuco_board (const BoardSpec &board)
+{
+  auto made = cv::makePtr<cv::aruco::CharucoBoard> (cv::Size (board.columns + 1, board.rows + 1),
+      float (board.square_m), float (marker_of (board)), *dictionary_of (board));
+  made->setLegacyPattern (true); /* with the markers where earlier versions have them */
+  return made;
+}
+
+void
+draw_charuco (const Board &board, cv::Size size, cv::Mat &to)
+{
+  board->generateImage (size, to);
+}
+
+void
+detect_charuco (
+    const cv::Mat &picture, const Board &board, Markers &markers, cv::Mat &points, cv::Mat &ids)
+{
+  std::vector<int> marker_ids;
+  cv::aruco::CharucoDetector (*board).detectBoard (picture, points, ids, markers, marker_ids);
+}
+#endif
 
 cv::Mat
 as_mat (ImageView<const std::uint8_t> picture)
@@ -185,39 +247,36 @@ board_dictionaries ()
 Status
 validate (const BoardSpec &board)
 {
-  if (board.columns < 3 || board.columns > 32)
-    return bad_board (
-        "columns is " + std::to_string (board.columns) + "; expected 3 to 32 inner corners");
-  if (board.rows < 3 || board.rows > 32)
-    return bad_board (
-        "rows is " + std::to_string (board.rows) + "; expected 3 to 32 inner corners");
+  for (const auto &[name, value] :
+      {std::pair ("columns", board.columns), std::pair ("rows", board.rows)})
+    if (value < 3 || value > 32)
+      return bad_board (
+          std::string (name) + " is " + std::to_string (value) + "; use 3 to 32 inner corners");
   if (!(board.square_m >= 1e-4 && board.square_m <= 10))
     return bad_board (
-        "square size is " + std::to_string (board.square_m) + " m; expected 0.0001 to 10");
+        "square size is " + std::to_string (board.square_m) + " m; use 0.0001 to 10 m");
   if (board.kind == BoardKind::kChessboard)
     return {};
   if (!(board.marker_m >= 0 && board.marker_m < board.square_m))
     return bad_board ("marker size is " + std::to_string (board.marker_m) +
-                      " m; expected less than a square, " + std::to_string (board.square_m));
+                      " m; use less than a square, " + std::to_string (board.square_m));
   if (board.dictionary < 0 || board.dictionary >= int (std::size (kDictionaries)))
     return bad_board ("dictionary " + std::to_string (board.dictionary) + " does not exist");
-  const int have =
-      cv::aruco::getPredefinedDictionary (kDictionaries[board.dictionary].opencv)->bytesList.rows;
+  const int have = dictionary_of (board)->bytesList.rows;
   const int want = (board.columns + 1) * (board.rows + 1) / 2;
   if (have < want)
     return bad_board ("dictionary " + std::string (kDictionaries[board.dictionary].name) + " has " +
-                      std::to_string (have) + " markers; expected at least " +
+                      std::to_string (have) + " markers; use one with at least " +
                       std::to_string (want) + " for a board of this size");
   return {};
 }
 
 struct BoardDetector::Charuco {
-  cv::Ptr<cv::aruco::CharucoBoard> board;
-  cv::Ptr<cv::aruco::DetectorParameters> parameters = cv::aruco::DetectorParameters::create ();
+  Board board;
   double marker_share = 0.75; /* marker by square */
 
   /* Side of the smallest square, derived from its marker. */
-  [[nodiscard]] double square_px (const std::vector<std::vector<cv::Point2f>> &markers) const
+  [[nodiscard]] double square_px (const Markers &markers) const
   {
     double smallest = 1e9;
     for (const auto &m : markers)
@@ -237,13 +296,9 @@ struct BoardDetector::Charuco {
 
   void find_corners (const cv::Mat &picture, std::vector<BoardCorner> &corners) const
   {
-    std::vector<std::vector<cv::Point2f>> markers;
-    std::vector<int> marker_ids;
-    cv::aruco::detectMarkers (picture, board->dictionary, markers, marker_ids, parameters);
-    if (marker_ids.empty ())
-      return;
+    Markers markers;
     cv::Mat points, ids;
-    cv::aruco::interpolateCornersCharuco (markers, marker_ids, picture, board, points, ids);
+    detect_charuco (picture, board, markers, points, ids);
     if (points.rows == 0)
       return;
     /* OpenCV's own refinement stops at 0.1 pixels. The window must not reach the markers. */
@@ -366,7 +421,7 @@ draw_board (const BoardSpec &board, int square_px, std::vector<std::uint8_t> &pi
   if (Status s = validate (board); !s.ok ())
     return s;
   if (square_px < 8 || square_px > 512)
-    return bad_board ("a square of " + std::to_string (square_px) + " pixels; expected 8 to 512");
+    return bad_board ("a square of " + std::to_string (square_px) + " pixels; use 8 to 512");
   const int width = (board.columns + 3) * square_px, height = (board.rows + 3) * square_px;
   pixels.assign (std::size_t (width) * height, 255);
   cv::Mat picture (height, width, CV_8U, pixels.data ());
@@ -374,7 +429,7 @@ draw_board (const BoardSpec &board, int square_px, std::vector<std::uint8_t> &pi
   if (board.kind == BoardKind::kCharuco) {
     try {
       cv::Mat drawn;
-      charuco_board (board)->draw (inner.size (), drawn);
+      draw_charuco (charuco_board (board), inner.size (), drawn);
       drawn.copyTo (picture (inner));
     } catch (const std::exception &e) {
       return bad_board (e.what ());

@@ -135,9 +135,7 @@ private:
   void hold_lens (double *lens)
   {
     const int model = int (settings_.distortion);
-    if (!settings_.refine_lenses) {
-      problem_.SetParameterBlockConstant (lens);
-    } else if (model < 8) {
+    if (model < 8) {
       std::vector<int> absent;
       for (int i = 4 + model; i < 12; i++)
         absent.push_back (i);
@@ -164,8 +162,8 @@ adjust_bundle (const BoardSpec &board, const std::vector<CalibrationFrame> &fram
     if (stop.stop_requested ())
       return {StatusCode::kInterrupted, "bundle adjustment was interrupted"};
     if (!solved)
-      return {StatusCode::kBadValue, "no poses of the cameras fit all boards; expected cameras "
-                                     "that capture at the same time, and boards held still"};
+      return {StatusCode::kBadValue, "no poses of the cameras fit all boards; trigger the "
+                                     "cameras at the same time and hold the board still"};
     adjustment.get (bundle);
   } catch (const std::exception &e) {
     return {StatusCode::kBadValue, std::string ("bundle adjustment: ") + e.what ()};

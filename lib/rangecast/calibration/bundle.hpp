@@ -16,8 +16,7 @@ struct Bundle {
 
 struct BundleSettings {
   DistortionModel distortion = DistortionModel::kFive;
-  bool refine_lenses = true; ///< false: refine poses only
-  double robust_px = 0;      ///< threshold of the Huber loss, pixels; 0: least squares
+  double robust_px = 0; ///< threshold of the Huber loss, pixels; 0: least squares
 };
 
 /** Minimizes the reprojection error over lenses, camera poses and board poses (Ceres).

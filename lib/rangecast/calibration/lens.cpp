@@ -137,19 +137,19 @@ check_lens (const CalibrationCamera &camera, const LensParameters &lens, double 
       fy <= 0 || fx > 1e5 || fy > 1e5)
     return {StatusCode::kBadValue,
         text_of (camera) + ": no lens model fits these boards (focal length " + number (fx) +
-            " pixels); expected tilted boards all over the picture"};
+            " pixels); show tilted boards all over the image"};
   if (cx < 0 || cy < 0 || cx >= camera.width || cy >= camera.height)
-    return {StatusCode::kBadValue,
-        text_of (camera) + ": principal point " + number (cx) + ", " + number (cy) +
-            " is not in the picture; expected tilted boards all over it"};
+    return {StatusCode::kBadValue, text_of (camera) + ": principal point " + number (cx) + ", " +
+                                       number (cy) +
+                                       " is outside the image; show tilted boards all over it"};
   const double corner =
       std::hypot (std::max (cx, camera.width - 1 - cx), std::max (cy, camera.height - 1 - cy));
   const double fold = fold_px (lens, corner);
   if (fold < reach_px)
     return {StatusCode::kBadValue,
         text_of (camera) + ": lens distortion turns back " + number (fold) +
-            " pixels from the middle; expected boards nearer to the picture's corners, or fewer "
-            "coefficients of distortion"};
+            " pixels from the image centre; show the board nearer to the image corners, or use "
+            "fewer coefficients of distortion"};
   if (fold < corner)
     warning = text_of (camera) + ": lens distortion is undetermined beyond " + number (fold) +
               " pixels from the image centre; show the board nearer to the image corners";

@@ -27,15 +27,8 @@ common_corners (const Sighting &a, const Sighting &b)
 std::string_view
 role_name (CameraRole role)
 {
-  switch (role) {
-    case CameraRole::kLeft:
-      return "left";
-    case CameraRole::kRight:
-      return "right";
-    case CameraRole::kThird:
-      return "third";
-  }
-  return "";
+  static constexpr std::string_view kNames[] = {"left", "right", "third"};
+  return kNames[int (role)];
 }
 
 std::string

@@ -54,7 +54,7 @@ link_cameras (const std::vector<CalibrationCamera> &cameras,
   std::vector<double> d2 = coefficients (lenses[link.b].lens);
   const CalibrationCamera &camera = cameras[link.a];
   try {
-    link.rms_px = cv::stereoCalibrate (common.object, common.first, common.second, k1, d1, k2, d2,
+    cv::stereoCalibrate (common.object, common.first, common.second, k1, d1, k2, d2,
         {camera.width, camera.height}, r, t, e, f,
         cv::CALIB_FIX_INTRINSIC | cv::CALIB_RATIONAL_MODEL,
         {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 100, 1e-9});
@@ -76,7 +76,7 @@ strongest_link (const std::vector<CalibrationFrame> &frames, const std::vector<b
     for (int b = 0; b < int (placed.size ()); b++)
       if (placed[a] && !placed[b])
         if (const int frames_shared = shared_frames (frames, a, b); frames_shared > best.frames)
-          best = {a, b, frames_shared, {}, 0};
+          best = {a, b, frames_shared, {}};
   return best;
 }
 
@@ -125,8 +125,8 @@ check_linked (
       }
   }
   return {StatusCode::kNotFound,
-      text + "; expected at least " + std::to_string (kMinSharedFrames) +
-          " frames in which a camera of each group sees the board at the same time"};
+      text + "; show the board to a camera of each group at the same time, in at least " +
+          std::to_string (kMinSharedFrames) + " frames"};
 }
 
 Status
@@ -135,8 +135,6 @@ chain_cameras (const std::vector<CalibrationCamera> &cameras,
     const std::vector<LensCalibration> &lenses, Bundle &bundle, std::vector<CameraLink> &links,
     const std::stop_token &stop)
 {
-  if (Status s = check_linked (cameras, frames); !s.ok ())
-    return s;
   links.clear ();
   bundle.lenses.clear ();
   for (const LensCalibration &lens : lenses)

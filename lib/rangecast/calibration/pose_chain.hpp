@@ -10,7 +10,6 @@ struct CameraLink {
   int a = 0, b = 0; ///< cameras
   int frames = 0;   ///< that both saw
   Pose b_from_a;
-  double rms_px = 0; ///< of cv::stereoCalibrate with fixed intrinsics
 };
 
 /** Minimum number of common frames of two linked cameras. */
@@ -22,7 +21,7 @@ inline constexpr int kMinSharedFrames = 3;
  *  @param lenses  by camera; with poses of the boards
  *  @param[out] links  one less than the number of cameras
  *  @param stop  ends it before the next link
- *  @return kInterrupted, or kNotFound that names the cameras with too few common boards */
+ *  @return kInterrupted, or kBadValue if no pose fits */
 Status chain_cameras (const std::vector<CalibrationCamera> &cameras,
     const std::vector<CalibrationFrame> &frames, const BoardSpec &board,
     const std::vector<LensCalibration> &lenses, Bundle &bundle, std::vector<CameraLink> &links,

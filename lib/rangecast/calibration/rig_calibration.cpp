@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "rig_calibration.hpp"
 
+#include "../geometry/rectified_pose.hpp"
 #include "opencv_types.hpp"
 #include "pose_chain.hpp"
 
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 
 namespace rangecast {
 namespace {
@@ -62,20 +64,125 @@ check_pair (
     return bad (view + right.name + " (right) " +
                 (std::abs (roll) > 135 ? "is upside down" : "lies on its side") + " against " +
                 left.name + " (left): it is turned by " + text +
-                " about its axis; turn the camera, or its pictures with videoflip");
+                " about its axis; turn the camera, or its images with videoflip");
   }
   const Vec3 c = right_from_left.inverse ().translation;
   std::snprintf (text, sizeof text, "%.4f m", norm (c));
   if (std::abs (c.x) < std::abs (c.y) || std::abs (c.x) < 0.5 * std::abs (c.z))
     return bad (view + left.name + " and " + right.name + " stand " + text +
-                " apart, but not side by side; expected a left and a right camera");
+                " apart, but not side by side; mount them side by side");
   if (c.x < 0)
     return bad (view + "left and right cameras are swapped: " + right.name + " (right) stands " +
                 text + " to the left of " + left.name +
-                " (left); swap the two. If they are not, both are upside down, or both pictures "
+                " (left); swap the two. If they are not, both are upside down, or both images "
                 "are mirrored");
   return {};
 }
+
+/* ---- the world ---- */
+
+Vec3
+normalised (Vec3 v)
+{
+  return 1 / norm (v) * v;
+}
+
+Vec3
+column (const Pose &pose, int i)
+{
+  return {pose.rotation[i], pose.rotation[3 + i], pose.rotation[6 + i]};
+}
+
+/* A world with this y axis and the z axis closest to `towards`. */
+Pose
+world_from (Vec3 origin, Vec3 up, Vec3 towards)
+{
+  const Vec3 y = normalised (up);
+  Vec3 flat = towards - dot (towards, y) * y;
+  if (norm (flat) < 1e-6) { /* parallel: any direction is as good */
+    const Vec3 any = std::abs (y.x) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+    flat = any - dot (any, y) * y;
+  }
+  const Vec3 z = normalised (flat), x = cross (y, z);
+  Pose pose{{x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z}, {}};
+  pose.translation = -1 * (pose.rotation * origin);
+  return pose;
+}
+
+Vec3
+mean (std::span<const Vec3> points)
+{
+  Vec3 sum;
+  for (const Vec3 &p : points)
+    sum = sum + p;
+  return 1.0 / double (points.size ()) * sum;
+}
+
+/* The point closest to the optical axes in the least-squares sense; the centre of the boards if the
+ * axes are parallel, or meet behind a camera or far beyond all boards.
+ */
+Vec3
+looked_at (std::span<const Pose> cameras, Vec3 middle)
+{
+  if (cameras.size () == 1) {
+    const Vec3 axis = column (cameras[0], 2), at = cameras[0].translation;
+    return at + dot (axis, middle - at) * axis;
+  }
+  cv::Matx33d a = cv::Matx33d::zeros ();
+  cv::Vec3d b (0, 0, 0);
+  double farthest = 0;
+  for (const Pose &camera : cameras) {
+    const Vec3 d = column (camera, 2), c = camera.translation;
+    const cv::Vec3d direction (d.x, d.y, d.z);
+    const cv::Matx33d across = cv::Matx33d::eye () - direction * direction.t ();
+    a = a + across;
+    b += across * cv::Vec3d (c.x, c.y, c.z);
+    farthest = std::max (farthest, norm (middle - c));
+  }
+  cv::Vec3d values;
+  cv::Matx33d vectors;
+  if (!cv::eigen (a, values, vectors) || values[2] < 0.01 * double (cameras.size ()))
+    return middle;
+  const cv::Vec3d p = a.inv () * b;
+  const Vec3 point{p[0], p[1], p[2]};
+  for (const Pose &camera : cameras) {
+    const double depth = dot (column (camera, 2), point - camera.translation);
+    if (!(depth > 0 && depth < 3 * farthest))
+      return middle;
+  }
+  return point;
+}
+
+/* @param first_from_camera  poses of the left cameras in the frame of the first one, which is
+ * included; not empty
+ * @param boards  centres of all boards in the first camera's frame, not empty
+ * @param first_from_board  for kBoard, with the origin in its centre
+ * @return world_from_first */
+Pose
+place_world (WorldFrame frame, std::span<const Pose> first_from_camera,
+    std::span<const Vec3> boards, const Pose &first_from_board)
+{
+  const Vec3 first = first_from_camera[0].translation;
+  if (frame == WorldFrame::kFirstView)
+    return world_from (first, {0, -1, 0}, {0, 0, -1});
+  const Vec3 middle = mean (boards);
+  if (frame == WorldFrame::kBoard) {
+    const Vec3 origin = first_from_board.translation;
+    Vec3 up = column (first_from_board, 2);
+    if (dot (up, first - origin) < 0)
+      up = -1 * up;
+    return world_from (origin, up, first - origin);
+  }
+  Vec3 up;
+  for (const Pose &camera : first_from_camera)
+    up = up - column (camera, 1);
+  if (norm (up) < 1e-3)
+    up = {0, -1, 0};
+  const Vec3 origin = looked_at (first_from_camera, middle);
+  return world_from (origin, up, first - origin);
+}
+
+/* ---- the calibration ---- */
 
 /* The state of a calibration. */
 class Calibration {
@@ -120,6 +227,7 @@ private:
   double sighting_rms (std::size_t frame, const Sighting &sighting) const;
   double reach (int camera) const;
   double row_error (int left, int right) const;
+  std::string misalignment_of (const PairReport &pair) const;
   PairReport pair_report (int a, int b) const;
   Pose world_from_first () const;
   Pose between (int a, int b) const
@@ -145,8 +253,8 @@ Calibration::what_was_dropped (int camera) const
   if (count == 0)
     return {};
   return " (" + std::to_string (count) +
-         " more do not fit: do the pictures of all cameras belong together, and did the board lie "
-         "still?)";
+         " more do not fit; check that the cameras capture at the same time, and hold the board "
+         "still)";
 }
 
 std::string
@@ -171,13 +279,13 @@ Calibration::check_counts () const
       continue;
     const std::string dropped = what_was_dropped (int (i));
     if (count == 0 && dropped.empty ())
-      return {StatusCode::kNotFound, text_of (cameras_[i]) + ": no board was found; expected " +
-                                         wanted_board () + ", in at least " +
-                                         std::to_string (settings_.min_frames) + " frames"};
+      return {StatusCode::kNotFound,
+          text_of (cameras_[i]) + ": no board was found; show one with " + wanted_board () +
+              ", in at least " + std::to_string (settings_.min_frames) + " frames"};
     return {StatusCode::kNotFound,
         text_of (cameras_[i]) + ": the board was found in " + std::to_string (count) +
             (count == 1 ? " frame" : " frames") + (dropped.empty () ? "" : " that fit") + dropped +
-            "; expected at least " + std::to_string (settings_.min_frames)};
+            "; show it in at least " + std::to_string (settings_.min_frames)};
   }
   return {};
 }
@@ -254,7 +362,7 @@ Calibration::drop_outliers (double limit_px, bool &any)
   s = check_linked (cameras_, frames_);
   return s.ok () ? s
                  : bad (s.message () + "; " + std::to_string (result_.dropped.size ()) +
-                        " boards that do not fit were left out: do the pictures belong together?");
+                        " boards that do not fit were skipped; check that the images match");
 }
 
 /* If each camera alone fits its boards but all of them together do not, the cause is not the
@@ -268,15 +376,15 @@ Calibration::with_hint (const Status &status) const
       !alone_good)
     return status;
   return {status.code (), status.message () +
-                              ". Each camera alone fits: were their pictures taken at the same "
-                              "moments, and are those of one of them mirrored?"};
+                              ". Each camera alone fits: were their images captured at the "
+                              "same time, and are those of one of them mirrored?"};
 }
 
 /* A robust loss identifies outliers; without them, least squares is the best estimate. */
 Status
 Calibration::adjust ()
 {
-  BundleSettings bundle{settings_.distortion, true, kRobustPx};
+  BundleSettings bundle{settings_.distortion, kRobustPx};
   bool dropped = false;
   Status s = drop_outliers (std::numeric_limits<double>::max (), dropped); /* behind a camera */
   dropped = true;
@@ -373,6 +481,18 @@ Calibration::pair_report (int a, int b) const
   return pair;
 }
 
+/* Of a stereo pair; rows that differ follow from it. */
+std::string
+Calibration::misalignment_of (const PairReport &pair) const
+{
+  if (cameras_[pair.b].role != CameraRole::kRight)
+    return {};
+  View view;
+  view.id = cameras_[pair.a].view_id;
+  view.right.emplace ().partner_from_left = between (pair.a, pair.b);
+  return describe_misalignment (view);
+}
+
 Status
 Calibration::report ()
 {
@@ -393,9 +513,9 @@ Calibration::report ()
   result_.rms_px = std::sqrt (std::reduce (squares.begin (), squares.end ()) /
                               double (std::reduce (corners.begin (), corners.end ())));
   if (!(result_.rms_px <= kWorstRmsPx))
-    return bad ("reprojection error is " + std::to_string (result_.rms_px) +
-                " pixels; expected less than " + std::to_string (int (kWorstRmsPx)) +
-                ": do columns, rows and the board agree?");
+    return bad ("reprojection error is " + std::to_string (result_.rms_px) + " pixels, more than " +
+                std::to_string (int (kWorstRmsPx)) +
+                "; check that columns and rows are those of the board");
   for (int a = 0; a < int (cameras_.size ()); a++)
     for (int b = 0; b < int (cameras_.size ()); b++) {
       const bool stereo = cameras_[a].view_id == cameras_[b].view_id &&
@@ -408,13 +528,15 @@ Calibration::report ()
         result_.pairs.push_back (pair_report (a, b));
     }
   for (const PairReport &pair : result_.pairs)
-    if (pair.row_error_px > kOddRowErrorPx)
+    if (const std::string text = misalignment_of (pair); !text.empty ())
+      result_.warnings.push_back (text);
+    else if (pair.row_error_px > kOddRowErrorPx)
       result_.warnings.push_back ("view " + std::to_string (cameras_[pair.a].view_id) +
                                   ": rows of " + cameras_[pair.a].name + " and " +
                                   cameras_[pair.b].name + " differ by " +
                                   rounded (pair.row_error_px) +
                                   " pixels after rectification, where 0.3 is good: were the "
-                                  "pictures taken at the same time, and did no camera move?");
+                                  "images captured at the same time, and did no camera move?");
   return {};
 }
 
@@ -453,8 +575,8 @@ Calibration::make_rig ()
   const Pose world = world_from_first ();
   if (settings_.world == WorldFrame::kBoard && frames_[0].sightings.empty ())
     result_.warnings.push_back (
-        "the first frame's board was left out, so the world begins at that of "
-        "another frame; hold it still in the first pictures");
+        "the first frame's board was skipped, so the world begins at that of "
+        "another frame; hold it still in the first images");
   for (std::size_t i = 0; i < cameras_.size (); i++) {
     if (cameras_[i].role != CameraRole::kLeft)
       continue;
@@ -489,34 +611,33 @@ check_cameras (const std::vector<CalibrationCamera> &cameras, const BoardSpec &b
   if (Status s = validate (board); !s.ok ())
     return s;
   if (cameras.empty ())
-    return {StatusCode::kNotFound, "no cameras; expected at least one"};
+    return {StatusCode::kNotFound, "no cameras; add at least one"};
   for (std::size_t i = 0; i < cameras.size (); i++) {
     const CalibrationCamera &camera = cameras[i];
     if (camera.view_id < 0 || camera.view_id >= kMaxViews)
-      return bad (
-          text_of (camera) + ": expected a view from 0 to " + std::to_string (kMaxViews - 1));
+      return bad (text_of (camera) + ": use a view from 0 to " + std::to_string (kMaxViews - 1));
     if (camera.width < 1 || camera.height < 1 || camera.width > kMaxImageSide ||
         camera.height > kMaxImageSide)
-      return {StatusCode::kBadSize, text_of (camera) + ": has no pictures of a size from 1x1 to " +
-                                        std::to_string (kMaxImageSide)};
+      return {StatusCode::kBadSize,
+          text_of (camera) + ": set an image size from 1x1 to " + std::to_string (kMaxImageSide)};
     if (const int same = find_camera (cameras, camera.view_id, camera.role); same != int (i))
       return bad (cameras[same].name + " and " + camera.name + " are both the " +
                   std::string (role_name (camera.role)) + " camera of view " +
-                  std::to_string (camera.view_id) + "; expected one");
+                  std::to_string (camera.view_id) + "; change the view or role of one");
     const int left = find_camera (cameras, camera.view_id, CameraRole::kLeft);
     if (left < 0)
-      return bad (text_of (camera) + ": its view has no left camera; expected one");
+      return bad (text_of (camera) + ": its view has no left camera; add one");
     if (cameras[left].width != camera.width || cameras[left].height != camera.height)
-      return {StatusCode::kBadSize, text_of (camera) + " is " + std::to_string (camera.width) +
-                                        "x" + std::to_string (camera.height) +
-                                        "; expected the size of " + text_of (cameras[left]) + ", " +
-                                        std::to_string (cameras[left].width) + "x" +
-                                        std::to_string (cameras[left].height)};
+      return {StatusCode::kBadSize,
+          text_of (camera) + " is " + std::to_string (camera.width) + "x" +
+              std::to_string (camera.height) + "; use the size of " + text_of (cameras[left]) +
+              ", " + std::to_string (cameras[left].width) + "x" +
+              std::to_string (cameras[left].height) + ": add videoscale before the pad"};
   }
   if (cameras.size () > 1 && board.is_ambiguous ())
     return bad ("board of " + std::to_string (board.columns) + "x" + std::to_string (board.rows) +
                 " inner corners looks the same upside down, so that cameras cannot agree on it; "
-                "expected an odd and an even number, or a ChArUco board");
+                "use an odd and an even number, or a ChArUco board");
   return {};
 }
 
@@ -528,7 +649,7 @@ calibrate_rig (const std::vector<CalibrationCamera> &cameras, std::vector<Calibr
   if (Status s = check_cameras (cameras, settings.board); !s.ok ())
     return s;
   if (settings.min_frames < 3)
-    return bad ("min-frames is " + std::to_string (settings.min_frames) + "; expected at least 3");
+    return bad ("min-frames is " + std::to_string (settings.min_frames) + "; use 3 or more");
   for (const CalibrationFrame &frame : frames)
     for (const Sighting &sighting : frame.sightings)
       if (sighting.camera < 0 || sighting.camera >= int (cameras.size ()) ||

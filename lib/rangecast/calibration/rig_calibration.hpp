@@ -3,11 +3,19 @@
 
 #include "../geometry/rig.hpp"
 #include "lens.hpp"
-#include "world_frame.hpp"
 
 #include <stop_token>
 
 namespace rangecast {
+
+/** Origin and orientation of the rig's world: right-handed, y up, metres. */
+enum class WorldFrame {
+  kCentre,    ///< origin at the point that the cameras look at, y is their mean up direction, the
+              ///< first one on the +z side
+  kFirstView, ///< origin in the first camera, which looks along -z
+  kBoard, ///< origin in the centre of a board that lies on the floor, y is its normal towards the
+          ///< cameras, z points towards the first camera
+};
 
 struct CalibrationSettings {
   BoardSpec board;

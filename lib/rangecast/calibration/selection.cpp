@@ -100,7 +100,7 @@ CameraCoverage::missing () const
     for (int column = 0; column < kColumns; column++)
       if (!cells[row * kColumns + column])
         list.push_back (
-            std::string ("board at the ") + kDown[row] + " " + kAcross[column] + " of the picture");
+            std::string ("board at the ") + kDown[row] + " " + kAcross[column] + " of the image");
   if (!tilted_left)
     list.emplace_back ("left end of the board turned away");
   if (!tilted_right)
@@ -148,19 +148,9 @@ FrameSelector::coverage (const CalibrationCamera &camera, int index) const
 std::string_view
 verdict_name (FrameVerdict verdict)
 {
-  switch (verdict) {
-    case FrameVerdict::kTaken:
-      return "taken";
-    case FrameVerdict::kNoBoard:
-      return "no-board";
-    case FrameVerdict::kMoving:
-      return "moving";
-    case FrameVerdict::kBlurred:
-      return "blurred";
-    case FrameVerdict::kSimilar:
-      return "similar";
-  }
-  return "";
+  static constexpr std::string_view kNames[kFrameVerdicts] = {
+      "taken", "no-board", "moving", "blurred", "similar"};
+  return kNames[int (verdict)];
 }
 
 void
@@ -232,12 +222,6 @@ FrameSelector::difference (const Places &places, std::size_t except) const
   return max;
 }
 
-bool
-FrameSelector::links_are_few (int a, int b) const
-{
-  return shared_frames (frames_, a, b) < kFewLinks;
-}
-
 /* Two cameras with few common frames want more of them: places may differ by half as much, and only
  * frames that both cameras share count as similar. */
 bool
@@ -246,7 +230,7 @@ FrameSelector::is_new (const Places &places) const
   double wanted = kNewPlace;
   for (const auto &[a, place_a] : places)
     for (const auto &[b, place_b] : places) {
-      if (a >= b || !links_are_few (a, b))
+      if (a >= b || shared_frames (frames_, a, b) >= kFewLinks)
         continue;
       wanted = kNewPlace / 2;
       double nearest = std::numeric_limits<double>::max ();

@@ -86,7 +86,6 @@ private:
   void record_images (
       const CalibrationFrame &frame, std::uint64_t time_ns, const std::vector<bool> &has_image);
   [[nodiscard]] double difference (const Places &places, std::size_t except) const;
-  [[nodiscard]] bool links_are_few (int a, int b) const;
   [[nodiscard]] bool is_new (const Places &places) const;
   FrameVerdict take (CalibrationFrame frame, Places places);
 

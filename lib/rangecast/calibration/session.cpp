@@ -17,16 +17,14 @@ CalibrationSession::set (const SessionSettings &settings)
   const CalibrationSettings &c = settings.calibration;
   if (!(c.near_m > 0 && c.near_m < c.far_m))
     return {StatusCode::kBadValue, "near is " + std::to_string (c.near_m) + " m and far is " +
-                                       std::to_string (c.far_m) + " m; expected 0 < near < far"};
+                                       std::to_string (c.far_m) + " m; set near between 0 and far"};
   if (settings.selection.max_frames < c.min_frames)
     return {StatusCode::kBadValue,
         "max-frames is " + std::to_string (settings.selection.max_frames) +
-            "; expected at least min-frames, " + std::to_string (c.min_frames)};
+            "; set it to min-frames, " + std::to_string (c.min_frames) + ", or more"};
   settings_ = settings;
-  states_.clear ();
-  cameras_.clear ();
   selector_.set (settings.calibration.board, settings.selection);
-  verdict_ = FrameVerdict::kNoBoard;
+  clear ();
   return {};
 }
 
@@ -136,8 +134,8 @@ CalibrationSession::check_kept () const
     if (kept >= wanted || kept >= all)
       continue;
     std::string text = text_of (cameras_[i]) + ": the board was found in " + std::to_string (all) +
-                       " pictures, but only " + std::to_string (kept) +
-                       " were kept; expected at least " + std::to_string (wanted) + ". Of the rest";
+                       " images, but only " + std::to_string (kept) + " were kept, fewer than " +
+                       std::to_string (wanted) + ". Of the rest";
     const std::pair<FrameVerdict, const char *> reasons[] = {{FrameVerdict::kMoving, "moving"},
         {FrameVerdict::kBlurred, "blurred"}, {FrameVerdict::kSimilar, "similar to an earlier one"}};
     const char *comma = "";
@@ -146,7 +144,7 @@ CalibrationSession::check_kept () const
         text += std::string (comma) + " " + std::to_string (count) + " were " + reason;
         comma = ",";
       }
-    return {StatusCode::kNotFound, text + ": hold the board still for a moment at each new place"};
+    return {StatusCode::kNotFound, text + "; hold the board still for a moment at each new place"};
   }
   return {};
 }

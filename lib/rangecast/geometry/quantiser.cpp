@@ -2,74 +2,36 @@
 #include "quantiser.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
 
 #include "point_cloud.hpp"
 
 namespace rangecast {
 
-void
-DepthQuantiser::fill_linear (std::uint32_t last)
-{
-  const std::uint32_t range = far_ - near_;
-  for (std::uint32_t code = 0; code <= last; code++)
-    depths_[code] =
-        static_cast<std::uint16_t> (near_ + (code * std::uint64_t{range} + last / 2) / last);
-  for (std::uint32_t d = near_; d <= far_; d++)
-    codes_[d] =
-        static_cast<std::uint16_t> (((d - near_) * std::uint64_t{last} + range / 2) / range);
-}
-
-void
-DepthQuantiser::fill_inverse (std::uint32_t last)
-{
-  const std::uint64_t range = far_ - near_, top = std::uint64_t{near_} * far_ * last;
-  for (std::uint32_t code = 0; code <= last; code++) {
-    const std::uint64_t bottom = std::uint64_t{far_} * last - code * range;
-    depths_[code] = static_cast<std::uint16_t> ((top + bottom / 2) / bottom);
-  }
-  /* The nearest in depth, not in 1 / depth, so that coding a decoded depth again does not change
-   * it. */
-  std::uint32_t code = 0;
-  for (std::uint32_t d = near_; d <= far_; d++) {
-    const auto distance = [&] (std::uint32_t c) { return std::abs (int (depths_[c]) - int (d)); };
-    std::uint32_t next = code;
-    while (next < last && depths_[next] < d)
-      next++;
-    if (distance (next) < distance (code))
-      code = next;
-    codes_[d] = static_cast<std::uint16_t> (code);
-  }
-}
-
 Status
-DepthQuantiser::set (std::uint16_t near, std::uint16_t far, int bits, DepthScale scale)
+DepthQuantiser::set (std::uint16_t near, std::uint16_t far, int bits)
 {
   if (near < 1 || far <= near || bits < 6 || bits > 16)
-    return {StatusCode::kBadValue, "depth quantiser: expected 1 <= near < far and 6 to 16 bits"};
-  const bool inverse = scale == DepthScale::kInverse;
-  const std::uint64_t range = far - near;
-  const std::uint64_t enough = inverse ? (far * range + near - 1) / near : range;
-  const auto last = static_cast<std::uint32_t> (std::min<std::uint64_t> (enough, (1u << bits) - 1));
+    return {StatusCode::kBadValue, "depth quantiser: needs 1 <= near < far and 6 to 16 bits"};
+  const std::uint32_t range = far - near, last = std::min (range, (1u << bits) - 1);
   near_ = near;
   far_ = far;
-  step_ = double (range) / last * (inverse ? double (far) / near : 1);
-  is_offset_ = !inverse && last == range;
+  step_ = double (range) / last;
+  is_offset_ = last == range;
   codes_.assign (65536, 0);
   depths_.resize (last + 1);
-  if (inverse)
-    fill_inverse (last);
-  else
-    fill_linear (last);
+  for (std::uint32_t code = 0; code <= last; code++)
+    depths_[code] =
+        static_cast<std::uint16_t> (near + (code * std::uint64_t{range} + last / 2) / last);
+  for (std::uint32_t d = near; d <= far; d++)
+    codes_[d] = static_cast<std::uint16_t> (((d - near) * std::uint64_t{last} + range / 2) / range);
   return {};
 }
 
 Status
-DepthQuantiser::set (const View &view, int bits, DepthScale scale)
+DepthQuantiser::set (const View &view, int bits)
 {
   Status status = set (depth_units (view.near_m, view.depth_unit_m),
-      depth_units (view.far_m, view.depth_unit_m), bits, scale);
+      depth_units (view.far_m, view.depth_unit_m), bits);
   if (!status.ok ())
     return {status.code (),
         "view " + std::to_string (view.id) + ": near and far are less than one depth unit apart"};

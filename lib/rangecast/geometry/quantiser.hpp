@@ -10,23 +10,15 @@
 
 namespace rangecast {
 
-/** The scale on which depth codes are linear, between near and far. */
-enum class DepthScale : std::uint8_t {
-  kLinear,  ///< in depth
-  kInverse, ///< in 1 / depth: steps grow with the square of the depth, like errors of stereo
-};
-
-/** Depth to codes of `bits` bits and back; near is code 0 and far the greatest, on either scale.
- *  Formulas: docs/formats/bitstream.md, "Quantisation". There are no more codes
- *  than lossless quantisation needs. On the inverse scale several codes may have one depth: code()
- *  returns the lowest of them, decoders accept all. Tables: 128 KiB and up to 128 KiB more. */
+/** Depth to codes of `bits` bits and back; near is code 0 and far the greatest. Formulas:
+ *  docs/formats/bitstream.md, "Quantisation". There are no more codes than lossless quantisation
+ *  needs. Tables: 128 KiB and up to 128 KiB more. */
 class DepthQuantiser {
 public:
   /** @param near, far  depth units, 1 <= near < far; @param bits  6 to 16 */
-  Status set (
-      std::uint16_t near, std::uint16_t far, int bits, DepthScale scale = DepthScale::kLinear);
+  Status set (std::uint16_t near, std::uint16_t far, int bits);
   /** The view's near and far. */
-  Status set (const View &view, int bits, DepthScale scale = DepthScale::kLinear);
+  Status set (const View &view, int bits);
 
   /** Whether a depth, depth units, is in near..far. */
   [[nodiscard]] bool valid (std::uint16_t depth) const { return depth >= near_ && depth <= far_; }
@@ -43,13 +35,10 @@ public:
   /** Greatest change of a depth, depth units, by quantisation and a change of its code by up to
    *  `threshold`. Examines all depths. */
   [[nodiscard]] int max_error (int threshold = 0) const;
-  /** Depth units from one code to the next at far, where the step is largest. */
+  /** Depth units from one code to the next. */
   [[nodiscard]] double step () const { return step_; }
 
 private:
-  void fill_linear (std::uint32_t last);
-  void fill_inverse (std::uint32_t last);
-
   std::uint16_t near_ = 0, far_ = 0;
   double step_ = 1;
   bool is_offset_ = false;

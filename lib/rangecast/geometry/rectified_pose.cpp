@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace rangecast {
 namespace {
@@ -45,6 +46,27 @@ is_rectified (const View &view)
          std::ranges::all_of (right.distortion, is_zero) && std::abs (t.y) < 1e-9 &&
          std::abs (t.z) < 1e-9 && view.intrinsics.fx == right.intrinsics.fx &&
          view.intrinsics.fy == right.intrinsics.fy && view.intrinsics.cy == right.intrinsics.cy;
+}
+
+std::string
+describe_misalignment (const View &view)
+{
+  constexpr double kMaxTurnDeg = 10;
+  const auto degrees = [] (double sine) { return std::asin (std::min (sine, 1.)) * 180 / M_PI; };
+  const Pose left_from_right = view.right->partner_from_left.inverse ();
+  const Vec3 axis = left_from_right.rotation * Vec3{0, 0, 1}, ahead = Vec3{0, 0, 1} + axis;
+  const Vec3 right = left_from_right.translation;
+  const double baseline = norm (right), forward = dot (right, ahead) / norm (ahead);
+  char text[200] = "";
+  if (const double turn = 2 * degrees (norm (axis - Vec3{0, 0, 1}) / 2); turn > kMaxTurnDeg)
+    std::snprintf (text, sizeof text,
+        "the cameras look in directions that differ by %.1f degrees; mount them parallel", turn);
+  else if (degrees (std::abs (forward) / baseline) > kMaxTurnDeg)
+    std::snprintf (text, sizeof text,
+        "the right camera stands %.3f m %s the left one, at a distance of %.3f m; mount them side "
+        "by side",
+        std::abs (forward), forward > 0 ? "ahead of" : "behind", baseline);
+  return text[0] ? "view " + std::to_string (view.id) + ": " + text : "";
 }
 
 Mat3

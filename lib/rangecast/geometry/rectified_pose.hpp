@@ -9,6 +9,11 @@ namespace rangecast {
  *  a displacement along x alone. @param view  has a right camera */
 bool is_rectified (const View &view);
 
+/** What is wrong with how a stereo pair stands, or empty: axes that converge, or one camera ahead
+ *  of the other. Rectification must then turn images so far that it stretches them, loses what the
+ *  cameras see in common, and enlarges errors of rows. @param view  has a right camera */
+std::string describe_misalignment (const View &view);
+
 /** Rotation of the left camera of a stereo pair that makes its rows agree with those of the right.
  *  Method: J.-Y. Bouguet's, as in cv::stereoRectify: each camera turns by half of the rotation
  *  between them, then both turn so that the baseline lies along x.

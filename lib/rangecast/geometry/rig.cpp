@@ -55,11 +55,11 @@ check_lens (
   constexpr double kMinFocal = 1e-3; /* less, and points lie beyond what a float can hold */
   if (!all_finite (values) || !(k.fx >= kMinFocal) || !(k.fy >= kMinFocal) || k.fx > 1e6 ||
       k.fy > 1e6 || std::abs (k.cx) > 1e6 || std::abs (k.cy) > 1e6)
-    return bad_field (view,
-        name + "intrinsics: expected fx, fy from 0.001 to 1e6 and cx, cy within 1e6, in pixels");
+    return bad_field (
+        view, name + "intrinsics: fx, fy must be 0.001 to 1e6 and cx, cy within 1e6 pixels");
   static constexpr std::size_t kSizes[] = {0, 4, 5, 8, 12, 14};
   if (std::ranges::find (kSizes, distortion.size ()) == std::end (kSizes))
-    return bad_field (view, name + "distortion: expected 0, 4, 5, 8, 12 or 14 coefficients, got " +
+    return bad_field (view, name + "distortion: must have 0, 4, 5, 8, 12 or 14 coefficients, has " +
                                 std::to_string (distortion.size ()));
   if (!all_finite (distortion))
     return bad_field (view, name + "distortion: a coefficient is not finite");
@@ -88,8 +88,8 @@ Status
 check_view (const View &view)
 {
   if (view.id < 0 || view.id >= kMaxViews)
-    return {StatusCode::kBadValue, "view-id " + std::to_string (view.id) + ": expected 0 to " +
-                                       std::to_string (kMaxViews - 1)};
+    return {StatusCode::kBadValue,
+        "view-id " + std::to_string (view.id) + ": must be 0 to " + std::to_string (kMaxViews - 1)};
   if (view.name.size () > kMaxViewName)
     return bad_field (view, "name is longer than 255 bytes");
   if (view.camera.size () > kMaxViewName)
@@ -97,18 +97,18 @@ check_view (const View &view)
   if (view.width < 1 || view.height < 1 || view.width > kMaxImageSide ||
       view.height > kMaxImageSide)
     return bad_field (view, "image size " + size_text (view.width, view.height) +
-                                ": expected 1 to " + std::to_string (kMaxImageSide) + " each");
+                                ": must be 1 to " + std::to_string (kMaxImageSide) + " each");
   if (Status s = check_lens (view, view.intrinsics, view.distortion, ""); !s.ok ())
     return s;
   if (Status s = check_pose (view, view.world_from_view, "world_from_view"); !s.ok ())
     return s;
   if (!(view.depth_unit_m >= 1e-7 && view.depth_unit_m <= 1.0))
-    return bad_field (view, "depth_unit: expected 1e-7 to 1 metres");
+    return bad_field (view, "depth_unit: must be 1e-7 to 1 metres");
   if (!(view.near_m > 0) || !(view.far_m > view.near_m) ||
       !(view.far_m / view.depth_unit_m < 65536.0)) {
     char text[160];
     std::snprintf (text, sizeof text,
-        "near and far are %g and %g m; expected 0 < near < far < 65536 depth units of %g m",
+        "near and far are %g and %g m; must be 0 < near < far < 65536 depth units of %g m",
         view.near_m, view.far_m, view.depth_unit_m);
     return bad_field (view, text);
   }
@@ -145,7 +145,7 @@ scale_view (View &view, int width, int height)
     return {StatusCode::kBadSize,
         "view " + std::to_string (view.id) + " is " + size_text (view.width, view.height) +
             ", the images are " + size_text (width, height) +
-            "; expected the same aspect ratio, then the calibration is scaled"};
+            "; a calibration can only be scaled to the same aspect ratio"};
   view.width = width;
   view.height = height;
   view.intrinsics = view.intrinsics.scaled (sx, sy);

@@ -192,7 +192,7 @@ decode_rig (std::span<const std::uint8_t> blob, Rig &rig)
     return {StatusCode::kBadData, "rig blob: does not begin with \"RCRG\""};
   if (blob[4] != kVersion)
     return {
-        StatusCode::kUnsupported, "rig blob: version " + std::to_string (blob[4]) + ", expected 1"};
+        StatusCode::kUnsupported, "rig blob: version " + std::to_string (blob[4]) + " is unknown"};
   const int n_views = blob[5];
   if (n_views > kMaxViews)
     return {StatusCode::kBadData, "rig blob: " + std::to_string (n_views) + " views, at most 64"};

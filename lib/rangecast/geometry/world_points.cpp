@@ -145,7 +145,7 @@ WorldPoints::reset (std::span<const RangeImage> images)
   if (pixels > UINT32_MAX) {
     parts_.clear ();
     return {StatusCode::kBadSize,
-        "frame set: " + std::to_string (pixels) + " pixels, expected less than 2^32"};
+        "frame set: " + std::to_string (pixels) + " pixels, which must be less than 2^32"};
   }
   if (pixel.size () < pixels) { /* the last to grow: all have grown */
     for (auto *array : {&x, &y, &z})

@@ -60,8 +60,9 @@ private:
 };
 
 struct DecoderResult {
-  std::uint64_t slices = 0;     ///< decoded; a repeated one counts once
-  std::uint64_t bad_slices = 0; ///< damaged, of another rig or version, or inconsistent with others
+  std::uint64_t slices = 0; ///< decoded
+  /** Damaged, too short, of another rig or version, or inconsistent or overlapping with others. */
+  std::uint64_t bad_slices = 0;
   std::uint64_t missing_pixels = 0; ///< of the views' ROIs, in slices that did not arrive
   std::uint64_t points = 0;         ///< valid pixels
   /** Pixels of intact slices that are invalid only because they refer to pixels of an earlier frame
@@ -90,11 +91,10 @@ public:
     int view_id = 0;
     Roi roi;
     std::uint64_t capture_time_ns = 0;
-    std::size_t first_slice = 0, slice_count = 0; ///< those that agree; by column, row, arrival
-    SliceHeader reference;                        ///< of these the first to arrive
+    std::size_t first_slice = 0, slice_count = 0; ///< those to decode; they share no pixel
+    SliceHeader reference;                        ///< of the first slice that agrees with most
     std::uint64_t coded_pixels = 0;               ///< pixels of the ROI in the slice headers
-    std::uint64_t held_pixels = 0;                ///< pixels of all slices that are long enough
-    bool overlaps = false;                        ///< two slices have a pixel in common
+    std::uint64_t held_pixels = 0;                ///< pixels of the slices to decode
   };
 
   Status set_rig (const Rig &rig);
@@ -117,15 +117,17 @@ public:
   void plan (std::span<const std::span<const std::uint8_t>> pieces, DecoderResult &result,
       bool whole_rois = true);
   [[nodiscard]] std::span<const PlannedView> views () const { return {planned_.data (), count_}; }
-  /** Pixels of a view's coded ROI that no slice holds; an estimate of at least 1 if slices overlap.
-   */
-  [[nodiscard]] std::uint64_t missing_pixels (std::size_t view) const;
+  /** Pixels of a view's coded ROI that no slice holds. */
+  [[nodiscard]] std::uint64_t missing_pixels (std::size_t view) const
+  {
+    return planned_[view].coded_pixels - planned_[view].held_pixels;
+  }
 
   /** Fills all pixels of `images`. Pixels without an intact slice are taken from `older`, or are
-   *  invalid. Where slices overlap, the later by column, then row, replaces the earlier.
+   *  invalid.
    *  @param images  one for each of views(), in that order, with its ROI
-   *  @param threads  slices decoded in parallel, except overlapping ones of a view; 0 = number of
-   *  cores. The result does not depend on it
+   *  @param threads  slices decoded in parallel; 0 = number of cores. The result does not depend on
+   * it
    *  @param[in,out] result  is added to
    *  @param older  earlier images of any views, perhaps with other ROIs
    *  @return kBadSize, with nothing decoded, if the images are not those of views() */
@@ -137,15 +139,9 @@ private:
     std::span<const std::uint8_t> unit;
     SliceHeader header;
     std::size_t arrival; /* number in the access unit */
-    bool too_short;      /* shorter than its symbols, or repeated too often: it is not decoded, so
-                            that small units do not cost much time */
+    bool too_short;      /* shorter than its symbols: small units must not cost much time */
   };
-  enum class Place : std::uint8_t { kNothing, kDamaged, kIntact };
-  struct Coverage { /* of a view whose slices overlap; a bit for each pixel of its ROI */
-    std::vector<bool> seen, valid;
-    std::uint64_t seen_pixels, points;
-  };
-  struct Job { /* some slices of a view, with all repetitions of each */
+  struct Job { /* some slices of a view */
     std::size_t view;
     std::size_t first, count;
     DecoderResult result;
@@ -153,25 +149,20 @@ private:
 
   bool read_slices (std::span<const std::uint8_t> bytes, DecoderResult &result);
   void plan_view (std::span<const PlannedSlice> slices, DecoderResult &result);
-  void limit_pixels (const PlannedView &planned);
+  void drop_overlapping (PlannedView &planned, DecoderResult &result);
   void crop_to_slices (PlannedView &planned);
-  void find_overlaps (PlannedView &planned);
-  static void cover (Coverage &covered, Place place, const Roi &part, const RangeImage &image);
   void begin_view (std::size_t index, const RangeImage &image, const ConstRangeImage &older);
   void add_jobs (std::size_t view);
   void run (Job &job, const RangeImage &image, const ConstRangeImage &older, SliceMemory &memory);
   [[nodiscard]] DecoderResult sum_up (std::size_t index) const;
-  Place decode_place (std::span<const PlannedSlice> same, const RangeImage &image,
-      const ConstRangeImage &older, DecoderResult &result, SliceMemory &memory);
 
   Rig rig_;
   SliceDecoder decoder_;
   std::array<ReferencePair, kMaxViews> references_; /* by view-id */
   std::array<PlannedView, kMaxViews> planned_;
-  std::array<Coverage, kMaxViews> covered_; /* by planned view */
   std::size_t count_ = 0;
   std::vector<PlannedSlice> slices_;
-  std::vector<int> row_ends_; /* while find_overlaps() runs */
+  std::vector<int> column_ends_; /* while drop_overlapping() runs */
   std::vector<Job> jobs_;
   WorkerMemory<SliceMemory> memory_;
 };

@@ -32,56 +32,6 @@ AccessUnitDecoder::reset_references ()
     pair.reset ();
 }
 
-/* Slices of one place: the first intact one counts, the others are repetitions. */
-AccessUnitDecoder::Place
-AccessUnitDecoder::decode_place (std::span<const PlannedSlice> same, const RangeImage &image,
-    const ConstRangeImage &older, DecoderResult &result, SliceMemory &memory)
-{
-  Place place = Place::kNothing;
-  for (const PlannedSlice &slice : same) {
-    const int id = slice.header.view_id;
-    ReferencePair &pair = references_[id];
-    ReferencePlane *now = slice.header.reference ? pair.now_kept () : nullptr;
-    const ReferencePlane &before = pair.before (slice.header.frame_number);
-    DecodedPixels decoded;
-    if (!slice.too_short &&
-        decoder_.decode (slice.unit, slice.header, {&before, now, &older}, image, decoded, memory)
-            .ok ()) {
-      result.slices++;
-      result.points += decoded.points;
-      result.unknown_pixels += decoded.unknown;
-      return Place::kIntact;
-    }
-    result.bad_slices++;
-    if (slice.too_short)
-      continue;
-    place = Place::kDamaged;
-    if (now)
-      now->clear (slice.header);
-  }
-  if (place == Place::kDamaged)
-    fill_from (older, image, place_of (same[0].header));
-  return place;
-}
-
-/* Counts each pixel once where slices overlap. Touches only pixels that arrived: a few small slices
- * can claim a large image. */
-void
-AccessUnitDecoder::cover (Coverage &covered, Place place, const Roi &part, const RangeImage &image)
-{
-  for (int y = part.y; y < part.y + part.height; y++)
-    for (int x = part.x; x < part.x + part.width; x++) {
-      const auto i = static_cast<std::size_t> (y) * static_cast<std::size_t> (image.roi.width) +
-                     static_cast<std::size_t> (x);
-      const bool valid = place == Place::kIntact && image.depth.at (x, y) != kInvalidDepth;
-      covered.seen_pixels += !covered.seen[i];
-      covered.points += valid;
-      covered.points -= covered.valid[i];
-      covered.seen[i] = true;
-      covered.valid[i] = valid;
-    }
-}
-
 /* Prepares a view before any of its slices is decoded. */
 void
 AccessUnitDecoder::begin_view (
@@ -91,37 +41,24 @@ AccessUnitDecoder::begin_view (
   decoder_.prepare (planned.reference);
   if (planned.reference.reference)
     references_[planned.view_id].begin (planned.reference);
-  if (planned.overlaps ||
-      planned.held_pixels != area_of (planned.roi)) /* not every pixel is coded */
+  if (planned.held_pixels != area_of (planned.roi)) /* not every pixel is coded */
     fill_from (older, image);
-  if (planned.overlaps) {
-    Coverage &covered = covered_[index];
-    covered.seen.assign (area_of (planned.roi), false);
-    covered.valid.assign (area_of (planned.roi), false);
-    covered.seen_pixels = covered.points = 0;
-  }
 }
 
-/* Slices that overlap are one job, because the later replaces the earlier. */
 void
 AccessUnitDecoder::add_jobs (std::size_t view)
 {
   const PlannedView &planned = planned_[view];
-  const std::uint64_t enough = planned.overlaps ? UINT64_MAX : area_of (planned.roi) / kJobsOfView;
-  std::size_t first = planned.first_slice;
-  std::span<const PlannedSlice> rest (&slices_[first], planned.slice_count);
-  std::uint64_t pixels = 0;
-  for (std::size_t count = 0; !rest.empty ();) {
-    const auto same = leading (rest, same_place);
-    rest = rest.subspan (same.size ());
-    count += same.size ();
-    if (!std::ranges::all_of (same, &PlannedSlice::too_short))
-      pixels += area_of (place_of (same[0].header));
-    if (!rest.empty () && pixels < enough)
-      continue;
-    jobs_.push_back ({view, first, count, {}});
-    first += count;
-    pixels = count = 0;
+  const std::uint64_t enough = area_of (planned.roi) / kJobsOfView + 1;
+  std::uint64_t pixels = enough; /* of the last job */
+  for (std::size_t i = 0; i < planned.slice_count; i++) {
+    const std::size_t slice = planned.first_slice + i;
+    if (pixels >= enough) {
+      jobs_.push_back ({view, slice, 0, {}});
+      pixels = 0;
+    }
+    jobs_.back ().count++;
+    pixels += area_of (place_of (slices_[slice].header));
   }
 }
 
@@ -129,13 +66,23 @@ void
 AccessUnitDecoder::run (
     Job &job, const RangeImage &image, const ConstRangeImage &older, SliceMemory &memory)
 {
-  std::span<const PlannedSlice> rest (&slices_[job.first], job.count);
-  while (!rest.empty ()) {
-    const auto same = leading (rest, same_place);
-    const Place place = decode_place (same, image, older, job.result, memory);
-    if (planned_[job.view].overlaps && place != Place::kNothing)
-      cover (covered_[job.view], place, place_of (same[0].header), image);
-    rest = rest.subspan (same.size ());
+  for (const PlannedSlice &slice : std::span (slices_).subspan (job.first, job.count)) {
+    const SliceHeader &header = slice.header;
+    ReferencePair &pair = references_[header.view_id];
+    ReferencePlane *now = header.reference ? pair.now_kept () : nullptr;
+    const ReferencePlane &before = pair.before (header.frame_number);
+    DecodedPixels decoded;
+    if (decoder_.decode (slice.unit, header, {&before, now, &older}, image, decoded, memory)
+            .ok ()) {
+      job.result.slices++;
+      job.result.points += decoded.points;
+      job.result.unknown_pixels += decoded.unknown;
+      continue;
+    }
+    job.result.bad_slices++;
+    if (now)
+      now->clear (header);
+    fill_from (older, image, place_of (header));
   }
 }
 
@@ -148,10 +95,7 @@ AccessUnitDecoder::sum_up (std::size_t index) const
   for (const Job &job : jobs_)
     if (job.view == index)
       sum += job.result;
-  if (planned.overlaps)
-    sum.points = covered_[index].points;
-  sum.missing_pixels =
-      planned.coded_pixels - (planned.overlaps ? covered_[index].seen_pixels : planned.held_pixels);
+  sum.missing_pixels = missing_pixels (index);
   const SliceHeader &first = planned.reference;
   sum.raw_bits =
       sum.points * static_cast<std::uint64_t> (first.depth_bits + 3 * first.colour_bits) +

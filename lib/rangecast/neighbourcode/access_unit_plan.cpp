@@ -11,31 +11,24 @@
 namespace rangecast {
 namespace {
 
-/* An encoder codes no pixel in two slices, and a network repeats packets a few times at most. A few
- * bytes each of more would keep the decoder busy for minutes. */
-constexpr std::uint64_t kMaxRepeats = 8;
-
 /* An encoder of profile plain codes at most 8/3 pixels a byte, so a ROI beyond this has lost more
  * than nine tenths; others keep their size from one frame set to the next. In other profiles a ROI
  * may shrink with fewer losses where little moves. */
 constexpr std::uint64_t kMaxPixelsPerByte = 32;
 
-/* First the fields in which slices of a view agree, then their place. */
+/* First the fields in which slices of a view agree, then the order in which they are taken. */
 auto
 sort_key (const SliceHeader &h)
 {
   return std::tuple{h.view_id, h.roi.x, h.roi.y, h.roi.width, h.roi.height, h.depth_bits,
-      h.inverse_depth, h.colour_bits, h.frame_number, h.reference, h.profile == Profile::kPlain,
-      h.first_column, h.first_row, h.columns, h.rows};
+      h.colour_bits, h.frame_number, h.reference, h.first_row};
 }
 
 bool
 agrees (const SliceHeader &a, const SliceHeader &b)
 {
-  return a.roi == b.roi && a.depth_bits == b.depth_bits && a.inverse_depth == b.inverse_depth &&
-         a.colour_bits == b.colour_bits && a.frame_number == b.frame_number &&
-         a.reference == b.reference &&
-         (a.profile == Profile::kPlain) == (b.profile == Profile::kPlain);
+  return a.roi == b.roi && a.depth_bits == b.depth_bits && a.colour_bits == b.colour_bits &&
+         a.frame_number == b.frame_number && a.reference == b.reference;
 }
 
 } // namespace
@@ -77,9 +70,9 @@ AccessUnitDecoder::plan (
   for (std::span<const PlannedSlice> rest = slices_; !rest.empty ();) {
     const auto view = leading (rest, [] (auto &a, auto &b) { return a.view_id == b.view_id; });
     plan_view (view, result);
+    drop_overlapping (planned_[count_ - 1], result);
     if (!whole_rois)
       crop_to_slices (planned_[count_ - 1]);
-    find_overlaps (planned_[count_ - 1]);
     rest = rest.subspan (view.size ());
   }
 }
@@ -106,20 +99,29 @@ AccessUnitDecoder::plan_view (std::span<const PlannedSlice> slices, DecoderResul
   const SliceHeader &header = best_first->header;
   planned_[count_++] = {header.view_id, header.roi, header.capture_time_ns,
       static_cast<std::size_t> (best.data () - slices_.data ()), best.size (), header,
-      area_of (header.roi), 0, false};
-  limit_pixels (planned_[count_ - 1]);
+      area_of (header.roi), 0};
 }
 
+/* Slices come by their first rows, so one overlaps an earlier one if that ends below its first row
+ * in a column of both. */
 void
-AccessUnitDecoder::limit_pixels (const PlannedView &planned)
+AccessUnitDecoder::drop_overlapping (PlannedView &planned, DecoderResult &result)
 {
-  std::uint64_t pixels = 0;
-  for (PlannedSlice &slice : std::span (&slices_[planned.first_slice], planned.slice_count)) {
-    if (slice.too_short)
-      continue;
-    pixels += area_of (place_of (slice.header));
-    slice.too_short = pixels > kMaxRepeats * planned.coded_pixels;
-  }
+  const std::span<PlannedSlice> slices (&slices_[planned.first_slice], planned.slice_count);
+  column_ends_.assign (static_cast<std::size_t> (planned.roi.width), 0);
+  const auto dropped = std::ranges::remove_if (slices, [&] (const PlannedSlice &slice) {
+    const SliceHeader &h = slice.header;
+    const auto ends = std::span (column_ends_)
+                          .subspan (static_cast<std::size_t> (h.first_column),
+                              static_cast<std::size_t> (h.columns));
+    if (slice.too_short || std::ranges::any_of (ends, [&] (int end) { return end > h.first_row; }))
+      return true;
+    std::ranges::fill (ends, h.first_row + h.rows);
+    planned.held_pixels += area_of (place_of (h));
+    return false;
+  });
+  planned.slice_count -= dropped.size ();
+  result.bad_slices += dropped.size ();
 }
 
 void
@@ -130,8 +132,6 @@ AccessUnitDecoder::crop_to_slices (PlannedView &planned)
   std::uint64_t bytes = 0;
   for (const PlannedSlice &slice : slices) {
     bytes += slice.unit.size ();
-    if (slice.too_short)
-      continue;
     const Roi place = place_of (slice.header);
     left = std::min (left, place.x);
     top = std::min (top, place.y);
@@ -148,37 +148,6 @@ AccessUnitDecoder::crop_to_slices (PlannedView &planned)
     slice.header.first_column -= left;
     slice.header.first_row -= top;
   }
-}
-
-/* Slices are sorted by their columns: one overlaps an earlier one if that reaches beyond its first
- * column in a row of both. */
-void
-AccessUnitDecoder::find_overlaps (PlannedView &planned)
-{
-  row_ends_.assign (static_cast<std::size_t> (planned.roi.height), 0);
-  const SliceHeader *last = nullptr;
-  for (std::size_t i = 0; i < planned.slice_count; i++) {
-    const PlannedSlice &slice = slices_[planned.first_slice + i];
-    const SliceHeader &h = slice.header;
-    if (slice.too_short || (last && same_place (h, *last)))
-      continue;
-    for (int &end : std::span (row_ends_).subspan (
-             static_cast<std::size_t> (h.first_row), static_cast<std::size_t> (h.rows))) {
-      planned.overlaps |= end > h.first_column;
-      end = h.first_column + h.columns;
-    }
-    planned.held_pixels += area_of (place_of (h));
-    last = &h;
-  }
-}
-
-std::uint64_t
-AccessUnitDecoder::missing_pixels (std::size_t view) const
-{
-  const PlannedView &planned = planned_[view];
-  if (!planned.overlaps || planned.coded_pixels > planned.held_pixels)
-    return planned.coded_pixels - planned.held_pixels;
-  return 1;
 }
 
 } // namespace rangecast

@@ -50,10 +50,8 @@ SliceDecoder::prepare (const SliceHeader &header)
   if (!tables)
     tables = std::make_unique<ViewTables> ();
   const View *view = rig_.find (header.view_id);
-  const auto scale = header.inverse_depth ? DepthScale::kInverse : DepthScale::kLinear;
-  const bool good = view && tables->depth.set (*view, header.depth_bits, scale).ok ();
+  const bool good = view && tables->depth.set (*view, header.depth_bits).ok ();
   tables->depth_bits = good ? header.depth_bits : 0;
-  tables->inverse = header.inverse_depth;
 }
 
 /* @return nullptr if there is no such table */
@@ -61,10 +59,7 @@ const DepthQuantiser *
 SliceDecoder::depth_of (const SliceHeader &header) const
 {
   const auto &tables = views_[header.view_id];
-  return tables && tables->depth_bits == header.depth_bits &&
-                 tables->inverse == header.inverse_depth
-             ? &tables->depth
-             : nullptr;
+  return tables && tables->depth_bits == header.depth_bits ? &tables->depth : nullptr;
 }
 
 Status
@@ -91,8 +86,6 @@ SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &hea
   bool good = depth;
   if (depth && header.profile != Profile::kPlain)
     good = memory.compact.decode (body, header, {*depth, colour}, usable, image, decoded);
-  else if (depth && (header.reference || !header.key))
-    good = memory.plain_temporal.decode (body, header, *depth, colour, usable, image, decoded);
   else if (depth)
     good = memory.plain.decode (body, header, *depth, colour, image, decoded.points);
   return good ? Status{} : damaged ();
@@ -111,8 +104,7 @@ SliceDecoder::smallest_size (const SliceHeader &header)
     case Profile::kEntropy:
       return kEntropyHeaderSize + kRansHeaderSize + !header.key;
     default:
-      return header_size_of (header) +
-             symbol_bytes (rows * static_cast<std::size_t> (header.columns));
+      return kSliceHeaderSize + symbol_bytes (rows * static_cast<std::size_t> (header.columns));
   }
 }
 

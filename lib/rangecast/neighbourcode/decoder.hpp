@@ -11,14 +11,12 @@
 #include "bitstream/unit.hpp"
 #include "compact/decoder.hpp"
 #include "plain/decoder.hpp"
-#include "plain/temporal.hpp"
 
 namespace rangecast {
 
 /** Memory to decode slices, one after another. */
 struct SliceMemory {
   PlainDecoder plain;
-  PlainTemporalDecoder plain_temporal;
   CompactDecoder compact; ///< profiles packed and entropy
 };
 
@@ -63,7 +61,6 @@ private:
   struct ViewTables {
     DepthQuantiser depth;
     int depth_bits = 0;
-    bool inverse = false;
   };
   [[nodiscard]] const DepthQuantiser *depth_of (const SliceHeader &header) const;
 

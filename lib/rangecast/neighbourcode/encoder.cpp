@@ -15,9 +15,8 @@ int
 plain_partitions (const SliceHeader &header, int max_slice_size)
 {
   const int bits = kSymbolBits + header.depth_bits + 3 * header.colour_bits;
-  /* Symbols and full pixels may each end within a byte; slices that refer to others have a longer
-   * header. */
-  const int overhead = int (kSliceHeaderSize) + 2 + header.reference;
+  /* Symbols and full pixels may each end within a byte. */
+  const int overhead = int (kSliceHeaderSize) + 2;
   const int max_columns = (max_slice_size - overhead) * 8 / bits;
   return (header.roi.width + max_columns - 1) / max_columns;
 }
@@ -52,18 +51,18 @@ validate (const EncoderSettings &s)
 {
   const auto bad = [] (const char *what) { return Status{StatusCode::kBadValue, what}; };
   if (s.depth_bits < 6 || s.depth_bits > 16)
-    return bad ("encoder: depth bits, expected 6 to 16");
+    return bad ("encoder: depth bits must be 6 to 16");
   if (s.colour_bits < 4 || s.colour_bits > 8)
-    return bad ("encoder: colour bits, expected 4 to 8");
+    return bad ("encoder: colour bits must be 4 to 8");
   if (s.depth_threshold < 0 || s.depth_threshold > 65535 || s.colour_threshold < 0 ||
       s.colour_threshold > 255)
-    return bad ("encoder: thresholds, expected 0 to 65535 for depth and 0 to 255 for colour");
+    return bad ("encoder: thresholds must be 0 to 65535 for depth and 0 to 255 for colour");
   if (s.max_slice_size < 256 || s.max_slice_size > int (kMaxUnitSize))
-    return bad ("encoder: maximum slice size, expected 256 to 65535 bytes");
+    return bad ("encoder: maximum slice size must be 256 to 65535 bytes");
   if (s.profile > Profile::kEntropy)
-    return bad ("encoder: profile, expected plain, packed or entropy");
-  if (s.depth_scale > DepthScale::kInverse)
-    return bad ("encoder: depth scale, expected linear or inverse");
+    return bad ("encoder: profile must be plain, packed or entropy");
+  if (s.temporal && s.profile == Profile::kPlain)
+    return bad ("encoder: temporal prediction needs profile packed or entropy");
   return {};
 }
 
@@ -76,10 +75,9 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
   if (Status s = validate (settings); !s.ok ())
     return s;
   const bool same_codes = same_view && settings.depth_bits == settings_.depth_bits &&
-                          settings.depth_scale == settings_.depth_scale &&
                           settings.colour_bits == settings_.colour_bits;
   if (!same_codes) {
-    if (Status s = depth_.set (view, settings.depth_bits, settings.depth_scale); !s.ok ())
+    if (Status s = depth_.set (view, settings.depth_bits); !s.ok ())
       return s;
     colour_ = ColourQuantiser (settings.colour_bits);
     plain_codes_.set (depth_, colour_);
@@ -238,7 +236,6 @@ ViewEncoder::begin (const ConstRangeImage &image, std::uint32_t frame_number)
   header_.depth_bits = static_cast<std::uint8_t> (settings_.depth_bits);
   header_.colour_bits = static_cast<std::uint8_t> (settings_.colour_bits);
   header_.profile = settings_.profile;
-  header_.inverse_depth = settings_.depth_scale == DepthScale::kInverse;
   header_.frame_number = frame_number;
   header_.capture_time_ns = image.capture_time_ns;
   if (roi.empty ()) {
@@ -275,9 +272,6 @@ ViewEncoder::code (PartitionId id, PartitionEncoder &memory)
     if (!memory.compact.code_partition (
             picture, band.plan.rows, header, partition.bytes, partition.result))
       misfits.store (true, std::memory_order_relaxed);
-  } else if (reference_.now) {
-    memory.plain_temporal.code_partition (image_, band.plan.rows, reference_, depth_, colour_,
-        plain, header, partition.bytes, partition.result);
   } else {
     memory.plain.code_partition (
         image_, plain_codes_, plain, header, partition.bytes, partition.result);

@@ -11,7 +11,6 @@
 #include "bitstream/unit.hpp"
 #include "compact/encoder.hpp"
 #include "plain/encoder.hpp"
-#include "plain/temporal.hpp"
 #include "reference_choice.hpp"
 
 namespace rangecast {
@@ -30,8 +29,7 @@ struct EncoderSettings {
   int max_slice_size = 1200; ///< bytes with all headers; 256 to 65535
   Profile profile = Profile::kPacked;
   NeighbourChoice choice = NeighbourChoice::kFirst;
-  DepthScale depth_scale = DepthScale::kLinear;
-  /** Pixels may also equal one of the frame set before. */
+  /** Pixels may also equal one of the frame set before; profiles packed and entropy. */
   bool temporal = false;
   /** Within this time every pixel is coded once without reference to earlier frame sets; 0: only in
    *  key frame sets. */
@@ -47,7 +45,6 @@ Status validate (const EncoderSettings &settings);
 /** Memory to code partitions of any view, one after another. */
 struct PartitionEncoder {
   PlainEncoder plain;
-  PlainTemporalEncoder plain_temporal;
   CompactEncoder compact; ///< profiles packed and entropy
 };
 

@@ -41,41 +41,31 @@ nearest (Nodes nodes, float radius)
 } // namespace
 
 void
-CellGrid::lay_out (std::span<const HeightRange> ranges, double slice_height_m, int columns)
+CellGrid::lay_out (const HeightRange &range, double slice_height_m, int columns)
 {
   columns_ = columns;
-  double height = 0;
-  for (const HeightRange &range : ranges)
-    height += std::max (0.0, double{range.y_max} - range.y_min);
-  const double max_slices = kMaxCells / columns - 2.0 * static_cast<double> (ranges.size ());
-  const double step = slice_height_m_ = std::max (slice_height_m, height / max_slices);
-  slices_.clear ();
-  stacks_.fill ({});
-  for (std::size_t cluster = 0; cluster < ranges.size (); cluster++) {
-    const HeightRange &range = ranges[cluster];
-    Stack &stack = stacks_[cluster];
-    stack.first_slice = static_cast<int> (slices_.size ());
-    if (!(range.y_min <= range.y_max))
-      continue;
+  const double height = std::max (0.0, double{range.y_max} - range.y_min);
+  const double step = slice_height_m_ =
+      std::max (slice_height_m, height / (kMaxCells / columns - 2.0));
+  stack_ = {};
+  if (range.y_min <= range.y_max) {
     /* Slices begin at multiples of their height from the axis' origin, not at the lowest point. */
     const double first = std::floor (range.y_min / step);
-    stack.count = static_cast<int> (std::floor (range.y_max / step) - first) + 1;
-    stack.first_number = static_cast<int> (std::clamp (first, -1e9, 1e9));
-    stack.first_y = static_cast<float> (first * step);
-    for (int i = 0; i < stack.count; i++)
-      slices_.push_back ({static_cast<int> (cluster), stack.first_number + i, {}});
+    stack_.count = static_cast<int> (std::floor (range.y_max / step) - first) + 1;
+    stack_.first_number = static_cast<int> (std::clamp (first, -1e9, 1e9));
+    stack_.first_y = static_cast<float> (first * step);
   }
-  const std::size_t cells = slices_.size () * static_cast<std::size_t> (columns);
+  counts_.assign (static_cast<std::size_t> (stack_.count), {});
+  const std::size_t cells = counts_.size () * static_cast<std::size_t> (columns);
   ends_.resize (std::max (ends_.size (), cells));
   std::fill_n (ends_.begin (), cells, 0u);
 }
 
 std::uint32_t
-CellGrid::cell_of (std::uint32_t cluster, float y, std::uint32_t column) const
+CellGrid::cell_of (float y, std::uint32_t column) const
 {
-  const Stack &stack = stacks_[cluster];
-  const int slice = static_cast<int> ((y - stack.first_y) / static_cast<float> (slice_height_m_));
-  return static_cast<std::uint32_t> (stack.first_slice + std::clamp (slice, 0, stack.count - 1)) *
+  const int slice = static_cast<int> ((y - stack_.first_y) / static_cast<float> (slice_height_m_));
+  return static_cast<std::uint32_t> (std::clamp (slice, 0, stack_.count - 1)) *
              static_cast<std::uint32_t> (columns_) +
          column;
 }
@@ -83,7 +73,7 @@ CellGrid::cell_of (std::uint32_t cluster, float y, std::uint32_t column) const
 void
 CellGrid::make_room (std::size_t size)
 {
-  const std::size_t cells = slices_.size () * static_cast<std::size_t> (columns_);
+  const std::size_t cells = counts_.size () * static_cast<std::size_t> (columns_);
   std::uint32_t total = 0;
   for (std::size_t i = 0; i < cells; i++)
     total += std::exchange (ends_[i], total);
@@ -137,7 +127,7 @@ CellGrid::make_nodes (std::size_t slice)
   const std::size_t first_cell = slice * static_cast<std::size_t> (columns_);
   std::uint32_t begin = first_cell > 0 ? ends_[first_cell - 1] : 0;
   std::uint32_t node_end = begin, entry_end = begin;
-  Counts &counts = slices_[slice].counts;
+  Counts &counts = counts_[slice];
   const auto less_radius = [] (const Point &a, const Point &b) {
     return a.radius != b.radius ? a.radius < b.radius : a.index < b.index;
   };
@@ -238,15 +228,6 @@ CellGrid::sum_along (std::size_t slice)
   });
 }
 
-/* Whether the slice so many steps further is of the same cluster. */
-bool
-CellGrid::is_beside (std::size_t slice, std::ptrdiff_t step) const
-{
-  const std::ptrdiff_t other = static_cast<std::ptrdiff_t> (slice) + step;
-  return other >= 0 && other < static_cast<std::ptrdiff_t> (slices_.size ()) &&
-         slices_[static_cast<std::size_t> (other)].cluster == slices_[slice].cluster;
-}
-
 void
 CellGrid::sum_across (std::size_t slice)
 {
@@ -277,14 +258,12 @@ CellGrid::sum_across (std::size_t slice)
 void
 CellGrid::find_held (std::size_t slice, std::span<const int> ids)
 {
-  const Slice &own = slices_[slice];
-  const Stack &stack = old_stacks_[static_cast<std::size_t> (own.cluster)];
-  const int number = own.number - stack.first_number;
-  if (number < 0 || number >= stack.count || old_columns_ != columns_ ||
+  const int number = stack_.first_number + static_cast<int> (slice) - old_stack_.first_number;
+  if (number < 0 || number >= old_stack_.count || old_columns_ != columns_ ||
       old_slice_height_m_ != slice_height_m_)
     return;
-  const Cell *cells = &old_cells_[static_cast<std::size_t> (stack.first_slice + number) *
-                                  static_cast<std::size_t> (columns_)];
+  const Cell *cells =
+      &old_cells_[static_cast<std::size_t> (number) * static_cast<std::size_t> (columns_)];
   /* Or of the cell left or right of it: which cells have points changes as the axis moves. */
   for_nodes (slice, [&] (int column, Node &node) {
     const Held *held = nullptr;
@@ -302,7 +281,6 @@ CellGrid::find_held (std::size_t slice, std::span<const int> ids)
 void
 CellGrid::choose (std::size_t slice, const OpticalAxes &optical, bool with_neighbours)
 {
-  const auto &axes = optical[static_cast<std::size_t> (slices_[slice].cluster)];
   for_nodes (slice, [&] (int column, Node &node) {
     std::array<std::int8_t, 4 * kMaxLayers> around;
     std::size_t count = 0;
@@ -327,7 +305,7 @@ CellGrid::choose (std::size_t slice, const OpticalAxes &optical, bool with_neigh
     node.next = static_cast<std::int8_t> (std::countr_zero (node.competing));
     for (std::uint64_t rest = node.competing; rest; rest &= rest - 1) {
       const auto view = static_cast<std::int8_t> (std::countr_zero (rest));
-      const auto &axis = axes[static_cast<std::size_t> (view)];
+      const auto &axis = optical[static_cast<std::size_t> (view)];
       const auto agreeing = std::count (around.begin (), around.begin () + count, view);
       const float score = std::abs (node.tangent[1] * axis[0] - node.tangent[0] * axis[1]) +
                           (view == node.held ? kHysteresis : 0) +
@@ -343,13 +321,13 @@ CellGrid::choose (std::size_t slice, const OpticalAxes &optical, bool with_neigh
 void
 CellGrid::remember (std::span<const int> ids)
 {
-  for (std::size_t slice = 0; slice < slices_.size (); slice++)
+  for (std::size_t slice = 0; slice < counts_.size (); slice++)
     for_nodes (slice, [&] (int, Node &node) {
       old_nodes_[static_cast<std::size_t> (&node - nodes_.data ())] = {
           node.radius, ids[static_cast<std::size_t> (node.winner)]};
     });
   std::swap (cells_, old_cells_);
-  old_stacks_ = stacks_;
+  old_stack_ = stack_;
   old_columns_ = columns_;
   old_slice_height_m_ = slice_height_m_;
 }
@@ -359,7 +337,7 @@ CellGrid::remember (std::span<const int> ids)
 CellGrid::Counts
 CellGrid::decide (const OpticalAxes &optical, std::span<const int> ids, int threads)
 {
-  const std::size_t count = slices_.size ();
+  const std::size_t count = counts_.size ();
   in_parallel (count, threads, [&] (std::size_t s) {
     make_nodes (s);
     find_tangents (s);
@@ -375,7 +353,7 @@ CellGrid::decide (const OpticalAxes &optical, std::span<const int> ids, int thre
         [&] (std::size_t s) { choose (2 * s + sweep % 2, optical, true); });
   Counts sum;
   for (std::size_t s = 0; s < count; s++) {
-    Counts &counts = slices_[s].counts;
+    Counts &counts = counts_[s];
     for_nodes (s, [&] (int, const Node &node) {
       counts.held += node.held >= 0;
       counts.changed += node.held >= 0 && node.held != node.winner;
@@ -392,7 +370,7 @@ CellGrid::decide (const OpticalAxes &optical, std::span<const int> ids, int thre
 void
 CellGrid::reset ()
 {
-  old_stacks_.fill ({});
+  old_stack_ = {};
 }
 
 int

@@ -7,14 +7,13 @@
 #include <vector>
 
 #include "../geometry/range_image.hpp"
-#include "clusters.hpp"
 
 namespace rangecast {
 
-/** All cylinders together have no more cells; slices become higher where points would need more. */
+/** The cylinder has no more cells; slices become higher where points would need more. */
 inline constexpr int kMaxCells = 1 << 21;
 
-/** The points of a frame set in the cells of some cylinders, one for each cluster, and the view
+/** The points of a frame set in the cells of a cylinder, and the view
  *  that wins each surface of a cell. Keeps its memory from frame to frame: 100 bytes a point, 20 a
  *  cell.
  *
@@ -35,13 +34,13 @@ class CellGrid {
 public:
   static constexpr std::uint32_t kNoNode = UINT32_MAX;
 
-  /** A point in the coordinates of its cylinder, metres. */
+  /** A point in the coordinates of the cylinder, metres. */
   struct Point {
     float radius, x, z;
     std::uint32_t index; ///< of the point in the cloud
     std::uint32_t view;  ///< number of the image in the frame set, not its view-id
   };
-  /** Heights of points on a cylinder, metres; none if y_min > y_max. */
+  /** Heights of points on the cylinder, metres; none if y_min > y_max. */
   struct HeightRange {
     float y_min, y_max;
   };
@@ -49,12 +48,12 @@ public:
     std::uint64_t cells = 0, shared = 0; ///< with points; with points of more than one view
     std::uint64_t held = 0, changed = 0; ///< nodes that had a winner before; that have another now
   };
-  /** x, z of each image's optical axis in each cluster's cylinder. */
-  using OpticalAxes = std::array<std::array<std::array<float, 2>, kMaxViews>, kMaxClusters>;
+  /** x, z of each image's optical axis in the cylinder's coordinates. */
+  using OpticalAxes = std::array<std::array<float, 2>, kMaxViews>;
 
-  /** Cuts the cylinders into slices. @param ranges  heights of each cluster's points */
-  void lay_out (std::span<const HeightRange> ranges, double slice_height_m, int columns);
-  [[nodiscard]] std::uint32_t cell_of (std::uint32_t cluster, float y, std::uint32_t column) const;
+  /** Cuts the cylinder into slices. @param range  heights of the points */
+  void lay_out (const HeightRange &range, double slice_height_m, int columns);
+  [[nodiscard]] std::uint32_t cell_of (float y, std::uint32_t column) const;
 
   /** Counts each point, to make room, then takes them in the order of the cloud.
    *  @param size  of the cloud, unused elements included */
@@ -74,17 +73,13 @@ public:
     const std::uint32_t node = node_of_[point];
     return node == kNoNode ? -1 : nodes_[node].winner;
   }
-  [[nodiscard]] int slices () const { return static_cast<int> (slices_.size ()); }
+  [[nodiscard]] int slices () const { return stack_.count; }
   /** The view-id of the winner of a cell's outermost surface; -1 without points. */
   [[nodiscard]] int cell_winner (int slice, int column) const;
 
 private:
-  struct Slice {
-    int cluster = 0, number = 0; /* number: floor (height / slice height) */
-    Counts counts;
-  };
-  struct Stack { /* the slices of a cluster */
-    int first_slice = 0, count = 0, first_number = 0;
+  struct Stack {                     /* the slices */
+    int count = 0, first_number = 0; /* number: floor (height / slice height) */
     float first_y = 0;
   };
   struct Node {
@@ -116,7 +111,11 @@ private:
     const Cell &c = cell (slice, (column + columns_) % columns_);
     return {nodes_.data () + c.first, c.count};
   }
-  [[nodiscard]] bool is_beside (std::size_t slice, std::ptrdiff_t step) const;
+  [[nodiscard]] bool is_beside (std::size_t slice, std::ptrdiff_t step) const
+  {
+    const std::ptrdiff_t other = static_cast<std::ptrdiff_t> (slice) + step;
+    return other >= 0 && other < stack_.count;
+  }
   void make_nodes (std::size_t slice);
   void add_node (std::uint32_t from, std::uint32_t to, std::uint32_t &entry_end, Cell &cell);
   void find_tangents (std::size_t slice);
@@ -130,8 +129,8 @@ private:
 
   int columns_ = 0;
   double slice_height_m_ = 0;
-  std::vector<Slice> slices_;
-  std::array<Stack, kMaxClusters> stacks_{};
+  Stack stack_;
+  std::vector<Counts> counts_;      /* of each slice */
   std::vector<std::uint32_t> ends_; /* of each cell in points_ */
   std::vector<Point> points_;
   std::vector<Cell> cells_;
@@ -142,7 +141,7 @@ private:
   /* Of the frame before. */
   int old_columns_ = 0;
   double old_slice_height_m_ = 0;
-  std::array<Stack, kMaxClusters> old_stacks_{};
+  Stack old_stack_;
   std::vector<Cell> old_cells_;
   std::vector<Held> old_nodes_;
 };

@@ -44,13 +44,11 @@ check (const CylinderSettings &settings)
 {
   const auto bad = [] (const char *what) { return Status{StatusCode::kBadValue, what}; };
   if (!(settings.slice_height_m >= 0.0002 && settings.slice_height_m <= 10))
-    return bad ("cylinder: slice height, expected 0.0002 to 10 metres");
+    return bad ("cylinder: slice height must be 0.0002 to 10 metres");
   if (settings.columns < 8 || settings.columns > 3600)
-    return bad ("cylinder: columns, expected 8 to 3600");
+    return bad ("cylinder: columns must be 8 to 3600");
   if (!(settings.overlap >= 0 && settings.overlap <= kMaxOverlap))
-    return bad ("cylinder: overlap, expected 0 to 16 pixels");
-  if (settings.max_clusters < 1 || settings.max_clusters > kMaxClusters)
-    return bad ("cylinder: clusters, expected 1 to 8");
+    return bad ("cylinder: overlap must be 0 to 16 pixels");
   return {};
 }
 
@@ -66,8 +64,8 @@ CylinderFilter::set_rig (const Rig &rig)
       return status;
     for (const View &view : rig.views) {
       if (!view.is_range_view ())
-        return {StatusCode::kBadValue,
-            "rig: view " + std::to_string (view.id) + " is not rectified, expected a range view"};
+        return {StatusCode::kBadValue, "rig: view " + std::to_string (view.id) +
+                                           " is not rectified: stereodepth makes range views"};
       rig_rays_[view.id] = PixelRays (view);
       rig_lookups_[view.id] = PixelLookup (view);
       rig_views_ |= std::uint64_t{1} << view.id;
@@ -79,8 +77,7 @@ CylinderFilter::set_rig (const Rig &rig)
 void
 CylinderFilter::reset ()
 {
-  for (AxisTracker &tracker : trackers_)
-    tracker.reset ();
+  tracker_.reset ();
   grid_.reset ();
   decided_ = false;
 }
@@ -102,123 +99,60 @@ CylinderFilter::find_cameras (std::span<const RangeImage> images)
   return {};
 }
 
-/* Gives each cluster the slot that it had in the frame before: the nearest pair of a cluster and a
- * slot first, if they are less than half a metre apart; the other clusters get unused slots. */
 void
-CylinderFilter::choose_slots (const std::array<Axis, kMaxClusters> &measured, int clusters)
+CylinderFilter::choose_axis (const CylinderSettings &settings, Axis &axis)
 {
-  constexpr double kFar = 0.5;
-  slots_.fill (-1);
-  unsigned taken = 0;
-  const auto assign = [&] (int cluster, int slot) {
-    slots_[cluster] = slot;
-    taken |= 1u << slot;
-  };
-  for (int pair = 0; pair < clusters; pair++) {
-    double nearest = kFar;
-    int best_cluster = -1, best_slot = -1;
-    for (int cluster = 0; cluster < clusters; cluster++)
-      for (int slot = 0; slot < kMaxClusters; slot++) {
-        if (slots_[cluster] >= 0 || (taken >> slot & 1) || !trackers_[slot].started ())
-          continue;
-        const double distance =
-            norm (trackers_[slot].axis ().position - measured[cluster].position);
-        if (distance < nearest)
-          nearest = distance, best_cluster = cluster, best_slot = slot;
-      }
-    if (best_cluster >= 0)
-      assign (best_cluster, best_slot);
-  }
-  for (int slot = 0; slot < kMaxClusters; slot++)
-    if (!(taken >> slot & 1))
-      trackers_[slot].reset ();
-  for (int cluster = 0, slot = 0; cluster < clusters; cluster++) {
-    while (slots_[cluster] < 0 && (taken >> slot & 1))
-      slot++;
-    if (slots_[cluster] < 0)
-      assign (cluster, slot);
-  }
-}
-
-/* Finds the clusters and the axis of each. */
-void
-CylinderFilter::choose_axes (const CylinderSettings &settings, CylinderResult &result)
-{
-  const bool world = settings.axis == AxisMode::kWorld;
-  result.clusters = clusters_.find (cloud_, world ? 1 : settings.max_clusters);
-  if (world) {
-    result.axis = axes_[0] = {};
-    slots_[0] = 0;
+  if (settings.axis == AxisMode::kWorld)
     return;
-  }
   const auto parts = cloud_.parts ();
   in_parallel (parts.size (), settings.threads, [&] (std::size_t i) {
-    moments_[i].fill ({});
+    moments_[i] = {};
     for (std::size_t k = parts[i].begin; k < parts[i].end; k++)
-      moments_[i][clusters_.cluster_of (cloud_.x[k], cloud_.z[k])].add (
-          cloud_.x[k], cloud_.y[k], cloud_.z[k]);
+      moments_[i].add (cloud_.x[k], cloud_.y[k], cloud_.z[k]);
   });
-  std::array<Axis, kMaxClusters> measured;
-  for (int cluster = 0; cluster < result.clusters; cluster++) {
-    Moments all;
-    for (std::size_t i = 0; i < parts.size (); i++)
-      all += moments_[i][static_cast<std::size_t> (cluster)];
-    measured[cluster] = axis_of_points (settings.axis, all, {rays_.data (), parts.size ()});
-  }
-  choose_slots (measured, result.clusters);
-  for (int cluster = 0; cluster < result.clusters; cluster++)
-    axes_[slots_[cluster]] = trackers_[slots_[cluster]].follow (measured[cluster]);
-  result.axis = axes_[slots_[0]];
+  Moments all;
+  for (std::size_t i = 0; i < parts.size (); i++)
+    all += moments_[i];
+  axis = tracker_.follow (axis_of_points (settings.axis, all, {rays_.data (), parts.size ()}));
 }
 
-/* Moves the points to the coordinates of their cluster's cylinder, and into its cells. */
+/* Moves the points to the coordinates of the cylinder, and into its cells. */
 void
-CylinderFilter::fill_grid (const CylinderSettings &settings, int clusters)
+CylinderFilter::fill_grid (const CylinderSettings &settings, const Axis &axis)
 {
   const auto parts = cloud_.parts ();
-  std::array<CylinderFrame, kMaxClusters> frames;
-  for (int cluster = 0; cluster < clusters; cluster++) {
-    const int slot = slots_[cluster];
-    frames[slot] = CylinderFrame (axes_[slot]);
-    for (std::size_t i = 0; i < parts.size (); i++) {
-      float optical[3];
-      frames[slot].turn (rays_[i].optical_axis, optical);
-      optical_[slot][i] = {optical[0], optical[2]};
-    }
+  const CylinderFrame to (axis);
+  for (std::size_t i = 0; i < parts.size (); i++) {
+    float optical[3];
+    to.turn (rays_[i].optical_axis, optical);
+    optical_[i] = {optical[0], optical[2]};
   }
   radius_.resize (std::max (radius_.size (), cloud_.x.size ()));
   cell_.resize (radius_.size ());
   const float columns_per_radian = static_cast<float> (settings.columns / (2 * M_PI));
   in_parallel (parts.size (), settings.threads, [&] (std::size_t i) {
-    ranges_[i].fill (kNoHeights);
+    CellGrid::HeightRange &range = ranges_[i] = kNoHeights;
     for (std::size_t k = parts[i].begin; k < parts[i].end; k++) {
       float *p[] = {&cloud_.x[k], &cloud_.y[k], &cloud_.z[k]}, out[3];
-      const auto slot = static_cast<std::uint32_t> (slots_[clusters_.cluster_of (*p[0], *p[2])]);
-      const CylinderFrame &to = frames[slot];
       const float moved[] = {*p[0] - to.origin[0], *p[1] - to.origin[1], *p[2] - to.origin[2]};
       to.turn (moved, out);
-      for (int axis = 0; axis < 3; axis++)
-        *p[axis] = out[axis];
+      for (int a = 0; a < 3; a++)
+        *p[a] = out[a];
       radius_[k] = std::sqrt (out[0] * out[0] + out[2] * out[2]);
       const float phi = std::atan2 (out[2], out[0]);
       const int column = static_cast<int> (
           (phi < 0 ? phi + static_cast<float> (2 * M_PI) : phi) * columns_per_radian);
-      cell_[k] = slot << 16 | static_cast<std::uint32_t> (std::min (column, settings.columns - 1));
-      ranges_[i][slot].y_min = std::min (ranges_[i][slot].y_min, out[1]);
-      ranges_[i][slot].y_max = std::max (ranges_[i][slot].y_max, out[1]);
+      cell_[k] = static_cast<std::uint32_t> (std::min (column, settings.columns - 1));
+      range = {std::min (range.y_min, out[1]), std::max (range.y_max, out[1])};
     }
   });
-  std::array<CellGrid::HeightRange, kMaxClusters> all;
-  all.fill (kNoHeights);
+  CellGrid::HeightRange all = kNoHeights;
   for (std::size_t i = 0; i < parts.size (); i++)
-    for (std::size_t slot = 0; slot < kMaxClusters; slot++) {
-      all[slot].y_min = std::min (all[slot].y_min, ranges_[i][slot].y_min);
-      all[slot].y_max = std::max (all[slot].y_max, ranges_[i][slot].y_max);
-    }
+    all = {std::min (all.y_min, ranges_[i].y_min), std::max (all.y_max, ranges_[i].y_max)};
   grid_.lay_out (all, settings.slice_height_m, settings.columns);
   for (const WorldPoints::Part &part : parts)
     for (std::size_t k = part.begin; k < part.end; k++) {
-      cell_[k] = grid_.cell_of (cell_[k] >> 16, cloud_.y[k], cell_[k] & 0xffff);
+      cell_[k] = grid_.cell_of (cloud_.y[k], cell_[k]);
       grid_.count (cell_[k]);
     }
   grid_.make_room (cloud_.x.size ());
@@ -242,11 +176,11 @@ CylinderFilter::work (
       [&] (std::size_t i) { cloud_.fill (i, images[i], rays_[i]); });
   result.points_in = result.points_out = cloud_.size ();
   if (result.points_in > 0)
-    choose_axes (settings, result);
+    choose_axis (settings, result.axis);
   if (std::ranges::count_if (
           cloud_.parts (), [] (const WorldPoints::Part &part) { return part.size () > 0; }) < 2)
     return {};
-  fill_grid (settings, result.clusters);
+  fill_grid (settings, result.axis);
   result.cells = grid_.decide (optical_, {ids_.data (), images.size ()}, settings.threads);
   const DecidedFrame frame{
       images, {rays_.data (), images.size ()}, {lookups_.data (), images.size ()}, cloud_, grid_};

@@ -12,7 +12,6 @@
 #include "../geometry/world_points.hpp"
 #include "axis.hpp"
 #include "cell_grid.hpp"
-#include "clusters.hpp"
 #include "redundant_points.hpp"
 
 namespace rangecast {
@@ -27,9 +26,6 @@ struct CylinderSettings {
    *  own view before the point is cleared, 0 .. kMaxOverlap pixels of that view. 1: as far as its
    *  triangles reach, so that no hole opens. */
   double overlap = 1;
-  /** Maximum number of clusters (people who stand apart) that get a cylinder each, 1 ..
-   *  kMaxClusters; 1: one cylinder for all points, as with AxisMode::kWorld. */
-  int max_clusters = 4;
   int threads = 1; ///< views, and slices, at a time; 0 = number of cores
 };
 
@@ -38,18 +34,16 @@ struct CylinderResult {
   std::uint64_t points_in = 0;  ///< valid pixels before
   std::uint64_t points_out = 0; ///< valid pixels after
   CellGrid::Counts cells;
-  Axis axis;        ///< of the cylinder of the largest cluster
-  int clusters = 0; ///< cylinders
+  Axis axis; ///< of the cylinder
 };
 
 /** Where several views see the same surface, keeps the points of the view that faces it most
  *  directly and clears those of the others.
  *
- *  All points go onto a cylinder about the object's axis, one for each cluster of points, which is
- *  cut into cells of equal height and angle. In a cell with points of several views let T be the
- *  mean of the views' tangents in the slice, weighted by their numbers of points. The view whose
- *  optical axis has the smallest inner product with T wins; the others' points there become
- * invalid.
+ *  All points go onto a cylinder about the object's axis, which is cut into cells of equal height
+ * and angle. In a cell with points of several views let T be the mean of the views' tangents in the
+ * slice, weighted by their numbers of points. The view whose optical axis has the smallest inner
+ * product with T wins; the others' points there become invalid.
  *
  *  Beyond that published rule:
  *  - CellGrid keeps surfaces at different radii apart and winners compact and still.
@@ -75,8 +69,8 @@ public:
   Status process (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
 
-  /** The winners of the last frame set, to draw or measure them: slices of all clusters, each from
-   *  the lowest up. None if it had points of fewer than two views. */
+  /** The winners of the last frame set, to measure them: slices from the lowest up. None if it had
+   * points of fewer than two views. */
   [[nodiscard]] int cell_slices () const { return decided_ ? grid_.slices () : 0; }
   /** The view-id of the winner of a cell's outermost surface; -1 where the frame set has no points.
    */
@@ -89,16 +83,13 @@ private:
   Status work (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);
   Status find_cameras (std::span<const RangeImage> images);
-  void choose_axes (const CylinderSettings &settings, CylinderResult &result);
-  void choose_slots (const std::array<Axis, kMaxClusters> &measured, int clusters);
-  void fill_grid (const CylinderSettings &settings, int clusters);
+  void choose_axis (const CylinderSettings &settings, Axis &axis);
+  void fill_grid (const CylinderSettings &settings, const Axis &axis);
 
   std::array<PixelRays, kMaxViews> rig_rays_; /* by view-id */
   std::array<PixelLookup, kMaxViews> rig_lookups_;
   std::uint64_t rig_views_ = 0; /* bit i: view-id i is in the rig */
-  /* By slot: a cluster keeps its slot as long as it exists. */
-  std::array<AxisTracker, kMaxClusters> trackers_;
-  Clusters clusters_;
+  AxisTracker tracker_;
   AxisMode axis_mode_ = AxisMode::kPrincipal; /* of the last frame set */
   bool decided_ = false;                      /* the last frame set has winners */
 
@@ -106,14 +97,12 @@ private:
   std::array<PixelRays, kMaxViews> rays_;
   std::array<PixelLookup, kMaxViews> lookups_;
   std::array<int, kMaxViews> ids_{};
-  std::array<std::array<Moments, kMaxClusters>, kMaxViews> moments_;
-  std::array<std::array<CellGrid::HeightRange, kMaxClusters>, kMaxViews> ranges_;
-  std::array<Axis, kMaxClusters> axes_;   /* by slot */
-  std::array<int, kMaxClusters> slots_{}; /* of the clusters, the largest first */
+  std::array<Moments, kMaxViews> moments_;
+  std::array<CellGrid::HeightRange, kMaxViews> ranges_;
   CellGrid::OpticalAxes optical_;
   WorldPoints cloud_;
   std::vector<float> radius_;
-  std::vector<std::uint32_t> cell_; /* of each point; at first cluster << 16 | column */
+  std::vector<std::uint32_t> cell_; /* of each point; at first its column */
   CellGrid grid_;
   RedundantPoints redundant_;
 };

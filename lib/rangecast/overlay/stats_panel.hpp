@@ -15,7 +15,7 @@ public:
   static constexpr int kMaxLines = 8;
   static constexpr int kMaxWidth = 512; ///< pixels; longer lines are cut off
 
-  /** Draws it again. @param lines  ASCII, kMaxLines at most; further ones are left out */
+  /** Draws it again. @param lines  ASCII, kMaxLines at most; further ones are skipped */
   void draw (std::span<const std::string> lines);
   /** The last picture drawn, as large as its text; empty before the first one. */
   [[nodiscard]] ImageView<const Rgbx> picture () const { return picture_; }

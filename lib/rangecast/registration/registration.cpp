@@ -49,7 +49,7 @@ Registration::set (const View &depth, const View &colour, RegisterInto into)
         (camera->distortion[12] != 0 || camera->distortion[13] != 0))
       return {StatusCode::kUnsupported, "view " + std::to_string (camera->id) +
                                             ": tilted sensors (coefficients 13 and 14) are not "
-                                            "supported here; expected 0 for both"};
+                                            "supported here"};
   depth_ = depth;
   colour_ = colour;
   into_ = into;

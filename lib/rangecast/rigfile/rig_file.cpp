@@ -22,15 +22,15 @@ numbers (const YamlNode &node, const std::string &name, std::size_t count)
 {
   std::vector<double> values;
   if (node.type != YamlNode::Type::kList)
-    throw BadFile{name + ": expected a list of numbers"};
+    throw BadFile{name + ": is no list of numbers"};
   for (const YamlNode &item : node.items) {
     const std::optional<double> value = item.number ();
     if (!value)
-      throw BadFile{name + ": expected only numbers"};
+      throw BadFile{name + ": has something that is no number"};
     values.push_back (*value);
   }
   if (count && values.size () != count)
-    throw BadFile{name + ": expected " + std::to_string (count) + " numbers, got " +
+    throw BadFile{name + ": must have " + std::to_string (count) + " numbers, has " +
                   std::to_string (values.size ())};
   return values;
 }
@@ -43,7 +43,7 @@ number (const YamlNode &parent, const std::string &name, double default_value)
     return default_value;
   const std::optional<double> value = node.number ();
   if (!value)
-    throw BadFile{name + ": expected a number"};
+    throw BadFile{name + ": is no number"};
   return *value;
 }
 
@@ -52,7 +52,7 @@ read_pose (const YamlNode &parent, const std::string &name)
 {
   const YamlNode &node = parent[name];
   if (node.type != YamlNode::Type::kMap)
-    throw BadFile{name + ": expected a map with rotation and translation"};
+    throw BadFile{name + ": is no map with rotation and translation"};
   Pose pose;
   const auto r = numbers (node["rotation"], name + ".rotation", 9);
   std::copy (r.begin (), r.end (), pose.rotation.begin ());
@@ -78,7 +78,7 @@ read_camera (const YamlNode &parent)
   if (node.type == YamlNode::Type::kNone)
     return {};
   if (node.type != YamlNode::Type::kText)
-    throw BadFile{"camera: expected a text (a serial number stands in quotes)"};
+    throw BadFile{"camera: is no text (put a serial number in quotes)"};
   return node.text;
 }
 
@@ -89,7 +89,7 @@ read_partner (const YamlNode &parent, const char *name)
   if (node.type == YamlNode::Type::kNone)
     return {};
   if (node.type != YamlNode::Type::kMap)
-    throw BadFile{std::string (name) + ": expected a map"};
+    throw BadFile{std::string (name) + ": is no map"};
   PartnerCamera partner;
   partner.camera = read_camera (node);
   read_lens (node, partner.intrinsics, partner.distortion);
@@ -101,11 +101,11 @@ View
 read_view (const YamlNode &node)
 {
   if (node.type != YamlNode::Type::kMap)
-    throw BadFile{"expected a map"};
+    throw BadFile{"is no map"};
   View view;
   const std::optional<int> id = node["id"].integer ();
   if (!id || *id < 0 || *id >= kMaxViews)
-    throw BadFile{"id: expected an integer from 0 to " + std::to_string (kMaxViews - 1)};
+    throw BadFile{"id: must be an integer from 0 to " + std::to_string (kMaxViews - 1)};
   view.id = *id;
   if (node["name"].type == YamlNode::Type::kText)
     view.name = node["name"].text;
@@ -114,7 +114,7 @@ read_view (const YamlNode &node)
   for (double side : size)
     if (!(side >= 1 && side <= kMaxImageSide && side == std::floor (side)))
       throw BadFile{
-          "image_size: expected whole numbers from 1 to " + std::to_string (kMaxImageSide)};
+          "image_size: must be whole numbers from 1 to " + std::to_string (kMaxImageSide)};
   view.width = static_cast<int> (size[0]);
   view.height = static_cast<int> (size[1]);
   read_lens (node, view.intrinsics, view.distortion);
@@ -132,13 +132,15 @@ read_rig (const YamlNode &file)
 {
   const std::optional<int> version = file["rangecast_rig"].integer ();
   if (!version)
-    throw BadFile{"no \"rangecast_rig\" version: this is not a rig file"};
+    throw BadFile{
+        "no \"rangecast_rig\" version: this is not a rig file; `rangecast import` makes one of "
+        "other calibrations"};
   if (*version != kRigFileVersion)
-    throw BadFile{"rangecast_rig version " + std::to_string (*version) + ", expected " +
+    throw BadFile{"rangecast_rig version " + std::to_string (*version) + ", not " +
                   std::to_string (kRigFileVersion)};
   const YamlNode &views = file["views"];
   if (views.type != YamlNode::Type::kList)
-    throw BadFile{"views: expected a list"};
+    throw BadFile{"views: is no list"};
   Rig rig;
   for (const YamlNode &node : views.items) {
     if (rig.views.size () >= kMaxViews)
@@ -160,15 +162,14 @@ load_rig (const std::string &path, Rig &rig)
   std::error_code error;
   const std::filesystem::file_status there = std::filesystem::status (path, error);
   if (!std::filesystem::exists (there))
-    return {StatusCode::kNotFound, path + ": no such file; expected a rig file (YAML or JSON)"};
+    return {StatusCode::kNotFound, path + ": no such rig file"};
   if (!std::filesystem::is_regular_file (there))
-    return {StatusCode::kNotFound,
-        path + ": is a folder or a device; expected a rig file (YAML or JSON)"};
+    return {StatusCode::kNotFound, path + ": is a folder or a device, no rig file"};
   if (std::filesystem::file_size (path, error) > kMaxRigFileSize || error)
-    return {StatusCode::kBadData, path + ": expected a rig file of at most 4 MiB"};
+    return {StatusCode::kBadData, path + ": is larger than 4 MiB"};
   YamlNode file;
   if (Status s = read_yaml (path, kMaxRigFileSize, file); !s.ok ())
-    return {s.code (), s.message () + "; expected a rig file (YAML or JSON)"};
+    return {s.code (), s.message () + "; is it a rig file?"};
   Rig loaded;
   try {
     loaded = read_rig (file);

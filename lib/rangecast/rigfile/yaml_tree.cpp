@@ -23,7 +23,7 @@ std::string
 unpacked (const std::string &path, gzFile file, std::uint64_t max_bytes)
 {
   if (!gzdirect (file) && !path.ends_with (".gz"))
-    throw BadYaml{"is compressed; expected a name that ends in .gz"};
+    throw BadYaml{"is compressed; give it a name that ends in .gz"};
   std::string text;
   for (int got = 1; got > 0;) {
     constexpr unsigned kBlock = 65536;
@@ -145,7 +145,7 @@ private:
     if (++nodes_ > kMaxYamlNodes)
       refuse ("more than " + std::to_string (kMaxYamlNodes) + " values");
     if (event_.type == YAML_ALIAS_EVENT)
-      refuse ("an alias; expected the value itself");
+      refuse ("an alias; write the value itself");
     if (event_.type == YAML_SCALAR_EVENT)
       return scalar (node);
     if (depth > kMaxYamlDepth)
@@ -155,7 +155,7 @@ private:
     while (next () != (map ? YAML_MAPPING_END_EVENT : YAML_SEQUENCE_END_EVENT)) {
       if (map) {
         if (event_.type != YAML_SCALAR_EVENT)
-          refuse ("expected the name of a field");
+          refuse ("a field without a name");
         node.names.push_back (text ());
         next ();
       }

@@ -25,8 +25,6 @@ struct Code {
 };
 constexpr Code kCodes[kFields] = {
     {0, 257}, {0, 257}, {0, 257}, {1, 255}, {0, 1}, {0, 16}, {0, 65535}, {0, 1}};
-constexpr std::uint32_t kMaxAdaptMs = 10'000;
-constexpr int kAdaptSteps = 1000; // of 10 ms
 
 std::string
 image_path (const std::string &path, int id)
@@ -49,7 +47,7 @@ BackgroundModel::reset (int width, int height)
   pixels_.assign (pixels, {});
   sums_.assign (pixels, {});
   inferred_.assign (pixels, 0);
-  taught_ms_.clear ();
+  adapt_base_ns_ = UINT64_MAX;
 }
 
 Status
@@ -60,89 +58,101 @@ BackgroundModel::learn (const ConstRangeImage &image)
     return {StatusCode::kBadSize, "view " + std::to_string (image.view_id) +
                                       ": the ROI does not lie in the image of the background"};
   for (int y = 0; y < roi.height; y++) {
-    const std::size_t first = static_cast<std::size_t> (roi.y + y) * width_ + roi.x;
+    Sums *sums = &sums_[static_cast<std::size_t> (roi.y + y) * width_ + roi.x];
     const Rgbx *colour = image.colour.row (y);
     const std::uint16_t *depth = image.depth.row (y);
-    for (int x = 0; x < roi.width; x++) {
-      BackgroundPixel &pixel = pixels_[first + x];
-      Sums &sums = sums_[first + x];
-      const float rgb[] = {float (colour[x].r), float (colour[x].g), float (colour[x].b)};
-      const float weight = 1.f / float (++sums.colour_n);
-      for (int c = 0; c < 3; c++) {
-        const float before = rgb[c] - pixel.mean[c];
-        pixel.mean[c] += before * weight;
-        sums.colour_m2 += before * (rgb[c] - pixel.mean[c]);
-      }
-      if (depth[x] != kInvalidDepth) {
-        pixel.nearest = sums.depth_n ? std::min (pixel.nearest, float (depth[x])) : depth[x];
-        const float before = depth[x] - pixel.depth;
-        pixel.depth += before / float (++sums.depth_n);
-        sums.depth_m2 += before * (depth[x] - pixel.depth);
-      }
-    }
+    for (int x = 0; x < roi.width; x++)
+      sums[x].add ({float (colour[x].r), float (colour[x].g), float (colour[x].b)}, depth[x]);
   }
   frames_++;
   return {};
 }
 
 void
-BackgroundModel::finish ()
+BackgroundModel::Sums::add (const float (&rgb)[3], std::uint16_t depth)
 {
-  for (std::size_t i = 0; i < pixels_.size (); i++) {
-    BackgroundPixel &pixel = pixels_[i];
-    const Sums &sums = sums_[i];
-    pixel.spread = sums.colour_n ? std::sqrt (sums.colour_m2 / (3.f * float (sums.colour_n))) : -1;
-    pixel.depth_spread = sums.depth_n ? std::sqrt (sums.depth_m2 / float (sums.depth_n)) : 0;
-    pixel.depth_share = frames_ ? float (sums.depth_n) / float (frames_) : 0;
+  const float weight = 1.f / float (++colour_n);
+  for (int c = 0; c < 3; c++) {
+    const float before = rgb[c] - pixel.mean[c];
+    pixel.mean[c] += before * weight;
+    colour_m2 += before * (rgb[c] - pixel.mean[c]);
   }
-  measure_noise ();
-  infer_depth ();
+  if (depth == kInvalidDepth)
+    return;
+  pixel.nearest = depth_n ? std::min (pixel.nearest, float (depth)) : depth;
+  const float before = depth - pixel.depth;
+  pixel.depth += before / float (++depth_n);
+  depth_m2 += before * (depth - pixel.depth);
+}
+
+BackgroundPixel
+BackgroundModel::Sums::result () const
+{
+  BackgroundPixel all = pixel;
+  all.spread = colour_n ? std::sqrt (colour_m2 / (3.f * float (colour_n))) : -1;
+  all.depth_spread = depth_n ? std::sqrt (depth_m2 / float (depth_n)) : 0;
+  all.depth_share = colour_n ? float (depth_n) / float (colour_n) : 0;
+  return all;
 }
 
 void
-BackgroundModel::move_towards (BackgroundPixel &pixel, const Rgbx &colour, std::uint16_t depth,
-    const float *to_model, float share)
+BackgroundModel::finish ()
 {
-  const float rgb[] = {float (colour.r), float (colour.g), float (colour.b)};
-  for (int c = 0; c < 3; c++)
-    pixel.mean[c] += share * (std::min (rgb[c] * to_model[c], 255.f) - pixel.mean[c]);
-  if (depth == kInvalidDepth || pixel.depth_share <= 0)
-    return;
-  const float step = share * (float (depth) - pixel.depth);
-  pixel.depth += step;
-  pixel.nearest += step;
+  std::ranges::transform (sums_, pixels_.begin (), &Sums::result);
+  sums_.assign (sums_.size (), {});
+  measure_noise ();
+  infer_depth ();
 }
 
 void
 BackgroundModel::adapt (const ConstRangeImage &image, ImageView<const std::uint8_t> teach,
     const std::array<float, 3> &light, double adapt_time_s)
 {
+  constexpr double kLearnAgainS = 3;
+  constexpr int kMinImages = 5;
   const Roi &roi = image.roi;
   if (!covers (roi))
     return;
-  if (taught_ms_.empty () || image.capture_time_ns < adapt_base_ns_) {
-    taught_ms_.assign (pixels_.size (), 0);
+  if (image.capture_time_ns < adapt_base_ns_) {
+    sums_.assign (sums_.size (), {});
     adapt_base_ns_ = image.capture_time_ns;
   }
   const auto now_ms = static_cast<std::uint32_t> (
       std::min<std::uint64_t> ((image.capture_time_ns - adapt_base_ns_) / 1'000'000, UINT32_MAX));
-  std::array<float, kAdaptSteps + 1> shares; // by the time since a pixel's last update
-  for (int i = 0; i <= kAdaptSteps; i++)
-    shares[i] = float (
-        std::min (1 - std::exp (-i * (kMaxAdaptMs * 1e-3 / kAdaptSteps) / adapt_time_s), 0.5));
-  const float to_model[] = {1 / light[0], 1 / light[1], 1 / light[2]};
   for (int y = 0; y < roi.height; y++) {
     const std::size_t first = static_cast<std::size_t> (roi.y + y) * width_ + roi.x;
     const std::uint8_t *use = teach.row (y);
     const Rgbx *colour = image.colour.row (y);
     const std::uint16_t *depth = image.depth.row (y);
     for (int x = 0; x < roi.width; x++) {
-      if (!use[x])
+      Sums &sums = sums_[first + x];
+      if (!use[x] || (sums.colour_n > 0 && depth[x] == kInvalidDepth)) /* depth tells a change */
         continue;
-      const std::uint32_t since = now_ms - std::min (now_ms, taught_ms_[first + x]);
-      taught_ms_[first + x] = now_ms;
-      move_towards (pixels_[first + x], colour[x], depth[x], to_model,
-          shares[std::min (since, kMaxAdaptMs) * kAdaptSteps / kMaxAdaptMs]);
+      BackgroundPixel &pixel = pixels_[first + x];
+      const float rgb[] = {std::min (float (colour[x].r) / light[0], 255.f),
+          std::min (float (colour[x].g) / light[1], 255.f),
+          std::min (float (colour[x].b) / light[2], 255.f)};
+      const double since_s = (now_ms - std::min (now_ms, sums.since_ms)) * 1e-3;
+      if (use[x] != kDifferent) {
+        const auto share = float (std::min (since_s / adapt_time_s, 0.5));
+        for (int c = 0; c < 3; c++)
+          pixel.mean[c] += share * (rgb[c] - pixel.mean[c]);
+        if (depth[x] != kInvalidDepth && pixel.depth_share > 0) {
+          const float step = share * (float (depth[x]) - pixel.depth);
+          pixel.depth += step;
+          pixel.nearest += step;
+        }
+        sums = {};
+        sums.since_ms = now_ms;
+        continue;
+      }
+      if (sums.colour_n == 0)
+        sums.since_ms = now_ms;
+      sums.add (rgb, depth[x]);
+      if (sums.colour_n < kMinImages || since_s < kLearnAgainS)
+        continue;
+      pixel = sums.result ();
+      sums = {};
     }
   }
 }

@@ -26,6 +26,9 @@ struct BackgroundPixel {
  * that range images with any ROI can be compared. */
 class BackgroundModel {
 public:
+  /** Value in adapt()'s mask: the background differs from the model. */
+  static constexpr std::uint8_t kDifferent = 1;
+
   /** Discards what was learnt. @param width, height  of the view's full image, pixels */
   void reset (int width, int height);
 
@@ -53,11 +56,10 @@ public:
   /** Computes means and standard deviations. */
   void finish ();
 
-  /** Adapts to slow changes: moves the means of some pixels towards an image by the fraction
-   *  1 - exp (-t / adapt_time_s), at most 1/2, where t <= 10 s is the time since the pixel's last
-   *  update. Pixels outside of the ROI catch up later.
+  /** Moves pixels that match the model towards the image, with the time constant `adapt_time_s`.
+   * Learns those again that have been different for three seconds, in at least five images.
    *  @param image  ignored if its ROI is not inside the full image; its capture time is used
-   *  @param teach  of the size of the ROI: not 0 where the image shows the background
+   *  @param teach  of the size of the ROI: see Segmenter::quiet()
    *  @param light  brightness of the image by channel relative to the model, which keeps its own
    *  @param adapt_time_s  > 0 */
   void adapt (const ConstRangeImage &image, ImageView<const std::uint8_t> teach,
@@ -80,22 +82,24 @@ private:
       const std::string &, std::vector<std::pair<int, BackgroundModel>> &);
 
   struct Sums {
+    BackgroundPixel pixel; // with means and minimum so far
     float colour_m2 = 0, depth_m2 = 0;
     int colour_n = 0, depth_n = 0;
+    std::uint32_t since_ms = 0; // of the first one, or when the pixel last matched
+
+    void add (const float (&rgb)[3], std::uint16_t depth);
+    [[nodiscard]] BackgroundPixel result () const;
   };
   Status read (const std::string &path, int frames);
   void measure_noise ();
   void infer_depth ();
-  static void move_towards (BackgroundPixel &pixel, const Rgbx &colour, std::uint16_t depth,
-      const float *to_model, float share);
 
   int width_ = 0, height_ = 0, frames_ = 0;
   double depth_noise_ = 0;
   std::vector<BackgroundPixel> pixels_;
   std::vector<Sums> sums_;
   std::vector<float> inferred_;
-  std::vector<std::uint32_t> taught_ms_; // last update since adapt_base_ns_, by pixel, or empty
-  std::uint64_t adapt_base_ns_ = 0;
+  std::uint64_t adapt_base_ns_ = UINT64_MAX;
 };
 
 /** @name The file form

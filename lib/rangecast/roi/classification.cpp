@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstring>
+#include <numeric>
 
 #include "../base/simd.hpp"
 
@@ -17,6 +17,8 @@ namespace {
 /* Fraction of frames with valid depth from which the background's depth is known; below it, the
  * scene there is out of range. From kSteadyShare on it is reliable. */
 constexpr float kKnownShare = 0.05f, kSteadyShare = 0.5f;
+/* A difference counts from this number of standard deviations of the background's noise on. */
+constexpr float kNoiseFactor = 4;
 /* Factor on the limits of shadow and highlight where depth matches the background. */
 constexpr float kConfirmed = 2;
 /* A pixel matches the background within this number of standard deviations (at least kMinSpread
@@ -95,10 +97,11 @@ load_fields (const BackgroundPixel *pixels, typename Lanes::F (&fields)[kFields]
   }
 }
 
-/* Result of comparing depth with the background's: -1 or 0 in each lane, at most one of them -1.
- * `somewhere`: valid depth where the background had none. */
+/* Result of comparing depth with the background's: -1 or 0 in each lane. `somewhere`: valid depth
+ * where the background had none. `background` includes `behind`, and leaves out what lies `before`
+ * the mean, in the noise: of a wall the smaller part, of a person before it most. */
 template <typename Lanes> struct Place {
-  typename Lanes::I background, somewhere, nearer;
+  typename Lanes::I background, before, behind, somewhere, nearer;
 };
 
 template <typename Lanes>
@@ -110,23 +113,26 @@ find_place (const typename Lanes::F &depth, const typename Lanes::F (&field)[kFi
   using I = typename Lanes::I;
   const I valid = depth > 0, known = field[kShare] >= kKnownShare;
   const F nearness = F{} + limits.nearness;
-  const F doubt =
-      greater (nearness, F (limits.noise_factor * limits.depth_noise * inferred * inferred));
-  const I none = inferred <= 0, before = depth < inferred - doubt;
+  const F doubt = greater (nearness, F (kNoiseFactor * limits.depth_noise * inferred * inferred));
+  const I none = inferred <= 0, front = depth < inferred - doubt;
   /* Where stereo alternates between two surfaces, their distance is not noise: only depth in front
    * of the nearer one is foreground. Stereo is stable without texture, too, but its error grows
    * when a shadow adds texture. */
   const F sensor = limits.depth_noise * field[kDepth] * field[kDepth],
-          wavers = field[kDepth] - field[kNearest] + limits.noise_factor * sensor,
-          steady = greater (greater (nearness, F (limits.noise_factor * sensor)),
-              lesser (F (limits.noise_factor * field[kDepthSpread]), wavers));
+          wavers = field[kDepth] - field[kNearest] + kNoiseFactor * sensor,
+          steady = greater (greater (nearness, F (kNoiseFactor * sensor)),
+              lesser (F (kNoiseFactor * field[kDepthSpread]), wavers));
   /* Learnt from few frames: twice. */
   const F noise = field[kShare] < kSteadyShare ? steady * 2 : steady;
-  const I nearer = depth < field[kDepth] - noise;
-  place.somewhere = valid & ~known & (none | before);
+  const I nearer = depth < field[kDepth] - noise, farther = depth >= field[kDepth] + noise;
+  place.somewhere = valid & ~known & (none | front);
   place.nearer = valid & known & nearer;
-  place.background = valid & ((known & ~nearer & (depth < field[kDepth] + noise)) |
-                                 (~known & ~none & ~before & (depth < inferred + doubt)));
+  /* Through the background nobody is seen: it has gone. */
+  place.behind = valid & (field[kShare] >= kSteadyShare) & farther;
+  place.background =
+      place.behind | (valid & ((known & ~nearer & ~farther) | (~known & ~none & ~front)));
+  place.before = depth < (known ? field[kDepth] - greater (nearness, F (noise / kNoiseFactor))
+                                : inferred - nearness);
 }
 
 /* Comparison of a colour with the background's under the current light. */
@@ -190,6 +196,7 @@ classify_lanes (
   Place<Lanes> place;
   find_place<Lanes> (Lanes::at (depths + i), field, Lanes::at (in.inferred + i), limits, place);
   place.background &= use_depth;
+  place.behind &= use_depth;
   place.somewhere &= use_depth;
   place.nearer &= use_depth;
   Comparison<Lanes> c;
@@ -198,8 +205,8 @@ classify_lanes (
     Lanes::keep_where (*value, compared);
 
   const F same = kSameFactor * kChannels * greater (field[kSpread], F (F{} + kMinSpread)),
-          chroma = greater (F (F{} + limits.colour), F (limits.noise_factor * field[kSpread])),
-          noise = limits.noise_factor * c.noise;
+          chroma = greater (F (F{} + limits.colour), F (kNoiseFactor * field[kSpread])),
+          noise = kNoiseFactor * c.noise;
   const I alike = ~unseen & (c.distortion < same * same),
           hue = unseen | (c.distortion > chroma * chroma);
   const float over = limits.highlight - 1;
@@ -216,14 +223,16 @@ classify_lanes (
   const I textureless = burnt_out & (I{} - int (limits.doubt_depth)),
           doubtful = place.somewhere | (place.nearer & textureless),
           nearer = (place.nearer & ~textureless) | (doubtful & ~(quiet & use_colour));
-  Lanes::at (group.other + i) = use_colour & (hue | light);
+  Lanes::at (group.other + i) = use_colour & (hue | light) & ~place.behind;
   Lanes::at (group.nearer + i) = nearer;
   Lanes::at (group.same + i) = alike;
   const I matches = place.background ? I{} + kYes : I{} + kPerhaps;
-  Lanes::at (group.calm + i) = matches & ~(nearer | (use_colour & ~quiet));
+  Lanes::at (group.calm + i) = matches & ~(nearer | place.behind | (use_colour & ~quiet));
   Lanes::at (group.lit + i) = light & ~hue;
   Lanes::at (group.blank + i) = burnt_out | (tolerance > kVague);
-  Lanes::at (group.placed + i) = place.background;
+  Lanes::at (group.placed + i) = place.background & (place.behind      ? I{} + 1
+                                                        : place.before ? I{} + kPerhaps
+                                                                       : I{} + kYes);
   Lanes::at (group.seen + i) = field[kShare] >= kSteadyShare;
   Lanes::at (group.ratio + i) = c.brightness;
   Lanes::at (group.tolerance + i) = tolerance;
@@ -286,59 +295,15 @@ classify (const ClassInput &in, int n, const ClassLimits &limits, const ClassRow
   classify_group<Lanes> ({background, inferred, depth, colour}, n - x, limits, part (x));
 }
 
-/* Bins of the logarithm of ratios from 1/4 to 4. Finds them without logarithms, of which the first
- * bits of a number are nearly one. */
-class LogBins {
-public:
-  static constexpr int kPerOctave = 32, kCount = 4 * kPerOctave;
-
-  LogBins ()
-  {
-    const auto bin_of = [] (std::uint32_t bits) {
-      return static_cast<int> (std::floor (std::log2 (std::bit_cast<float> (bits)) * kPerOctave)) +
-             kCount / 2;
-    };
-    for (std::uint32_t i = 0; i < kPrefixes; i++) {
-      const std::uint32_t begin = (kFirstBin + i) << kShift, end = begin + (1U << kShift);
-      const int bin = bin_of (begin);
-      std::uint32_t low = begin, high = end; /* searches for the next bin's first number */
-      while (low < high)
-        if (const std::uint32_t middle = low + (high - low) / 2; bin_of (middle) > bin)
-          high = middle;
-        else
-          low = middle + 1;
-      bins_[i] = {bin, low};
-    }
-  }
-  /** @return -1 outside */
-  [[nodiscard]] int find (float ratio) const
-  {
-    const auto bits = std::bit_cast<std::uint32_t> (ratio);
-    const std::uint32_t i = (bits >> kShift) - kFirstBin;
-    return i < kPrefixes ? bins_[i].first + (bits >= bins_[i].next) : -1;
-  }
-
-private:
-  /* Numbers with the same first bits, so many that they are in two bins at most. */
-  static constexpr int kBits = 6, kShift = 23 - kBits;
-  static_assert (1 << kBits > 1.5 * kPerOctave);
-  static constexpr std::uint32_t kFirstBin = std::bit_cast<std::uint32_t> (0.25f) >> kShift,
-                                 kPrefixes = 4 << kBits;
-  struct Bins {
-    int first;
-    std::uint32_t next; /* bits of the second one's first number */
-  };
-  std::array<Bins, kPrefixes> bins_;
-};
-
-/* Histogram of brightness ratios, to find the mode. */
+/* Histogram of brightness ratios from 1/4 to 4, to find the mode. Bins are the first bits of a
+ * number, which are nearly its logarithm. */
 class RatioPeak {
 public:
   void add (float ratio)
   {
-    static const LogBins bins;
-    if (const int bin = bins.find (ratio); bin >= 0)
-      counts_[static_cast<std::size_t> (bin)]++;
+    if (const std::uint32_t i = (std::bit_cast<std::uint32_t> (ratio) >> kShift) - kFirst;
+        i < kBins)
+      counts_[i]++;
     all_++;
   }
   /** @return the mode if at least a sixth of all samples share it, else the fallback */
@@ -346,23 +311,21 @@ public:
   {
     constexpr int kReach = 3;
     int best = 0, best_sum = 0;
-    for (int i = kReach; i < kBins - kReach; i++) {
-      int sum = 0;
-      for (int k = -kReach; k <= kReach; k++)
-        sum += counts_[i + k];
-      if (sum > best_sum)
+    for (int i = kReach; i < kBins - kReach; i++)
+      if (const int sum = std::reduce (&counts_[i - kReach], &counts_[i + kReach] + 1);
+          sum > best_sum)
         best = i, best_sum = sum;
-    }
     if (best_sum == 0 || best_sum * 6 < all_)
       return fallback;
-    float mean = 0;
-    for (int k = -kReach; k <= kReach; k++)
-      mean += float (counts_[best + k]) * (float (best + k - kBins / 2) + 0.5f);
-    return std::exp2 (mean / float (best_sum) / kPerOctave);
+    double mean = 0;
+    for (int i = best - kReach; i <= best + kReach; i++)
+      mean += counts_[i] * (kFirst + i + 0.5) / best_sum;
+    return std::bit_cast<float> (static_cast<std::uint32_t> (mean * (1 << kShift)));
   }
 
 private:
-  static constexpr int kPerOctave = LogBins::kPerOctave, kBins = LogBins::kCount;
+  static constexpr int kBits = 5, kShift = 23 - kBits, kBins = 4 << kBits;
+  static constexpr std::uint32_t kFirst = std::bit_cast<std::uint32_t> (0.25f) >> kShift;
   std::array<int, kBins> counts_{};
   int all_ = 0;
 };

@@ -12,7 +12,6 @@ namespace rangecast {
 struct ClassLimits {
   bool use_colour, use_depth;
   bool doubt_depth;           ///< depth comes from stereo: unreliable without texture
-  float noise_factor;         ///< threshold in standard deviations of the noise
   float colour;               ///< minimum chromatic distortion, grey levels
   float shadow, highlight;    ///< range of brightness relative to the background
   float nearness;             ///< minimum distance in front of the background, depth units
@@ -36,7 +35,7 @@ struct ClassRow {
   std::uint8_t *calm;   ///< 255: colour and depth match the background, 128: only colour
   std::uint8_t *lit;    ///< different in brightness only
   std::uint8_t *blank;  ///< background with inconclusive colour
-  std::uint8_t *placed; ///< depth matches the background's
+  std::uint8_t *placed; ///< 255: depth is the background's, 128: so, but before its mean, 1: behind
   std::uint8_t *seen;   ///< the background's depth is known
   float *ratio;         ///< brightness relative to the background
   float *tolerance;     ///< noise of `ratio`

@@ -5,9 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
-
-#include "../base/simd.hpp"
+#include <opencv2/imgproc.hpp>
 
 namespace rangecast {
 namespace {
@@ -145,41 +143,17 @@ depth_of (const RangeImage &image, int x, int y, bool any_colour)
 
 } // namespace
 
-/* Marks the pixels of a row that may get a depth, have none, and have a neighbour with one. */
-void
-DepthFill::mark_row (const RangeImage &image, const std::uint8_t *may, int y)
-{
-  const int width = image.depth.width;
-  const std::uint16_t *own = image.depth.row (y), *above = image.depth.row (std::max (0, y - 1)),
-                      *below = image.depth.row (std::min (image.depth.height - 1, y + 1));
-  std::uint16_t *__restrict around = around_.data ();
-  std::uint8_t *__restrict marks = marks_.data ();
-  for (int x = 0; x < width; x++)
-    around[x + 1] = above[x] | own[x] | below[x];
-  for (int x = 0; x < width; x++) {
-    const bool known = (around[x] | around[x + 1] | around[x + 2]) != 0;
-    marks[x] = known & (own[x] == kInvalidDepth) & (may[x] != 0);
-  }
-}
-
 /* The front: pixels without depth next to pixels with depth. */
 void
 DepthFill::begin (const RangeImage &image, const cv::Mat &allowed)
 {
-  const auto width = static_cast<std::size_t> (image.depth.width);
-  front_.clear ();
-  seen_.create (allowed.size (), CV_8U);
-  around_.assign (width + 2, 0);
-  marks_.resize (width);
-  for (int y = 0; y < image.depth.height; y++) {
-    for_this_cpu ([&] { mark_row (image, allowed.ptr<std::uint8_t> (y), y); });
-    std::copy (marks_.begin (), marks_.end (), seen_.ptr<std::uint8_t> (y));
-    const std::uint8_t *at = marks_.data (), *end = at + width;
-    while (const void *found = std::memchr (at, 1, static_cast<std::size_t> (end - at))) {
-      at = static_cast<const std::uint8_t *> (found);
-      front_.emplace_back (static_cast<int> (at++ - marks_.data ()), y);
-    }
-  }
+  const cv::Mat depth (
+      allowed.size (), CV_16U, image.depth.data, static_cast<std::size_t> (image.depth.stride));
+  cv::compare (depth, kInvalidDepth, known_, cv::CMP_NE);
+  cv::dilate (known_, seen_, cv::Mat ());
+  cv::bitwise_and (seen_, allowed, seen_);
+  seen_.setTo (0, known_);
+  cv::findNonZero (seen_, front_);
 }
 
 void

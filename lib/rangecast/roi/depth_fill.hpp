@@ -25,15 +25,12 @@ public:
   int fill (const RangeImage &image, const cv::Mat &allowed, int reach, bool any_colour = false);
 
 private:
-  void mark_row (const RangeImage &image, const std::uint8_t *may, int y);
   void begin (const RangeImage &image, const cv::Mat &allowed);
   void advance (const RangeImage &image, const cv::Mat &allowed);
 
   std::vector<cv::Point> front_, next_front_; /* pixels next to known ones */
   std::vector<std::uint16_t> found_;          /* their depths */
-  cv::Mat seen_;                              /* CV_8U: 1 = was in the front */
-  std::vector<std::uint16_t> around_; /* of a row: 0 where there is no depth around; two more */
-  std::vector<std::uint8_t> marks_;   /* of a row: 1 = in the front */
+  cv::Mat known_, seen_;                      /* CV_8U: with depth; was in the front */
 };
 
 } // namespace rangecast

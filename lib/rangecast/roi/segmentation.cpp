@@ -34,8 +34,8 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
     double depth_unit_m, const SegmentationSettings &settings)
 {
   ClassLimits limits = {settings.cue != Cue::kDepth, settings.cue != Cue::kColour,
-      settings.cue == Cue::kBoth && settings.fringe > 1, float (settings.noise_factor),
-      float (settings.colour_threshold), float (settings.shadow), float (settings.highlight),
+      settings.cue == Cue::kBoth && settings.fringe > 1, float (settings.colour_threshold),
+      float (settings.shadow), float (settings.highlight),
       float (settings.depth_threshold_m / depth_unit_m), float (background.depth_noise ()),
       {1, 1, 1}};
   if (settings.follow_light && limits.use_colour)
@@ -62,18 +62,17 @@ Segmenter::classify (const ConstRangeImage &image, const BackgroundModel &backgr
 void
 Segmenter::find_sides (const SegmentationSettings &settings)
 {
-  nearer_.copyTo (opened_);
-  remove_small (opened_, settings.min_area, 0);
   sides_.create (nearer_.size (), CV_8U);
   sides_.setTo (int (Side::kUnknown));
-  sides_.setTo (int (Side::kBackground), placed_);
+  cv::compare (placed_, 1, inverse_, cv::CMP_GT);
+  sides_.setTo (int (Side::kBackground), inverse_);
   /* Where the background had no depth, colour decides if it is conclusive. */
   cv::bitwise_or (seen_, blank_, inside_);
   cv::bitwise_or (inside_, other_, inside_);
   cv::bitwise_not (inside_, inside_);
-  majority_.find (inside_, 2, inverse_);
+  cv::medianBlur (inside_, inverse_, 5);
   sides_.setTo (int (Side::kBackground), inverse_);
-  sides_.setTo (int (Side::kForeground), opened_);
+  sides_.setTo (int (Side::kForeground), near_);
   const int reach = std::clamp (int (kSight * sides_.cols), 16, 255);
   surroundings_.find_inside (sides_, reach, surrounded_);
   /* A region that matches the background conclusively is a hole through which it is seen. Stereo
@@ -85,67 +84,11 @@ Segmenter::find_sides (const SegmentationSettings &settings)
   cv::bitwise_not (opened_, inverse_);
   cv::bitwise_and (inverse_, calm_, inverse_);
   cv::compare (inverse_, 0, inverse_, cv::CMP_GT);
-  majority_.find (inverse_, 2, opened_);
+  cv::medianBlur (inverse_, opened_, 5);
   cv::bitwise_or (inverse_, opened_, inverse_);
   surrounded_.copyTo (inside_);
   inside_.setTo (0, inverse_);
 }
-
-/* Values are not loaded by condition in these loops, so that vectors are. */
-namespace {
-
-/* Pixels of a row that are set in a mask of 0 and 255: 1, else 0. */
-void
-count_pixels (const std::uint8_t *__restrict mask, int n, std::uint16_t *__restrict counts)
-{
-  for (int x = 0; x < n; x++)
-    counts[x] = mask[x] & 1;
-}
-
-/* Values of a row where a mask is set, else 0. */
-void
-choose_values (const float *__restrict values, const std::uint8_t *__restrict mask, int n,
-    float *__restrict chosen)
-{
-  for (int x = 0; x < n; x++) {
-    const float value = values[x];
-    chosen[x] = mask[x] ? value : 0;
-  }
-}
-
-/* Marks pixels of a mask where more than `half` of the pixels around are set. */
-void
-mark_majority (const std::uint16_t *__restrict counts, const std::uint8_t *__restrict mask,
-    int half, int n, std::uint8_t *__restrict marks)
-{
-  for (int x = 0; x < n; x++) {
-    const std::uint8_t pixel = mask[x];
-    marks[x] = counts[x] > half ? pixel : std::uint8_t{0};
-  }
-}
-
-/* Brightness of a row relative to the background, and that of some pixels around: sum and number.
- */
-struct Brightness {
-  const float *ratio, *tolerance, *sum;
-  const std::uint16_t *count;
-};
-
-/* Whether brightness is that of the pixels around, of which there must be some. */
-void
-compare_brightness (const Brightness &b, int min_count, int n, std::uint8_t *__restrict like)
-{
-  const float *__restrict ratio = b.ratio, *__restrict tolerance = b.tolerance,
-                          *__restrict sum = b.sum;
-  const std::uint16_t *__restrict count = b.count;
-  for (int x = 0; x < n; x++) {
-    const auto pixels = float (count[x]);
-    const float off = std::abs (ratio[x] * pixels - sum[x]), max = tolerance[x] * pixels;
-    like[x] = (off <= max) & (count[x] >= min_count) ? kYes : 0;
-  }
-}
-
-} // namespace
 
 /* The brightness of pixels relative to that of pixels of a mask within reach.
  * @param min_count  least number of those
@@ -153,57 +96,56 @@ compare_brightness (const Brightness &b, int min_count, int n, std::uint8_t *__r
 void
 Segmenter::compare_with_mean (const cv::Mat &mask, int reach, int min_count, cv::Mat &like)
 {
-  const int n = mask.cols;
-  counts_.create (mask.size (), CV_16U);
-  like.create (mask.size (), CV_8U);
+  const cv::Size window = {2 * reach + 1, 2 * reach + 1};
+  cv::bitwise_and (mask, 1, like);
+  cv::boxFilter (like, counts_, CV_16U, window, {-1, -1}, false, cv::BORDER_CONSTANT);
+  chosen_.create (mask.size (), CV_32F);
+  chosen_.setTo (0);
+  ratio_.copyTo (chosen_, mask);
+  cv::boxFilter (chosen_, sums_, CV_32F, window, {-1, -1}, false, cv::BORDER_CONSTANT);
   for_this_cpu ([&] {
-    box_counts_.find (
-        mask.size (), reach, cv::BORDER_CONSTANT,
-        [&] (int y, std::uint16_t *counts) { count_pixels (mask.ptr (y), n, counts); },
-        [&] (int y, const std::uint16_t *sums) {
-          std::copy_n (sums, n, counts_.ptr<std::uint16_t> (y));
-        });
-    box_values_.find (
-        mask.size (), reach, cv::BORDER_CONSTANT,
-        [&] (int y, float *values) {
-          choose_values (ratio_.ptr<float> (y), mask.ptr (y), n, values);
-        },
-        [&] (int y, const float *sums) {
-          compare_brightness ({ratio_.ptr<float> (y), tolerance_.ptr<float> (y), sums,
-                                  counts_.ptr<std::uint16_t> (y)},
-              min_count, n, like.ptr (y));
-        });
+    for (int y = 0; y < mask.rows; y++) {
+      const float *ratio = ratio_.ptr<float> (y), *tolerance = tolerance_.ptr<float> (y),
+                  *sum = sums_.ptr<float> (y);
+      const auto count = counts_.ptr<std::uint16_t> (y);
+      std::uint8_t *__restrict to = like.ptr (y);
+      for (int x = 0; x < mask.cols; x++) {
+        const auto n = float (count[x]);
+        const bool within = std::abs (ratio[x] * n - sum[x]) <= tolerance[x] * n;
+        to[x] = within & (count[x] >= min_count) ? kYes : 0;
+      }
+    }
   });
 }
 
-/* Ignores shadows and light of any strength where depth matches the background all around. */
+/* Ignores colour where depth matches the background all around: shadows, a lamp, a screen. inverse_
+ * is where. */
 void
-Segmenter::ignore_lighting (int reach)
+Segmenter::ignore_colour (int reach)
 {
-  const int side = 2 * reach + 1, n = sides_.cols;
-  cv::compare (sides_, int (Side::kForeground), opened_, cv::CMP_EQ);
-  cv::dilate (opened_, opened_, square (side));
-  inverse_.create (sides_.size (), CV_8U);
-  for_this_cpu ([&] {
-    box_counts_.find (
-        sides_.size (), reach, cv::BORDER_DEFAULT,
-        [&] (int y, std::uint16_t *counts) { count_pixels (placed_.ptr (y), n, counts); },
-        [&] (int y, const std::uint16_t *counts) {
-          mark_majority (counts, lit_.ptr (y), side * side / 2, n, inverse_.ptr (y));
-        });
-  });
+  const int side = 2 * reach + 1;
+  cv::dilate (near_, opened_, square (side));
+  cv::bitwise_and (placed_, 1, inverse_);
+  cv::boxFilter (inverse_, counts_, CV_16U, {side, side}, {-1, -1}, false);
+  cv::compare (counts_, side * side / 2, inverse_, cv::CMP_GT);
+  cv::bitwise_and (inverse_, other_, inverse_);
   inverse_.setTo (0, opened_);
   other_.setTo (0, inverse_);
-  /* A shadow that reaches the person's feet: pixels without depth have the brightness of the shadow
-   * next to them. */
+}
+
+/* A shadow that reaches the person's feet: pixels without depth have the brightness of the shadow
+ * next to them. */
+void
+Segmenter::ignore_shadows (int reach)
+{
+  cv::bitwise_and (inverse_, lit_, inverse_);
   if (cv::countNonZero (inverse_) == 0)
     return;
   constexpr int kEnough = 5; /* pixels */
   compare_with_mean (inverse_, reach, kEnough, opened_);
   cv::bitwise_and (opened_, lit_, opened_);
   opened_.setTo (0, surrounded_);
-  cv::compare (sides_, int (Side::kForeground), inverse_, cv::CMP_EQ);
-  opened_.setTo (0, inverse_);
+  opened_.setTo (0, near_);
   other_.setTo (0, opened_);
 }
 
@@ -219,19 +161,26 @@ Segmenter::find_same (int reach)
   compare_with_mean (opened_, reach, 1, inverse_);
   cv::bitwise_and (same_, inverse_, same_);
   cv::compare (counts_, 0, inverse_, cv::CMP_EQ);
-  majority_.find (same_, 1, opened_); /* single pixels may match by chance */
+  cv::medianBlur (same_, opened_, 3); /* single pixels may match by chance */
   cv::bitwise_and (opened_, nearer_, same_);
 }
 
 void
 Segmenter::join_cues (const SegmentationSettings &settings)
 {
-  if (settings.cue != Cue::kBoth || settings.fringe <= 1) {
+  const bool stereo = settings.cue == Cue::kBoth && settings.fringe > 1;
+  if (settings.cue == Cue::kBoth) {
+    nearer_.copyTo (near_);
+    remove_small (near_, settings.min_area, 0);
+    if (stereo)
+      find_sides (settings);
+    ignore_colour (stereo ? settings.fringe : kGuard);
+  }
+  if (!stereo) {
     cv::bitwise_or (other_, nearer_, mask_);
     return;
   }
-  find_sides (settings);
-  ignore_lighting (settings.fringe);
+  ignore_shadows (settings.fringe);
   find_same (settings.fringe);
   cv::bitwise_and (inverse_, nearer_, inverse_);
   cv::bitwise_or (inverse_, same_, inverse_); /* wide where it extends into the object */
@@ -276,6 +225,9 @@ Segmenter::find_quiet ()
   cv::dilate (mask_, opened_, square (2 * kGuard + 1));
   cv::bitwise_not (opened_, opened_);
   cv::bitwise_and (calm_, opened_, quiet_);
+  cv::bitwise_and (placed_, opened_, opened_);
+  cv::min (opened_, BackgroundModel::kDifferent, opened_);
+  cv::max (quiet_, opened_, quiet_);
   cv::compare (calm_, kYes, opened_, cv::CMP_EQ);
   cv::bitwise_and (opened_, inverse_, opened_);
   cv::bitwise_or (quiet_, opened_, quiet_);
@@ -336,7 +288,7 @@ Segmenter::extend_depth (const RangeImage &image, const SegmentationSettings &se
 {
   if (settings.fill <= 0)
     return;
-  majority_.find (mask_, 1, opened_);
+  cv::medianBlur (mask_, opened_, 3);
   cv::bitwise_and (opened_, mask_, opened_);
   if (settings.cue != Cue::kDepth)
     opened_.setTo (0, calm_);
@@ -388,10 +340,8 @@ Segmenter::clear (const RangeImage &image, const BackgroundModel &background, do
     for (int y = 0; y < image.roi.height; y++) {
       const auto clear = inverse_.ptr<std::uint8_t> (y);
       std::uint16_t *depth = image.depth.row (y);
-      for (int x = 0; x < image.roi.width; x++) {
-        const std::uint16_t kept = depth[x];
-        depth[x] = clear[x] ? kInvalidDepth : kept;
-      }
+      for (int x = 0; x < image.roi.width; x++)
+        depth[x] = clear[x] ? kInvalidDepth : depth[x];
     }
     remove_small_in_space (
         image, depth_unit_m, background.depth_noise () / depth_unit_m, settings.min_area);

@@ -6,9 +6,7 @@
 
 #include "../geometry/connected_components.hpp"
 #include "background.hpp"
-#include "box_sums.hpp"
 #include "depth_fill.hpp"
-#include "majority.hpp"
 #include "surroundings.hpp"
 
 namespace rangecast {
@@ -18,7 +16,6 @@ enum class Cue { kBoth, kColour, kDepth };
 
 struct SegmentationSettings {
   Cue cue = Cue::kBoth;
-  double noise_factor = 4;         ///< threshold in standard deviations of the noise
   double depth_threshold_m = 0.02; ///< minimum distance in front of the background, metres
   double colour_threshold = 18;    ///< minimum chromatic distortion, grey levels
   double shadow = 0.5;             ///< minimum brightness of a shadow, relative to the background
@@ -67,8 +64,9 @@ public:
 
   /** Result of decide() for its ROI: 255 = foreground, with or without depth. */
   [[nodiscard]] const cv::Mat &mask () const { return mask_; }
-  /** Where an image may update the background: not 0 = matches its colour and brightness, and
-   * either its depth or far from the foreground. */
+  /** Where an image may update the background: 128 or more = matches its colour and brightness, and
+   * either its depth or far from the foreground; BackgroundModel::kDifferent = does not, but lies
+   * at its depth or behind. */
   [[nodiscard]] const cv::Mat &quiet () const { return quiet_; }
   /** Brightness of the last image by channel, relative to the background. */
   [[nodiscard]] const std::array<float, 3> &light () const { return light_; }
@@ -78,7 +76,8 @@ private:
       double depth_unit_m, const SegmentationSettings &settings);
   void find_sides (const SegmentationSettings &settings);
   void compare_with_mean (const cv::Mat &mask, int reach, int min_count, cv::Mat &like);
-  void ignore_lighting (int reach);
+  void ignore_colour (int reach);
+  void ignore_shadows (int reach);
   void find_same (int reach);
   void join_cues (const SegmentationSettings &settings);
   void remove_small (cv::Mat &mask, int min_area, int keep);
@@ -93,16 +92,14 @@ private:
   cv::Mat lit_;                                  /* different in brightness only, 255 = yes */
   cv::Mat blank_;  /* background with inconclusive colour, 255 = yes */
   cv::Mat seen_;   /* the background's depth is known, 255 = yes */
-  cv::Mat placed_; /* result of comparing depth with the background's, 255 = the same */
+  cv::Mat placed_; /* 255: depth is the background's, 128: so, but before its mean, 1: behind */
+  cv::Mat near_;   /* nearer_ without small components */
   cv::Mat sides_, surrounded_, inside_; /* inside_: surrounded_ without holes */
   cv::Mat ratio_, tolerance_;           /* brightness relative to the background, and its noise */
-  cv::Mat counts_;                      /* CV_16U: see compare_with_mean() */
+  cv::Mat counts_, chosen_, sums_;      /* see compare_with_mean() */
   cv::Mat mask_, steps_;
   cv::Mat opened_, inverse_; /* scratch; after decide(), inverse_ is the background */
   ConnectedComponents components_;
-  Majority majority_;
-  BoxSums<std::uint16_t> box_counts_;
-  BoxSums<float> box_values_;
   DepthFill fill_;
   Surroundings surroundings_;
   std::vector<int> areas_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../base/parallel.hpp"
 #include "figure.hpp"
 #include "pattern.hpp"
 #include "scene.hpp"
@@ -202,14 +203,14 @@ MipMap
 make_texture (std::uint32_t seed)
 {
   std::vector<Rgbx> pixels (static_cast<std::size_t> (kTextureSize) * kTextureSize);
-  for (int j = 0; j < kTextureSize; j++)
+  in_parallel (kTextureSize, 0, [&] (std::size_t j) {
     for (int i = 0; i < kTextureSize; i++) {
       const double s = ((i + 0.5) / kTextureSize * 2 - 1) * M_PI,
-                   y = kTop + (kBottom - kTop) * ((j + 0.5) / kTextureSize);
+                   y = kTop + (kBottom - kTop) * ((double (j) + 0.5) / kTextureSize);
       const Vec3 c = colour_at (s, y, seed);
-      pixels[static_cast<std::size_t> (j) * kTextureSize + i] = {
-          to_byte (c.x), to_byte (c.y), to_byte (c.z), 0};
+      pixels[j * kTextureSize + std::size_t (i)] = {to_byte (c.x), to_byte (c.y), to_byte (c.z), 0};
     }
+  });
   return {kTextureSize, kTextureSize, std::move (pixels)};
 }
 

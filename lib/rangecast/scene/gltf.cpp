@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* After the Khronos Group's glTF 2.0 specification (ISO/IEC 12113:2022); section numbers are its.
  */
-#include "model_file.hpp"
+#include "model.hpp"
 
 #ifdef RANGECAST_HAVE_MODELS
 
@@ -10,7 +10,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <span>
 #include <tiny_gltf.h>
 
@@ -201,9 +200,6 @@ keep_picture (tinygltf::Image *image, int, std::string *, std::string *, int, in
   return true;
 }
 
-/** For each joint, world from the mesh's space as the joint would move it. */
-using Skin = std::vector<Affine>;
-
 /** The elements of an accessor. */
 struct Values {
   std::vector<float> numbers; ///< `components` for each element
@@ -246,12 +242,9 @@ private:
   bool read_materials ();
   bool read_scene ();
   bool read_node_mesh (std::size_t node);
-  bool read_skin (int index);
-  bool read_primitive (const Primitive &primitive, const Affine &world, const Skin &skin);
-  bool read_vertices (const Primitive &primitive, int coordinates, const Affine &world,
-      const Skin &skin, Mesh &mesh);
-  bool read_weights (const Primitive &primitive, const Affine &world, const Skin &skin,
-      std::size_t vertices, std::vector<Affine> &pose);
+  bool read_skin (int index, Affine &world);
+  bool read_primitive (const Primitive &primitive, const Affine &world);
+  bool read_vertices (const Primitive &primitive, int coordinates, const Affine &world, Mesh &mesh);
   bool read_triangles (const Primitive &primitive, bool mirrored, Mesh &mesh);
 
   const std::string path_;
@@ -261,7 +254,6 @@ private:
   std::size_t elements_ = 0;  ///< that accessors have given
   std::vector<Affine> world_; ///< of each node that a root reaches
   std::vector<bool> reached_;
-  std::map<int, Skin> skins_; ///< that nodes have used
   std::size_t vertices_ = 0, triangles_ = 0;
 };
 
@@ -396,7 +388,7 @@ bool
 Reader::read_pictures ()
 {
   for (auto &image : file_.images) {
-    ModelPicture picture{path_ + ": picture " + std::to_string (model_.pictures.size ()), {}};
+    ModelPicture picture{path_ + ": image " + std::to_string (model_.pictures.size ()), {}};
     Bytes bytes;
     if (image.bufferView >= 0 && !view_bytes (image.bufferView, bytes))
       return false;
@@ -420,7 +412,7 @@ Reader::read_texture (const tinygltf::TextureInfo &info, ModelMaterial &material
   if (texture.source < 0 && !texture.extensions.empty ())
     return fail_extension (texture.extensions.begin ()->first);
   if (texture.source < 0 || std::size_t (texture.source) >= model_.pictures.size ())
-    return fail (StatusCode::kBadData, "a material's texture has no picture");
+    return fail (StatusCode::kBadData, "a material's texture has no image");
   material.picture = texture.source;
   const tinygltf::Value change = extension (info.extensions, "KHR_texture_transform");
   material.coordinates = int (std::clamp (number_in (change, "texCoord", info.texCoord), 0., 9.));
@@ -499,49 +491,41 @@ Reader::read_node_mesh (std::size_t index)
     return true;
   if (std::size_t (node.mesh) >= file_.meshes.size ())
     return fail (StatusCode::kBadData, "a node names a mesh that is missing");
-  if (node.skin >= 0 && !skins_.contains (node.skin) && !read_skin (node.skin))
+  Affine world = world_[index];
+  if (node.skin >= 0 && !read_skin (node.skin, world))
     return false;
   for (const Primitive &primitive : file_.meshes[std::size_t (node.mesh)].primitives)
-    if (!read_primitive (primitive, world_[index], skins_[node.skin]))
+    if (!read_primitive (primitive, world))
       return false;
   return true;
 }
 
+/* A mesh with a skin is drawn as it was bound: where its first joint moves it, whatever its node's
+ * transform says (3.7.3.3). In the pose of binding all joints agree. */
 bool
-Reader::read_skin (int index)
+Reader::read_skin (int index, Affine &world)
 {
-  Skin &skin = skins_[index];
-  if (std::size_t (index) >= file_.skins.size ())
-    return fail (StatusCode::kBadData, "a node names a skin that is missing");
-  const tinygltf::Skin &from = file_.skins[std::size_t (index)];
-  Values inverse; /* absent: identities (5.28.1) */
-  if (from.inverseBindMatrices >= 0) {
-    if (!read (from.inverseBindMatrices, inverse))
-      return false;
-    if (inverse.components != 16 || inverse.count < from.joints.size ())
-      return fail (StatusCode::kBadData, "a skin has fewer matrices than joints");
-  }
-  for (std::size_t i = 0; i < from.joints.size (); i++) {
-    const auto node = std::size_t (from.joints[i]);
-    if (node >= world_.size ())
-      return fail (StatusCode::kBadData, "a skin names a node that is missing");
-    skin.push_back (inverse.count == 0
-                        ? world_[node]
-                        : world_[node] * affine_of (inverse.numbers.data () + 16 * i));
-  }
+  if (std::size_t (index) >= file_.skins.size () ||
+      file_.skins[std::size_t (index)].joints.empty ())
+    return fail (StatusCode::kBadData, "a node names a skin that is missing or has no joints");
+  const tinygltf::Skin &skin = file_.skins[std::size_t (index)];
+  const auto joint = std::size_t (skin.joints[0]);
+  if (joint >= world_.size ())
+    return fail (StatusCode::kBadData, "a skin names a node that is missing");
+  world = world_[joint];
+  if (skin.inverseBindMatrices < 0) /* absent: identities (5.28.1) */
+    return true;
+  Values inverse;
+  if (!read (skin.inverseBindMatrices, inverse))
+    return false;
+  if (inverse.components != 16 || inverse.count == 0)
+    return fail (StatusCode::kBadData, "a skin's matrices are missing");
+  world = world * affine_of (inverse.numbers.data ());
   return true;
 }
 
-/** Whether a primitive follows the skin's joints; else its node's transform places it. */
 bool
-follows (const tinygltf::Primitive &primitive, const Skin &skin)
-{
-  return !skin.empty () && primitive.attributes.contains ("JOINTS_0") &&
-         primitive.attributes.contains ("WEIGHTS_0");
-}
-
-bool
-Reader::read_primitive (const Primitive &primitive, const Affine &world, const Skin &skin)
+Reader::read_primitive (const Primitive &primitive, const Affine &world)
 {
   if (primitive.mode == TINYGLTF_MODE_TRIANGLE_STRIP ||
       primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN)
@@ -552,10 +536,9 @@ Reader::read_primitive (const Primitive &primitive, const Affine &world, const S
     return fail (StatusCode::kBadData, "a mesh names a material that is missing");
   const int material = std::max (primitive.material, -1);
   const int coordinates = material < 0 ? 0 : model_.palette[std::size_t (material)].coordinates;
-  const bool mirrored = !follows (primitive, skin) && world.determinant () < 0;
   Mesh mesh;
-  if (!read_vertices (primitive, coordinates, world, skin, mesh) ||
-      !read_triangles (primitive, mirrored, mesh))
+  if (!read_vertices (primitive, coordinates, world, mesh) ||
+      !read_triangles (primitive, world.determinant () < 0, mesh))
     return false;
   drop_unused_vertices (mesh);
   vertices_ += mesh.vertices.size ();
@@ -567,47 +550,8 @@ Reader::read_primitive (const Primitive &primitive, const Affine &world, const S
   return true;
 }
 
-/* One transform a vertex if there is a skin: the mean of its four joints'. */
 bool
-Reader::read_weights (const Primitive &primitive, const Affine &world, const Skin &skin,
-    std::size_t vertices, std::vector<Affine> &pose)
-{
-  if (!follows (primitive, skin))
-    return true;
-  Values joints, weights;
-  if (!read (primitive.attributes.at ("JOINTS_0"), joints) ||
-      !read (primitive.attributes.at ("WEIGHTS_0"), weights))
-    return false;
-  if (joints.count != vertices || weights.count != vertices || joints.components != 4 ||
-      weights.components != 4)
-    return fail (StatusCode::kBadData, "joints or weights do not fit the vertices");
-  for (std::size_t i = 0; i < vertices; i++) {
-    Affine mean{};
-    for (auto &row : mean.m)
-      std::fill (std::begin (row), std::end (row), 0.0);
-    double sum = 0;
-    for (std::size_t j = 4 * i; j < 4 * i + 4; j++) {
-      const double weight = double (weights.numbers[j]);
-      if (!(weight > 0 && std::isfinite (weight)))
-        continue;
-      if (!(joints.numbers[j] >= 0 && joints.numbers[j] < float (skin.size ())))
-        return fail (StatusCode::kBadData, "a vertex follows a joint that is missing");
-      const Affine &joint = skin[std::size_t (joints.numbers[j])];
-      for (int k = 0; k < 12; k++)
-        mean.m[k / 4][k % 4] += weight * joint.m[k / 4][k % 4];
-      sum += weight;
-    }
-    for (auto &row : mean.m)
-      for (double &value : row)
-        value /= sum;
-    pose.push_back (sum > 0 ? mean : world);
-  }
-  return true;
-}
-
-bool
-Reader::read_vertices (
-    const Primitive &primitive, int coordinates, const Affine &world, const Skin &skin, Mesh &mesh)
+Reader::read_vertices (const Primitive &primitive, int coordinates, const Affine &to, Mesh &mesh)
 {
   const auto &attributes = primitive.attributes;
   Values positions, normals, places, colours;
@@ -628,13 +572,11 @@ Reader::read_vertices (
     return fail (StatusCode::kUnsupported, "more than 4 million vertices");
   if (positions.components != 3)
     return fail (StatusCode::kBadData, "POSITION is not of type VEC3");
-  std::vector<Affine> pose;
   if (!optional ("NORMAL", normals) || !optional ("COLOR_0", colours) ||
-      !optional ("TEXCOORD_" + std::to_string (coordinates), places) ||
-      !read_weights (primitive, world, skin, positions.count, pose))
+      !optional ("TEXCOORD_" + std::to_string (coordinates), places))
     return false;
+  const double sign = to.determinant () < 0 ? -1 : 1;
   for (std::size_t i = 0; i < positions.count; i++) {
-    const Affine &to = pose.empty () ? world : pose[i];
     const float *p = positions.numbers.data () + 3 * i;
     MeshVertex vertex{};
     for (int k = 0; k < 3; k++)
@@ -642,7 +584,6 @@ Reader::read_vertices (
           float (to.m[k][0] * p[0] + to.m[k][1] * p[1] + to.m[k][2] * p[2] + to.m[k][3]);
     if (normals.components == 3) {
       const float *n = normals.numbers.data () + 3 * i;
-      const double sign = to.determinant () < 0 ? -1 : 1;
       double turned[3], length = 0;
       for (int k = 0; k < 3; k++) {
         turned[k] = sign * (to.cofactor (k, 0) * n[0] + to.cofactor (k, 1) * n[1] +

@@ -78,8 +78,8 @@ inline constexpr double kPersonHeight = 1.8;
  *  @return false if no triangle is left */
 bool fit_figure (Figure &figure, double top_m);
 
-/** The built-in figure: head and shoulders, 0.5 m wide, about 13,000 triangles, closed; behind that
- *  mesh in the list, one for each thing it wears.
+/** The built-in figure: head and shoulders, 0.5 m wide, about 13,000 triangles, closed; after that
+ *  mesh, those of each accessory.
  *  @param seed   of hair, skin and shirt
  *  @param dress  DressFlags of scene.hpp */
 Figure make_figure (std::uint32_t seed, unsigned dress = 0);

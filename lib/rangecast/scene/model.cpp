@@ -12,7 +12,6 @@
 #include <tuple>
 #include <utility>
 
-#include "model_file.hpp"
 #include "pattern.hpp"
 #include "texture.hpp"
 
@@ -39,12 +38,7 @@ is_drawable (const Mesh &mesh)
            is_within (v.z, kMaxPosition) && is_within (v.u, kMaxTextureCoordinate) &&
            is_within (v.v, kMaxTextureCoordinate);
   };
-  const auto triangle_ok = [&] (const auto &triangle) {
-    return std::ranges::all_of (
-        triangle, [&] (std::uint32_t index) { return index < mesh.vertices.size (); });
-  };
-  return std::ranges::all_of (mesh.vertices, vertex_ok) &&
-         std::ranges::all_of (mesh.triangles, triangle_ok);
+  return std::ranges::all_of (mesh.vertices, vertex_ok);
 }
 
 /* ---- textures ---- */
@@ -192,21 +186,11 @@ private:
 void
 drop_second_sides (Mesh &mesh)
 {
-  std::vector<std::pair<std::array<std::uint32_t, 3>, std::size_t>> sorted;
-  for (std::size_t i = 0; i < mesh.triangles.size (); i++) {
-    auto key = mesh.triangles[i];
+  std::set<std::array<std::uint32_t, 3>> seen;
+  std::erase_if (mesh.triangles, [&seen] (auto key) {
     std::ranges::sort (key);
-    sorted.emplace_back (key, i);
-  }
-  std::ranges::sort (sorted);
-  std::vector<std::array<std::uint32_t, 3>> kept;
-  std::vector<bool> second (mesh.triangles.size (), false);
-  for (std::size_t i = 1; i < sorted.size (); i++)
-    second[sorted[i].second] = sorted[i].first == sorted[i - 1].first;
-  for (std::size_t i = 0; i < mesh.triangles.size (); i++)
-    if (!second[i])
-      kept.push_back (mesh.triangles[i]);
-  mesh.triangles = std::move (kept);
+    return !seen.insert (key).second;
+  });
 }
 
 bool
@@ -236,9 +220,8 @@ make_figure (const ModelSettings &settings, Model &model, Figure &figure)
     if (Status s = texturer.dress (material, mesh); !s.ok ())
       return s;
     if (!is_drawable (mesh))
-      return {
-          StatusCode::kBadData, settings.path + ": a position is not below 1e9, a texture "
-                                                "coordinate not below 1e4, or an index is missing"};
+      return {StatusCode::kBadData, settings.path + ": a position is not below 1e9, or a texture "
+                                                    "coordinate not below 1e4"};
     if (mesh.double_sided)
       drop_second_sides (mesh);
     if (!has_normals (mesh))

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "model_file.hpp"
+#include "model.hpp"
 
 #ifdef RANGECAST_HAVE_MODELS
 

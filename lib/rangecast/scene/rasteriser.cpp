@@ -107,14 +107,6 @@ level_for (const RasterVertex &a, const RasterVertex &b, const RasterVertex &c, 
 } // namespace
 
 void
-Rasteriser::begin (int width, int height)
-{
-  width_ = width;
-  height_ = height;
-  inverse_depth_.assign (static_cast<std::size_t> (width) * height, 0);
-}
-
-void
 Rasteriser::begin (int width, int height, const std::vector<float> &inverse_depth)
 {
   width_ = width;

@@ -12,7 +12,7 @@ namespace rangecast {
 /** A corner of a triangle as a camera sees it. */
 struct RasterVertex {
   float x, y;          ///< pixels; (0, 0) is the centre of the top-left pixel
-  float inverse_depth; ///< 1 / m; 0 or less: behind the camera, its triangles are left out
+  float inverse_depth; ///< 1 / m; 0 or less: behind the camera, its triangles are skipped
   float u, v;          ///< texture, 0 to 1
   float light;         ///< the texture's colour is multiplied by it, 0 to 1
   float back_light;    ///< the same of the other side, if the mesh is double-sided
@@ -24,10 +24,8 @@ struct RasterVertex {
  *  that fits the triangle's size. Silhouettes are not antialiased. */
 class Rasteriser {
 public:
-  /** Starts a picture; allocates only if it is larger than any before. */
-  void begin (int width, int height);
-  /** The same, behind and in front of surfaces drawn before. @param inverse_depth  1/z, 1/m, row by
-   * row */
+  /** Starts a picture behind and in front of surfaces drawn before; allocates only if it is larger
+   *  than any before. @param inverse_depth  1/z, 1/m, row by row */
   void begin (int width, int height, const std::vector<float> &inverse_depth);
   /** Draws what faces the camera, and the rest of a double-sided mesh.
    *  @param vertices  the mesh's as the camera sees them */

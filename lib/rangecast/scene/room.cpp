@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../base/parallel.hpp"
 #include "pattern.hpp"
 
 namespace rangecast {
@@ -59,7 +60,8 @@ void
 draw_room (const Intrinsics &camera, const Pose &world_from_camera, double radius_m,
     const RoomPaint &paint, ImageView<Rgbx> colour)
 {
-  for (int y = 0; y < colour.height; y++)
+  in_parallel (static_cast<std::size_t> (colour.height), 0, [&] (std::size_t row) {
+    const int y = static_cast<int> (row);
     for (int x = 0; x < colour.width; x++) {
       Vec3 sum;
       for (const double dy : {-0.25, 0.25})
@@ -71,6 +73,7 @@ draw_room (const Intrinsics &camera, const Pose &world_from_camera, double radiu
         }
       colour.at (x, y) = {to_byte (sum.x / 4), to_byte (sum.y / 4), to_byte (sum.z / 4), 0};
     }
+  });
 }
 
 std::vector<float>

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 
 #include "../base/parallel.hpp"
-#include "furnishing.hpp"
 #include "mesh.hpp"
 #include "model.hpp"
 #include "pattern.hpp"
@@ -67,8 +67,6 @@ private:
   std::vector<std::int16_t> samples_;
 };
 
-constexpr double kLightPeriod = 40; ///< seconds
-
 /** Pose of a figure at a moment. */
 struct FigurePose {
   float sin_yaw, cos_yaw, sin_nod, cos_nod; ///< of the head
@@ -81,19 +79,15 @@ wave (double time_s, double period_s)
   return std::sin (2 * M_PI * std::fmod (time_s, period_s) / period_s);
 }
 
-/** Persons behind the first one move as it did some seconds before. */
 FigurePose
-pose_of (int person, double time_s, double motion)
+pose_of (double time_s, double motion)
 {
-  constexpr float kPlaces[SceneSettings::kMaxPersons][2] = {
-      {0, 0}, {-0.65f, -0.4f}, {0.65f, -0.4f}};
-  time_s += 1.3 * person;
   const double yaw = motion * 20 * M_PI / 180 * wave (time_s, 4);
   const double nod = motion * 4 * M_PI / 180 * wave (time_s, 2.7);
   return {static_cast<float> (std::sin (yaw)), static_cast<float> (std::cos (yaw)),
       static_cast<float> (std::sin (nod)), static_cast<float> (std::cos (nod)),
-      static_cast<float> (motion * 0.015 * wave (time_s, 5)) + kPlaces[person][0],
-      static_cast<float> (motion * 0.010 * wave (time_s, 3.3)) + kPlaces[person][1]};
+      static_cast<float> (motion * 0.015 * wave (time_s, 5)),
+      static_cast<float> (motion * 0.010 * wave (time_s, 3.3))};
 }
 
 struct Direction {
@@ -121,53 +115,30 @@ light_on (Direction n)
 }
 
 Status
-bad_setting (const char *name, const char *expected)
-{
-  return {StatusCode::kBadValue, std::string ("scene: ") + name + ": expected " + expected};
-}
-
-Status
-check_room (const SceneSettings &s)
-{
-  if (s.persons < 1 || s.persons > SceneSettings::kMaxPersons)
-    return bad_setting ("persons", "1 to 3");
-  if (!(s.far_m >= 1 && s.far_m <= 6))
-    return bad_setting ("far", "1 to 6 metres");
-  if (!(s.cast_shadow >= 0 && s.cast_shadow <= 0.9))
-    return bad_setting ("cast-shadow", "0 to 0.9");
-  if (!(s.light_drift >= 0 && s.light_drift <= 0.5))
-    return bad_setting ("light-drift", "0 to 0.5");
-  if (!(s.wall_texture >= 0 && s.wall_texture <= 1))
-    return bad_setting ("wall-texture", "0 to 1");
-  if (!(s.wall_warmth >= 0 && s.wall_warmth <= 1))
-    return bad_setting ("wall-warmth", "0 to 1");
-  return {};
-}
-
-Status
 check (const SceneSettings &s)
 {
-  if (s.views < 1 || s.views > kMaxViews)
-    return bad_setting ("views", "1 to 64");
-  if (s.width < 16 || s.height < 16 || s.width > NoiseTable::kMaxSide ||
-      s.height > NoiseTable::kMaxSide)
-    return bad_setting ("width and height", "16 to 4096 pixels");
-  if (!(s.arc_deg > 0 && s.arc_deg <= 360))
-    return bad_setting ("arc", "more than 0, up to 360 degrees");
-  if (!(s.distance_m >= 0.5 && s.distance_m <= 1.2))
-    return bad_setting ("distance", "0.5 to 1.2 metres");
-  if (!(s.baseline_m >= 0.01 && s.baseline_m <= 0.3))
-    return bad_setting ("baseline", "0.01 to 0.3 metres");
-  if (!(s.noise_sigma >= 0 && s.noise_sigma <= 20))
-    return bad_setting ("noise", "0 to 20 grey levels");
-  if (!(s.motion >= 0 && s.motion <= 2))
-    return bad_setting ("motion", "0 to 2");
-  if (s.dress > kDressAll)
-    return bad_setting ("dress", "hair, glasses, collar, hand");
-  if (s.model_top_m != kTopAutomatic && s.model_top_m != kTopAll &&
-      !(s.model_top_m >= 0.1 && s.model_top_m <= kPersonHeight))
-    return bad_setting ("model-top", "-1, 0, or 0.1 to 1.8 metres");
-  return check_room (s);
+  const struct {
+    const char *name;
+    double value, low, high;
+  } limits[] = {{"views", double (s.views), 1, kMaxViews},
+      {"width", double (s.width), 16, NoiseTable::kMaxSide},
+      {"height", double (s.height), 16, NoiseTable::kMaxSide}, {"arc", s.arc_deg, 0.001, 360},
+      {"distance", s.distance_m, 0.5, 1.2}, {"baseline", s.baseline_m, 0.01, 0.3},
+      {"noise", s.noise_sigma, 0, 20}, {"motion", s.motion, 0, 2},
+      {"model-top", s.model_top_m, kTopAutomatic, kPersonHeight}, {"far", s.far_m, 1, 6},
+      {"wall-texture", s.wall_texture, 0, 1}, {"wall-warmth", s.wall_warmth, 0, 1}};
+  for (const auto &[name, value, low, high] : limits)
+    if (!(value >= low && value <= high)) {
+      char text[100];
+      std::snprintf (
+          text, sizeof text, "scene: %s is %g; use a value from %g to %g", name, value, low, high);
+      return {StatusCode::kBadValue, text};
+    }
+  const bool whole_or_some =
+      s.model_top_m == kTopAutomatic || s.model_top_m == kTopAll || s.model_top_m >= 0.1;
+  return whole_or_some ? Status ()
+                       : Status (StatusCode::kBadValue,
+                             "scene: model-top is below 0.1 metres; use -1, 0 or 0.1 to 1.8");
 }
 
 View
@@ -198,22 +169,7 @@ struct CameraState {
   std::vector<float> room_depth; ///< 1/z of it, 1/m
   std::vector<RasterVertex> corners;
   Rasteriser rasteriser;
-  std::unique_ptr<ShadowMap> shadow; ///< its own: cameras are rendered at the same time
 };
-
-/** All light of a picture times a factor. */
-void
-scale_light (ImageView<Rgbx> colour, double factor)
-{
-  std::uint8_t table[256];
-  for (int i = 0; i < 256; i++)
-    table[i] = to_byte (i * factor);
-  for (int y = 0; y < colour.height; y++)
-    for (int x = 0; x < colour.width; x++) {
-      Rgbx &pixel = colour.at (x, y);
-      pixel = {table[pixel.r], table[pixel.g], table[pixel.b], 0};
-    }
-}
 
 /** A mesh as a camera sees it. */
 void
@@ -250,17 +206,11 @@ project (const Mesh &mesh, const FigurePose &pose, const Intrinsics &in,
 struct Scene::Impl {
   SceneSettings settings;
   Rig rig, range_rig;
-  std::vector<Figure> figures; ///< one a person, or one model for all
+  Figure figure;
   NoiseTable noise;
   std::vector<CameraState> cameras;
 
-  [[nodiscard]] const Figure &figure (int person) const
-  {
-    return figures[std::min (static_cast<std::size_t> (person), figures.size () - 1)];
-  }
   [[nodiscard]] ImageView<const Rgbx> room_of (CameraState &camera) const;
-  void draw_chair (CameraState &camera, ImageView<Rgbx> room) const;
-  void draw_shadow (CameraState &camera, double time_s, ImageView<Rgbx> colour) const;
   void write_depth (const CameraState &camera, ImageView<std::uint16_t> depth,
       ImageView<std::uint8_t> mask) const;
   Roi bounding_box (const CameraState &camera) const;
@@ -279,40 +229,8 @@ Scene::Impl::room_of (CameraState &camera) const
         {settings.seed, settings.wall_texture, settings.wall_warmth}, room);
     camera.room_depth = room_inverse_depth (
         lens, camera.world_from_camera, kWallRadius, settings.width, settings.height);
-    if (settings.chair)
-      draw_chair (camera, room);
   }
   return room;
-}
-
-void
-Scene::Impl::draw_chair (CameraState &camera, ImageView<Rgbx> room) const
-{
-  const Mesh chair = make_chair (settings.seed);
-  project (
-      chair, pose_of (0, 0, 0), rig.views[0].intrinsics, camera.world_from_camera, camera.corners);
-  camera.rasteriser.begin (settings.width, settings.height, camera.room_depth);
-  camera.rasteriser.draw (camera.corners, chair, room);
-  camera.room_depth.assign (
-      camera.rasteriser.row (0), camera.rasteriser.row (0) + camera.room_depth.size ());
-}
-
-void
-Scene::Impl::draw_shadow (CameraState &camera, double time_s, ImageView<Rgbx> colour) const
-{
-  if (!camera.shadow)
-    camera.shadow = std::make_unique<ShadowMap> ();
-  ShadowMap &shadow = *camera.shadow;
-  shadow.begin ();
-  for (int i = 0; i < settings.persons; i++)
-    for (const Mesh &mesh : figure (i)) {
-      project (mesh, pose_of (i, time_s, settings.motion), shadow.intrinsics (),
-          shadow.world_from_lamp (), camera.corners);
-      shadow.add (camera.corners, mesh);
-    }
-  shadow.end ();
-  shadow.darken (rig.views[0].intrinsics, camera.world_from_camera, camera.room_depth.data (),
-      settings.cast_shadow, colour);
 }
 
 void
@@ -372,11 +290,8 @@ Scene::create (const SceneSettings &settings, std::unique_ptr<Scene> &scene)
   Impl &impl = *made->impl_;
   impl.settings = settings;
   if (settings.model.empty ())
-    for (int i = 0; i < settings.persons; i++)
-      impl.figures.push_back (
-          make_figure (settings.seed + static_cast<std::uint32_t> (i), settings.dress));
-  else if (Status status =
-               load_model ({settings.model, settings.model_top_m}, impl.figures.emplace_back ());
+    impl.figure = make_figure (settings.seed, settings.dress);
+  else if (Status status = load_model ({settings.model, settings.model_top_m}, impl.figure);
            !status.ok ())
     return status;
   impl.noise.fill (settings.noise_sigma, settings.seed);
@@ -423,7 +338,7 @@ Scene::render (int view_id, SceneCamera which, double time_s, bool empty, ImageV
     return picture.width == s.width && picture.height == s.height;
   };
   if (!fits (colour) || (!depth.empty () && !fits (depth)) || (!mask.empty () && !fits (mask)))
-    return {StatusCode::kBadSize, "scene: a picture is not " + std::to_string (s.width) + " x " +
+    return {StatusCode::kBadSize, "scene: an image is not " + std::to_string (s.width) + " x " +
                                       std::to_string (s.height) + " pixels"};
   const int index = view_id * kCamerasPerView + static_cast<int> (which);
   CameraState &camera = impl_->cameras[static_cast<std::size_t> (index)];
@@ -431,17 +346,12 @@ Scene::render (int view_id, SceneCamera which, double time_s, bool empty, ImageV
   for (int y = 0; y < s.height; y++)
     std::memcpy (colour.row (y), room.row (y), sizeof (Rgbx) * static_cast<std::size_t> (s.width));
   camera.rasteriser.begin (s.width, s.height, camera.room_depth);
-  if (!empty && s.cast_shadow > 0)
-    impl_->draw_shadow (camera, time_s, colour);
-  for (int i = 0; !empty && i < s.persons; i++)
-    for (const Mesh &mesh : impl_->figure (i)) {
-      project (mesh, pose_of (i, time_s, s.motion), impl_->rig.views[0].intrinsics,
-          camera.world_from_camera, camera.corners);
-      camera.rasteriser.draw (camera.corners, mesh, colour);
-    }
+  for (std::size_t i = 0; !empty && i < impl_->figure.size (); i++) {
+    project (impl_->figure[i], pose_of (time_s, s.motion), impl_->rig.views[0].intrinsics,
+        camera.world_from_camera, camera.corners);
+    camera.rasteriser.draw (camera.corners, impl_->figure[i], colour);
+  }
   impl_->write_depth (camera, depth, mask);
-  if (s.light_drift > 0)
-    scale_light (colour, 1 + s.light_drift * wave (time_s, kLightPeriod));
   impl_->noise.add (colour, index, time_s);
   return {};
 }
@@ -451,7 +361,7 @@ Scene::render_range (std::span<const RangeImage> images, double time_s, bool emp
     std::span<Roi> boxes, int n_threads)
 {
   if (boxes.size () != images.size () || images.size () > kMaxViews)
-    return {StatusCode::kBadSize, "scene: expected one box for each range image"};
+    return {StatusCode::kBadSize, "scene: needs one box for each range image"};
   std::array<Status, kMaxViews> results;
   in_parallel (images.size (), n_threads, [&] (std::size_t i) {
     const RangeImage &image = images[i];
@@ -465,38 +375,6 @@ Scene::render_range (std::span<const RangeImage> images, double time_s, bool emp
     if (!results[i].ok ())
       return results[i];
   return {};
-}
-
-void
-convert_pixels (
-    ImageView<const Rgbx> in, PixelFormat format, std::uint8_t *out, std::ptrdiff_t stride)
-{
-  for (int y = 0; y < in.height; y++) {
-    const Rgbx *from = in.row (y);
-    std::uint8_t *to = out + y * stride;
-    switch (format) {
-      case PixelFormat::kRgbx:
-        std::memcpy (to, from, sizeof (Rgbx) * static_cast<std::size_t> (in.width));
-        break;
-      case PixelFormat::kBgrx:
-        for (int x = 0; x < in.width; x++, to += 4)
-          to[0] = from[x].b, to[1] = from[x].g, to[2] = from[x].r, to[3] = 0;
-        break;
-      case PixelFormat::kRgb:
-        for (int x = 0; x < in.width; x++, to += 3)
-          to[0] = from[x].r, to[1] = from[x].g, to[2] = from[x].b;
-        break;
-      case PixelFormat::kBgr:
-        for (int x = 0; x < in.width; x++, to += 3)
-          to[0] = from[x].b, to[1] = from[x].g, to[2] = from[x].r;
-        break;
-      case PixelFormat::kGray: /* 0.299, 0.587, 0.114 in 1/256 */
-        for (int x = 0; x < in.width; x++)
-          to[x] =
-              static_cast<std::uint8_t> ((77 * from[x].r + 150 * from[x].g + 29 * from[x].b) >> 8);
-        break;
-    }
-  }
 }
 
 } // namespace rangecast

@@ -12,7 +12,7 @@
 
 namespace rangecast {
 
-/** Clothing and hair of the built-in figure: surfaces in front of one another. */
+/** Accessories of the built-in figure: surfaces in front of one another. */
 enum DressFlags : unsigned {
   kDressHair = 1,    ///< long hair, with strands that hang free before cheeks and neck
   kDressGlasses = 2, ///< thin rims before the eyes
@@ -35,17 +35,11 @@ struct SceneSettings {
   std::string model;       ///< glTF or OBJ file; empty: the built-in figure
   double model_top_m = -1; ///< of a model of 1.8 m, kept from the crown down, 0.1 .. 1.8; 0: all
                            ///< of it, 0.5 m large; -1: 0.5 m of a standing person, else all
-  unsigned dress = 0;      ///< what the built-in figure wears, DressFlags
 
-  int persons = 1;    ///< figures, 1 .. kMaxPersons; the others stand 0.4 m behind, left and right
-  double far_m = 1.3; ///< farthest depth, 1 .. 6; from 3.5 on it reaches the room's walls
-  double cast_shadow = 0;  ///< fraction of light that the figures' shadow blocks, 0 .. 0.9
-  double light_drift = 0;  ///< amplitude of a slow change of all light (40 s), 0 .. 0.5
+  unsigned dress = 0;      ///< DressFlags of the built-in figure
+  double far_m = 1.3;      ///< farthest depth, 1 .. 6; from 3.5 on it reaches the room's walls
   double wall_texture = 1; ///< contrast of the room's texture, 0 = plain .. 1
   double wall_warmth = 0;  ///< 0 = blue-grey walls .. 1 = as wood, skin and hair
-  bool chair = false;      ///< a chair stands behind the figure, also in the empty room
-
-  static constexpr int kMaxPersons = 3;
 };
 
 enum class SceneCamera {
@@ -95,12 +89,5 @@ private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/** Colour as other pixel formats have it; all 8 bits a channel. */
-enum class PixelFormat { kRgbx, kBgrx, kRgb, kBgr, kGray };
-
-/** @param[out] out  first byte of H rows, `stride` bytes apart; grey = BT.601 luma. Reentrant. */
-void convert_pixels (
-    ImageView<const Rgbx> in, PixelFormat format, std::uint8_t *out, std::ptrdiff_t stride);
 
 } // namespace rangecast

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
@@ -19,48 +18,8 @@ namespace rangecast {
 namespace {
 
 constexpr std::size_t kMaxFile = std::size_t{256} << 20;
-constexpr std::int64_t kMaxSide = 16384, kMaxPixels = std::int64_t{1} << 26;
-
-struct Size {
-  std::int64_t width = 0, height = 0; ///< 0: unknown
-};
 
 using Bytes = std::span<const std::uint8_t>;
-
-std::int64_t
-big_endian (Bytes bytes, std::size_t at, int n)
-{
-  std::int64_t value = 0;
-  for (int i = 0; i < n; i++)
-    value = value << 8 | bytes[at + std::size_t (i)];
-  return value;
-}
-
-/* JPEG's size is in its frame header, behind segments that may be of any length. */
-Size
-jpeg_size (Bytes b)
-{
-  for (std::size_t at = 2; at + 9 < b.size () && b[at] == 0xff;) {
-    const std::uint8_t marker = b[at + 1];
-    const bool other = marker == 0xc4 || marker == 0xc8 || marker == 0xcc;
-    if (marker == 0xff) { /* padding */
-      at++;
-    } else if (marker >= 0xc0 && marker <= 0xcf && !other) {
-      return {big_endian (b, at + 7, 2), big_endian (b, at + 5, 2)};
-    } else {
-      at += 2 + std::size_t (big_endian (b, at + 2, 2));
-    }
-  }
-  return {};
-}
-
-Size
-picture_size (Bytes b)
-{
-  if (b.size () > 24 && std::memcmp (b.data (), "\x89PNG\r\n\x1a\n", 8) == 0)
-    return {big_endian (b, 16, 4), big_endian (b, 20, 4)};
-  return b.size () > 2 && b[0] == 0xff && b[1] == 0xd8 ? jpeg_size (b) : Size{};
-}
 
 /* Any depth and number of channels to BGRA of 8 bits. */
 cv::Mat
@@ -117,14 +76,8 @@ decode_texture (Bytes bytes, const std::string &name, const TextureSettings &set
 {
   const Status bad = {
       StatusCode::kBadData, name + ": is no image that can be read; convert it to JPEG or PNG"};
-  const Size size = picture_size (bytes);
-  if (size.width <= 0 || size.height <= 0)
+  if (bytes.empty ())
     return bad;
-  if (size.width > kMaxSide || size.height > kMaxSide || size.width * size.height > kMaxPixels)
-    return {
-        StatusCode::kUnsupported, name + ": a picture of " + std::to_string (size.width) + "x" +
-                                      std::to_string (size.height) +
-                                      " pixels; at most 64 million and 16384 a side are supported"};
   try {
     const cv::Mat data (
         1, static_cast<int> (bytes.size ()), CV_8U, const_cast<std::uint8_t *> (bytes.data ()));

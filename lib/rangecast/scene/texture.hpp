@@ -18,10 +18,9 @@ struct TextureSettings {
   std::uint8_t alpha_cutoff = 0;   ///< see Mesh; 0: alpha is ignored
 };
 
-/** Decodes JPEG or PNG. The size in the picture's header is checked before anything of
- *  that size is allocated.
- *  @param name  of the picture, for the error
- *  @return kBadData or kUnsupported naming the picture */
+/** Decodes JPEG or PNG, of at most 2^30 pixels (OpenCV's limit).
+ *  @param name  of the image, for the error
+ *  @return kBadData naming the image */
 Status decode_texture (std::span<const std::uint8_t> bytes, const std::string &name,
     const TextureSettings &settings, std::shared_ptr<const MipMap> &texture);
 

@@ -28,8 +28,7 @@ Status
 Rectifier::set (const View &view)
 {
   if (!view.right)
-    return {StatusCode::kNotFound,
-        "view " + std::to_string (view.id) + ": has no right camera; expected a stereo pair"};
+    return {StatusCode::kNotFound, "view " + std::to_string (view.id) + ": has no right camera"};
   range_view_ = view;
   range_view_.distortion.clear ();
   range_view_.right.reset ();
@@ -64,12 +63,12 @@ Rectifier::compute_rectification (const View &view)
     cv::initUndistortRectifyMap (
         k2, right.distortion, r2, p2, size, CV_16SC2, maps_[1][0], maps_[1][1]);
   } catch (const cv::Exception &) {
-    return bad_pair (view, "cannot be rectified; expected a calibrated stereo pair");
+    return bad_pair (view, "cannot be rectified; calibrate it again");
   }
   const double fx = p1.at<double> (0, 0);
   if (std::abs (p2.at<double> (1, 3)) > std::abs (p2.at<double> (0, 3)))
     return bad_pair (view, "its cameras stand one above the other, or one lies on its side or is "
-                           "upside down; expected them side by side and the same way up");
+                           "upside down; put them side by side and the same way up");
   baseline_m_ = -p2.at<double> (0, 3) / fx;
   principal_offset_ = p2.at<double> (0, 2) - p1.at<double> (0, 2);
   if (!(baseline_m_ > 0))

@@ -49,7 +49,7 @@ ThirdPair::choose_axes (const View &view)
     return bad_third (view, "stands where the left one is");
   const Vec3 x = 1 / baseline_m_ * to_third, across = cross ({0, 0, 1}, x);
   if (norm (across) < 0.5)
-    return bad_third (view, "stands before or behind the left one; expected beside or above");
+    return bad_third (view, "stands before or behind the left one, not beside or above");
   const Vec3 y = 1 / norm (across) * across, z = cross (x, y);
   rectified_from_left_ = {x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z};
   return {};
@@ -111,7 +111,7 @@ ThirdPair::make_maps (const View &view)
     cv::initUndistortRectifyMap (camera_matrix (view.third->intrinsics), view.third->distortion,
         rotations[1], rectified_camera_, size, CV_16SC2, maps_[1][0], maps_[1][1]);
   } catch (const cv::Exception &) {
-    return bad_third (view, "cannot be rectified; expected a calibrated pair");
+    return bad_third (view, "cannot be rectified; calibrate it again");
   }
   return {};
 }
@@ -138,8 +138,7 @@ Status
 ThirdPair::set (const View &view, const View &range_view, double focal_baseline, int n_threads)
 {
   if (!view.third)
-    return {StatusCode::kNotFound,
-        "view " + std::to_string (view.id) + ": has no third camera; expected `third` in the rig"};
+    return {StatusCode::kNotFound, "view " + std::to_string (view.id) + ": has no third camera"};
   if (Status s = choose_axes (view); !s.ok ())
     return s;
   if (Status s = place (view, range_view); !s.ok ())

@@ -17,8 +17,8 @@ struct SceneFrame {
   double distance_m = 1;    ///< of the first view from the target
   double elevation_deg = 0; ///< of the first view above the level through the target
   double fov_deg = 45;      ///< vertical field of view of the first view
-  double off_centre_x = 0;  ///< the first view's principal point, right of the picture's middle
-  double off_centre_y = 0;  ///< and below it, both in halves of the picture's height
+  double off_centre_x = 0;  ///< the first view's principal point, right of the image centre
+  double off_centre_y = 0;  ///< and below it, both in halves of the image height
 };
 
 /** Several views: the target is the point of the first view's axis that is nearest to where all
@@ -86,5 +86,60 @@ Mat4 in_part (const Mat4 &clip_from_world, const PicturePart &part);
  *  is not in front of the camera. */
 Roi covered_part (const Mat4 &clip_from_world, std::span<const Vec3> hull, int width, int height,
     const Roi &part);
+
+/** An orbiting camera that pointers and keys move, within the ranges of striprender's properties.
+ */
+class OrbitMotion {
+public:
+  Orbit orbit;                ///< azimuth -360 to 360 degrees
+  unsigned home_requests = 0; ///< how often the first view was requested
+
+  /** Sets what is on the screen, for drags, and the camera's position while members of `orbit` are
+   *  0. @param width, height  of the picture, pixels */
+  void set_shown (const OrbitMatrices &matrices, const SceneFrame &scene, int width, int height);
+
+  void turn (double azimuth_deg, double elevation_deg);
+  /** Multiplies the distance. */
+  void zoom (double factor);
+  /** A drag by pixels: half a circle over the width of the picture, a quarter over its height. */
+  void orbit_by (double dx, double dy);
+  /** A drag by pixels: the scene follows the pointer. */
+  void pan_by (double dx, double dy);
+  /** Two fingers move: to distance `after` between them, pixels, and their middle by (dx, dy). */
+  void pinch (double dx, double dy, double before, double after);
+  /** What a key or a notch of the wheel does: turns by steps, moves nearer or farther by one. */
+  void step (int right, int up);
+  void step_nearer (bool nearer);
+  /** Back to the first view; the field of view stays. */
+  void go_home ();
+
+private:
+  double home_distance_m_ = 1, home_elevation_deg_ = 0;
+  Vec3 pan_right_, pan_down_;
+  int width_ = 640, height_ = 480;
+};
+
+/** Clip coordinates of (column, row, 1) times depth, and 1: pixels of the ROI, depth units. */
+Mat4 clip_from_pixel (const Mat4 &clip_from_world, const View &view, const Roi &roi);
+
+/** Position of the camera of a perspective matrix, world, metres. */
+Vec3 viewer_position (const Mat4 &clip_from_world);
+
+/** Cosine of the angle between the directions in which the viewer and a view look. */
+double view_alignment (const Mat4 &clip_from_world, const View &view);
+
+/** Whether a clip matrix of pixels mirrors. If it does not, triangles that are counter-clockwise in
+ *  their view's picture (y down) are so for OpenGL, too. */
+bool mirrors (const Mat4 &clip_from_world);
+
+/** Moves z in normalised device coordinates, a + b / w, to that of a point g farther from the
+ * viewer, a + b / (w + g). Unlike an equivalent offset of z it never crosses the far plane when the
+ * near plane is close. */
+struct DepthShift {
+  float a, b, g;
+};
+/** @param clip_matrix  a matrix whose w is the distance along the viewer's direction
+ *  @param gap_m        metres */
+DepthShift depth_shift (const Mat4 &clip_matrix, const Mat4 &clip_from_world, double gap_m);
 
 } // namespace rangecast

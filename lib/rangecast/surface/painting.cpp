@@ -53,9 +53,9 @@ inside_gap (const Mat4 &clip_from_world, const View &view)
 }
 
 double
-strip_gap (const Mat4 &clip_from_world, const View &view, double view_gap_m)
+strip_gap (const Mat4 &clip_from_world, const View &view)
 {
-  return view_gap_m * (1 - view_alignment (clip_from_world, view));
+  return kViewGap_m * (1 - view_alignment (clip_from_world, view));
 }
 
 LayerAngles

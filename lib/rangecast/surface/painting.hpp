@@ -7,14 +7,15 @@
 #include <span>
 #include <vector>
 
+#include "orbit.hpp"
 #include "shaders.hpp"
 #include "surface_scene.hpp"
-#include "view_matrices.hpp"
 
 namespace rangecast {
 
 /** Metres by which a view's surfaces move away from the viewer, times 1 - cosine of the angle
- *  between the two's directions; not in mode kBlend. */
+ *  between the two's directions; not in mode kBlend. More than stereo's noise, less than a nose:
+ *  with 4, 12, 40 and 100 mm PSNR is 42.9, 43.4, 43.3 and 43.3 dB. */
 inline constexpr double kViewGap_m = 0.012;
 /** Mode kBlend: metres behind the nearest surface within which views are blended. */
 inline constexpr double kBlendRange_m = 0.02;
@@ -51,7 +52,7 @@ LayerPlace place_layer (const Mat4 &clip_from_pixel, const Mat4 &clip_from_world
 double inside_gap (const Mat4 &clip_from_world, const View &view);
 /** The same in the other modes. Where two views see one surface, the one that looks more as the
  *  viewer does is in front: it has more pixels there, and noise must not let both show. */
-double strip_gap (const Mat4 &clip_from_world, const View &view, double view_gap_m);
+double strip_gap (const Mat4 &clip_from_world, const View &view);
 
 /** The angle between a view's ray and the viewer's: u_lens, u_viewer and u_unit of pass 1. */
 struct LayerAngles {

@@ -10,7 +10,10 @@ namespace {
 /* Pixels: smaller tiles follow the surface more closely. */
 constexpr int kTile = 32;
 
-} // namespace
+/* Nearest and farthest valid depth, depth units; farthest = 0 if none is valid. */
+struct DepthSpan {
+  std::uint16_t nearest, farthest;
+};
 
 DepthSpan
 depth_span (const ImageView<const std::uint16_t> &depth)
@@ -26,6 +29,8 @@ depth_span (const ImageView<const std::uint16_t> &depth)
   }
   return {static_cast<std::uint16_t> (nearest + 1), farthest};
 }
+
+} // namespace
 
 void
 append_hull (const ConstRangeImage &image, const View &view, std::vector<Vec3> &hull)

@@ -299,8 +299,6 @@ void main ()
     vec4 filled = fill (at);
     sum = vec4 (mix (sum.rgb / sum.a, filled.rgb, filled.a), 1.0);
   }
-#elif WITH_DEPTH
-  gl_FragDepth = texelFetch (u_depths, at, 0).r;
 #else
   gl_FragDepth = is_gap ? 1.0 : 0.0;
 #endif
@@ -320,10 +318,10 @@ strip_vertex_shader (bool with_offsets, bool both_sides)
 }
 
 std::string
-finish_shader (bool fill, bool with_depth)
+finish_shader (bool fill)
 {
-  return "#define FILL " + std::to_string (fill) + "\n#define WITH_DEPTH " +
-         std::to_string (with_depth) + kBackgroundFunction + kBlendWeights + kFinishFragment;
+  return "#define FILL " + std::to_string (fill) + kBackgroundFunction + kBlendWeights +
+         kFinishFragment;
 }
 
 } // namespace
@@ -349,11 +347,9 @@ shader_source (Shader shader)
     case Shader::kBlendFragment:
       return std::string (kBlendWeights) + kBlendFragment;
     case Shader::kFinishFragment:
-      return finish_shader (false, false);
-    case Shader::kFinishDepthFragment:
-      return finish_shader (false, true);
+      return finish_shader (false);
     case Shader::kFillFragment:
-      return finish_shader (true, false);
+      return finish_shader (true);
     case Shader::kSumFragment:
       break;
   }

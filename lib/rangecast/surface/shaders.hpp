@@ -18,10 +18,9 @@ enum class Shader : unsigned {
   kPointVertex,        ///< of mode kPoints
   kBlendVertex,        ///< BlendVertex, pass 1: each view into its cell
   kBlendFragment,
-  kFinishFragment,      ///< pass 3: the picture; depth is 1 where pass 4 is needed, else 0
-  kFinishDepthFragment, ///< the same, with the surfaces' depth
-  kFillFragment,        ///< pass 4: the picture with small gaps filled
-  kSumFragment,         ///< pass 2: colours of one cell added up by weight; see sum_shader()
+  kFinishFragment, ///< pass 3: the picture; depth is 1 where pass 4 is needed, else 0
+  kFillFragment,   ///< pass 4: the picture with small gaps filled
+  kSumFragment,    ///< pass 2: colours of one cell added up by weight; see sum_shader()
 };
 
 /** Greatest number of cells that pass 2 of mode kBlend adds up. */

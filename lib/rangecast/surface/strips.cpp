@@ -67,10 +67,7 @@ public:
         width_ (std::min (image.depth.width, kMaxStripSide)),
         height_ (std::min (image.depth.height, kMaxStripSide)),
         step_ (static_cast<int> (settings.depth_step * 65536)),
-        tolerance_ (tolerances (settings.merge * (planes ? kMergeDepthBlend : kMergeDepth),
-            settings.merge * kMergeColour)),
-        copy_tolerance_ (
-            tolerances (settings.merge * kMergeCopyDepth, settings.merge * kMergeCopyColour))
+        tolerance_ (tolerances (planes ? kMergeDepthBlend : kMergeDepth, kMergeColour))
   {
   }
 
@@ -135,7 +132,7 @@ private:
    * stick out of surfaces seen at a grazing angle, whose rows are far apart in depth. */
   [[nodiscard]] Lower lower_of (int x) const
   {
-    const int last = std::min (height_ - 1, row_ + 1 + settings_.max_gap);
+    const int last = std::min (height_ - 1, row_ + 1 + kMaxStripGap);
     for (int y = row_ + 1; y <= last; y++)
       if (const std::uint16_t depth = image_.depth.at (x, y); depth != kInvalidDepth) {
         if (y == row_ + 1 ? joins_pixel_below (x) : near (depth_[x], depth))
@@ -166,7 +163,7 @@ private:
   /* The next pixel of the band after x, or -1. */
   [[nodiscard]] int next_in_band (int x) const
   {
-    const int last = std::min (width_ - 1, x + 1 + settings_.max_gap);
+    const int last = std::min (width_ - 1, x + 1 + kMaxStripGap);
     for (int n = x + 1; n <= last; n++)
       if (depth_[n] != kInvalidDepth)
         return (n == x + 1 ? joins_pixel_right (x, row_) : near (depth_[x], depth_[n])) ? n : -1;
@@ -178,9 +175,7 @@ private:
   {
     const std::uint16_t *depth = image_.depth.row (y);
     const Rgbx *colour = colour_.row (y);
-    std::fill_n (kept, width_, settings_.merge <= 0);
-    if (settings_.merge <= 0)
-      return;
+    std::fill_n (kept, width_, false);
     Cone cone;
     PixelLanes before{};
     int first = -1; /* where the piece begins; -1: none does */
@@ -443,7 +438,8 @@ private:
   StripResult &result_;
   const int width_, height_;
   const int step_; /* of 65536 */
-  const PixelLanes tolerance_, copy_tolerance_;
+  const PixelLanes tolerance_;
+  const PixelLanes copy_tolerance_ = tolerances (kMergeCopyDepth, kMergeCopyColour);
   const std::uint16_t *depth_ = nullptr;
   int row_ = 0;
   /* by column */

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "surface_scene.hpp"
 
+#include <utility>
+
 #include "../base/parallel.hpp"
+#include "orbit.hpp"
 #include "scene_hull.hpp"
-#include "view_matrices.hpp"
 #include "view_tint.hpp"
 
 namespace rangecast {
@@ -11,11 +13,18 @@ namespace rangecast {
 void
 SurfaceScene::set_rig (const Rig &rig)
 {
+  constexpr double kMoved = 0.1; /* metres; rangealign corrects poses by less */
+  Rig all = rig;
+  bool same = true;
+  for (const View &before : known_.views)
+    if (const View *now = rig.find (before.id); !now)
+      all.views.push_back (before);
+    else
+      same = same && now->width == before.width && now->height == before.height &&
+             norm (now->world_from_view.translation - before.world_from_view.translation) < kMoved;
   rig_ = &rig;
-  frame_ = scene_frame (rig);
-  lines_.clear ();
-  for (std::size_t i = 0; i < rig.views.size (); i++)
-    append_camera_lines (rig.views[i], camera_colour (i), lines_);
+  known_ = same ? std::move (all) : rig;
+  frame_ = scene_frame (known_);
   count_ = 0;
   complete_ = false;
 }
@@ -80,7 +89,7 @@ SurfaceScene::build (std::span<const RangeImage> images, const SurfaceSettings &
       image.colour = views_[i].image.colour;
     else if (settings.tint_views)
       image.colour = tinted (images[i].colour,
-          camera_colour (std::size_t (view - rig_->views.data ())), memory_[i].tinted);
+          view_colour (std::size_t (view - rig_->views.data ())), memory_[i].tinted);
     views_[i] = {image, view};
     if (is_reduced)
       views_[i] = memory_[i].reduced.reduce (views_[i]);

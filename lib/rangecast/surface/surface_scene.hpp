@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "blend_planes.hpp"
-#include "camera_lines.hpp"
 #include "orbit.hpp"
 #include "reduced_view.hpp"
 #include "strips.hpp"
@@ -34,13 +33,15 @@ struct SurfaceSettings {
  *  frame set to the next. For one thread at a time. */
 class SurfaceScene {
 public:
-  /** The rig must live as long as it is used here. */
+  /** The rig must live as long as it is used here. Views that have left still count for frame(), so
+   * that the picture does not turn, unless another one is elsewhere now: then this is another rig.
+   */
   void set_rig (const Rig &rig);
-  /** The camera's default position, from the rig. */
+  /** Forgets the views that have left. */
+  void reset () { known_ = {}; }
+  /** The camera's default position, from the rig and the views that have left. */
   [[nodiscard]] const SceneFrame &frame () const { return frame_; }
   [[nodiscard]] std::size_t rig_views () const { return rig_->views.size (); }
-  /** The rig's cameras and their frusta. */
-  [[nodiscard]] std::span<const LineVertex> camera_lines () const { return lines_; }
 
   /** Makes the strips of images, each of a view in the rig, its ROI in that view's image and no
    *  larger than kMaxStripSide. If it is the same frame set as last time and nothing that strips
@@ -74,8 +75,8 @@ private:
   void build_view (std::size_t which, const SurfaceSettings &settings);
 
   const Rig *rig_ = nullptr;
+  Rig known_; /* rig_ and the views that have left */
   SceneFrame frame_;
-  std::vector<LineVertex> lines_;
   std::array<ViewMemory, kMaxViews> memory_; /* by number in the frame set */
   std::array<StripResult, kMaxViews> results_{};
   std::array<SurfaceView, kMaxViews> views_;

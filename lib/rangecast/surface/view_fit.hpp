@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
-#include "scene_fit.hpp"
+#include "../geometry/range_image.hpp"
+#include "orbit.hpp"
 #include "surface_scene.hpp"
 
 namespace rangecast {
@@ -45,5 +47,14 @@ private:
   Picture picture_;                       /* that the fit is for */
   SceneFrame frame_;
 };
+
+/** The scene with another target and distance: the points, seen from the orbit's direction with its
+ *  field of view, are in the middle of the picture and fill 85 % of its width or height, whichever
+ *  they reach first. The target is in the middle of their depth, and the principal point in the
+ *  middle of the picture. The outermost 0.2 % of the points at each edge are treated as noise.
+ *  @param aspect  width / height of the picture
+ *  @param points  world, metres; if there are none, the scene stays as it is */
+SceneFrame fitted_frame (
+    const SceneFrame &scene, const Orbit &orbit, double aspect, std::span<const Vec3> points);
 
 } // namespace rangecast

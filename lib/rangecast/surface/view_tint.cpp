@@ -1,10 +1,21 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "view_tint.hpp"
 
+#include <iterator>
+
 namespace rangecast {
 
+ViewColour
+view_colour (std::size_t index)
+{
+  static constexpr ViewColour kColours[] = {{255, 96, 80, "red"}, {96, 220, 96, "green"},
+      {96, 160, 255, "blue"}, {255, 208, 64, "yellow"}, {224, 112, 255, "violet"},
+      {64, 224, 224, "cyan"}, {255, 160, 64, "orange"}, {224, 224, 224, "white"}};
+  return kColours[index % std::size (kColours)];
+}
+
 ImageView<Rgbx>
-tinted (const ImageView<const Rgbx> &picture, const LineColour &colour, std::vector<Rgbx> &memory)
+tinted (const ImageView<const Rgbx> &picture, const ViewColour &colour, std::vector<Rgbx> &memory)
 {
   const auto width = static_cast<std::size_t> (picture.width);
   memory.resize (width * static_cast<std::size_t> (picture.height));

@@ -119,7 +119,11 @@ TriggerMatcher::find (std::uint64_t frame_id, std::int64_t camera_ns, std::int64
     const std::int64_t differs = by_time.trigger - numbered;
     contradictions_ = by_time.known && differs == contradiction_ ? contradictions_ + 1 : 1;
     contradiction_ = differs;
-    const bool near = by_time.known && std::llabs (by_time.residual_ns) < period_ns_ / 4;
+    /* Triggers on request may be closer than delays are alike; a missed one has passed long ago. */
+    const bool apart =
+        by_time.known && std::llabs (trigger_at (by_time.trigger)->time_ns -
+                                     trigger_at (numbered)->time_ns) >= period_ns_ / 2;
+    const bool near = apart && std::llabs (by_time.residual_ns) < period_ns_ / 4;
     const bool time_wins = near && (stamped_ || contradictions_ >= kMaxContradictions);
     if (!time_wins && std::llabs (by_number.residual_ns) < 2 * period_ns_)
       by_time = by_number;

@@ -9,11 +9,11 @@ namespace rangecast {
 /** Finds the trigger that a camera's frame belongs to. One instance for each camera.
  *
  *  It combines the frame's number, which increases by one with each frame, and its time stamp,
- * which follows the trigger by a fixed delay on the camera's own clock. Numbers alone would be off
- * for good after a missed trigger, which cameras do not count; stamps alone would misplace a frame
- * that a busy camera took late. If the two disagree, the stamp wins if it is within a quarter of a
- * period of a trigger. For cameras without time stamps the arrival is used, which wins only after
- * three equal disagreements.
+ *  which follows the trigger by a fixed delay on the camera's own clock. Numbers alone would be off
+ *  for good after a missed trigger, which cameras do not count; stamps alone would misplace a frame
+ *  that a busy camera took late. If the two disagree, the stamp wins if it is within a quarter of
+ *  a period of a trigger, and that one is at least half a period away from the numbered one. For
+ * cameras without time stamps the arrival is used, which wins only after three equal disagreements.
  *
  *  Delay and number are learnt from triggers that were fired alone, when all before were answered
  * or given up: fire such ones until settled(), when two of them have agreed. Nothing is allocated.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <iterator>
-#include <rangecast/surface/orbit_motion.hpp>
+#include <rangecast/surface/orbit.hpp>
 #include <rangecast/surface/painting.hpp>
 #include <rangecast/surface/shaders.hpp>
 #include <vector>
@@ -93,11 +93,12 @@ write (std::vector<float> &to, std::initializer_list<double> values)
  *  @param max_side  of a texture, pixels */
 void
 write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from_world, int width,
-    int height, const Roi &part, int max_side)
+    int height, int max_side)
 {
   static rangecast::BlendAtlas atlas;
   static std::vector<double> alignments;
-  const Roi covered = rangecast::covered_part (clip_from_world, scene.hull, width, height, part);
+  const Roi covered =
+      rangecast::covered_part (clip_from_world, scene.hull, width, height, {0, 0, width, height});
   const auto shift =
       rangecast::depth_shift (clip_from_world, clip_from_world, rangecast::kBlendRange_m);
   constexpr unsigned colour = rangecast::kBackgroundColour;
@@ -112,7 +113,7 @@ write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from
   write (to, {any ? double (atlas.cells) : 0, double (atlas.width), double (atlas.height), 0});
   write (to,
       {double (covered.x), double (covered.y), double (covered.width), double (covered.height)});
-  write (to, {shift.a, shift.b, shift.g, double (rangecast::fill_reach (part.height)),
+  write (to, {shift.a, shift.b, shift.g, double (rangecast::fill_reach (height)),
                  double (rangecast::mirrors (clip_from_world)), double (scene.layers.size ())});
   for (std::size_t i = 0; i < scene.layers.size (); i++) {
     const auto &[view, roi] = scene.layers[i];
@@ -129,43 +130,6 @@ write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from
     to.insert (to.end (), std::begin (angles.viewer), std::end (angles.viewer));
     write (to, {angles.unit});
   }
-}
-
-/* ---- headsets ---- */
-
-/** Where the scene's target is before the user's eyes: ahead and below, metres. */
-constexpr double kAhead_m = 1.5, kBelow_m = 0.15;
-
-Mat4
-product (const Mat4 &a, const Mat4 &b)
-{
-  Mat4 c{};
-  for (std::size_t column = 0; column < 4; column++)
-    for (std::size_t row = 0; row < 4; row++)
-      for (std::size_t k = 0; k < 4; k++)
-        c[4 * column + row] += a[4 * k + row] * b[4 * column + k];
-  return c;
-}
-
-/* Local space of WebXR: x right, y up, -z ahead, the origin near the user's eyes. */
-Mat4
-local_from_world (const SceneFrame &home)
-{
-  const Vec3 z = home.to_first, y = home.up, x = rangecast::cross (y, z);
-  const Vec3 &t = home.target;
-  const double shift[] = {0, -kBelow_m, -kAhead_m};
-  Mat4 to{};
-  std::size_t row = 0;
-  for (const Vec3 &axis : {x, y, z}) {
-    const double in_world = rangecast::dot (axis, t);
-    to[row] = float (axis.x);
-    to[4 + row] = float (axis.y);
-    to[8 + row] = float (axis.z);
-    to[12 + row] = float (shift[row] - in_world);
-    row++;
-  }
-  to[15] = 1;
-  return to;
 }
 
 } // namespace
@@ -193,34 +157,7 @@ rc_camera_picture (std::int32_t width, std::int32_t height, std::int32_t max_sid
   const auto matrices = rangecast::orbit_matrices (
       c.scene.home, c.motion.orbit, double (width) / height, false, {}, c.scene.hull, room_m);
   c.motion.set_shown (matrices, c.scene.home, width, height);
-  write_picture (
-      c.picture, c.scene, matrices.clip_from_world, width, height, {0, 0, width, height}, max_side);
-  return c.picture.data ();
-}
-
-/** The same for one eye of a headset, which draws into a part of a framebuffer. The input has that
- *  eye's clip_from_local: 16 floats, column by column. The person stands before the user, turned as
- *  the first view sees them.
- *  @param width, height  of the framebuffer, pixels
- *  @return nullptr if the input is not a matrix or the part does not lie in the framebuffer */
-RC_EXPORT (rc_camera_eye)
-const float *
-rc_camera_eye (std::int32_t width, std::int32_t height, std::int32_t x, std::int32_t y,
-    std::int32_t part_width, std::int32_t part_height, std::int32_t max_side)
-{
-  Mat4 clip_from_local;
-  const auto bytes = web::input (sizeof clip_from_local);
-  if (bytes.size () != sizeof clip_from_local || x < 0 || y < 0 || part_width < 1 ||
-      part_height < 1 || part_width > width - x || part_height > height - y)
-    return nullptr;
-  std::memcpy (clip_from_local.data (), bytes.data (), bytes.size ());
-  Camera &c = camera ();
-  const rangecast::PicturePart part = {double (part_width) / width, double (part_height) / height,
-      (2.0 * x + part_width) / width - 1, (2.0 * y + part_height) / height - 1};
-  const Mat4 clip_from_world =
-      rangecast::in_part (product (clip_from_local, local_from_world (c.scene.home)), part);
-  write_picture (c.picture, c.scene, clip_from_world, width, height,
-      {x, y, part_width, part_height}, max_side);
+  write_picture (c.picture, c.scene, matrices.clip_from_world, width, height, max_side);
   return c.picture.data ();
 }
 

@@ -21,7 +21,7 @@ namespace {
 using Bytes = std::span<const std::uint8_t>;
 
 /* The largest message: an access unit of a byte stream. */
-constexpr std::size_t kMaxInput = rangecast::kMaxAccessUnitSize + rangecast::kStreamPrefixSize;
+constexpr std::size_t kMaxInput = rangecast::kMaxAccessUnitSize + rangecast::kAccessUnitHeaderSize;
 
 std::vector<std::uint8_t> input_bytes;
 std::string message;
@@ -336,32 +336,16 @@ RC_EXPORT (rc_rig_views) std::uint32_t rc_rig_views ()
   return web::has_rig () ? std::uint32_t (web::frame_set ().rig->views.size ()) : 0;
 }
 
-/** Changes with the rig; 0: there is none yet. */
-RC_EXPORT (rc_rig_generation) std::uint32_t rc_rig_generation ()
-{
-  return rc_rig_views () > 0 ? web::frame_set ().rig_number : 0;
-}
-
-/** @return a record of a view of the rig: view-id, width, height, fx, fy, cx, cy, rotation (9, row
- *  by row) and translation (3) of world_from_view, depth unit, near, far (metres), address and
- *  bytes of the name (UTF-8); nullptr if there is none */
+/** @return a record of a view of the rig: view-id, width, height; nullptr if there is none */
 RC_EXPORT (rc_rig_view) const double *rc_rig_view (std::uint32_t index)
 {
-  static double record[24];
+  static double record[3];
   if (index >= rc_rig_views ())
     return nullptr;
   const View &view = web::frame_set ().rig->views[index];
-  const rangecast::Intrinsics &lens = view.intrinsics;
-  double *to = record;
-  for (const double value : {double (view.id), double (view.width), double (view.height), lens.fx,
-           lens.fy, lens.cx, lens.cy})
-    *to++ = value;
-  to = std::copy (view.world_from_view.rotation.begin (), view.world_from_view.rotation.end (), to);
-  const rangecast::Vec3 &t = view.world_from_view.translation;
-  for (const double value : {t.x, t.y, t.z, view.depth_unit_m, view.near_m, view.far_m,
-           double (reinterpret_cast<std::uintptr_t> (view.name.data ())),
-           double (view.name.size ())})
-    *to++ = value;
+  record[0] = view.id;
+  record[1] = view.width;
+  record[2] = view.height;
   return record;
 }
 

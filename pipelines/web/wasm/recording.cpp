@@ -8,7 +8,7 @@
 
 #include "border.hpp"
 
-using rangecast::kStreamPrefixSize;
+using rangecast::kAccessUnitHeaderSize;
 using rangecast::StreamFile;
 using rangecast::StreamPart;
 
@@ -19,7 +19,7 @@ rc_read (double offset, std::uint32_t size, std::uint8_t *to);
 namespace {
 
 /* A file that begins with more that is no access unit is something else. */
-constexpr std::size_t kMaxLeadingRubbish = 2 << 20;
+constexpr std::size_t kMaxLeadingGarbage = 2 << 20;
 /* Bytes that are read at a time, at least. */
 constexpr std::size_t kBlock = 256 << 10;
 
@@ -27,7 +27,7 @@ struct Recording {
   double size = 0;      /* bytes */
   std::uint64_t at = 0; /* offset of what `buffer` holds from `begin` on */
   std::vector<std::uint8_t> buffer;
-  std::size_t begin = 0, rubbish = 0;
+  std::size_t begin = 0, garbage = 0;
   bool any_access_unit = false, any_frame_set = false;
   std::uint64_t first_ns = rangecast::kNoTime, last_ns = rangecast::kNoTime;
   std::string ending;  /* how it is cut off; empty: it is not */
@@ -89,19 +89,16 @@ missing_data ()
   if (!r.any_access_unit)
     return r.version.empty () ? "This is no recording of gst-rangecast (.rcnc)."
                               : "The recording cannot be read: " + r.version + ".";
-  return web::has_rig () ? "The recording ends before its first whole picture."
+  return web::has_rig () ? "The recording ends before its first complete frame set."
                          : "The recording has no rig, which says where its cameras stand.";
 }
 
-/* A stream of another version begins with the same start code. */
+/* The access units of another version have the same magic. */
 void
 look_at_version (std::span<const std::uint8_t> bytes)
 {
-  rangecast::UnitHeader unit;
-  const auto code = rangecast::kStartCode;
-  if (bytes.size () < kStreamPrefixSize || !std::equal (code.begin (), code.end (), bytes.begin ()))
-    return;
-  const auto status = rangecast::read_unit_header (bytes.subspan (code.size ()), unit);
+  rangecast::AccessUnitHeader header;
+  const auto status = rangecast::read_access_unit_header (bytes, header);
   if (status.code () == rangecast::StatusCode::kUnsupported)
     recording->version = status.message ();
 }
@@ -111,7 +108,7 @@ note_ending (const StreamPart &part)
 {
   if (part.expected)
     recording->ending = "The recording is cut off: its last frame set has " +
-                        std::to_string (part.length + part.rubbish) + " of " +
+                        std::to_string (part.length + part.garbage) + " of " +
                         std::to_string (part.expected) + " bytes.";
 }
 
@@ -124,7 +121,7 @@ decode_part (const StreamPart &part)
   r.any_access_unit = true;
   if (r.first_ns == rangecast::kNoTime)
     r.first_ns = pts;
-  web::add_units (r.bytes ().subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
+  web::add_units (r.bytes ().subspan (kAccessUnitHeaderSize, part.length - kAccessUnitHeaderSize));
   const bool timed = pts != rangecast::kNoTime && pts >= r.first_ns;
   const web::Outcome outcome = web::decode (timed ? pts - r.first_ns : rangecast::kNoPts);
   r.any_frame_set |= outcome == web::kDone;
@@ -145,18 +142,18 @@ next (bool whole)
     }
     note_ending (part);
     if (whole && part.expected && r.any_frame_set) {
-      skip (part.length + part.rubbish);
+      skip (part.length + part.garbage);
     } else if (part.length) {
       const web::Outcome outcome = decode_part (part);
       skip (part.length);
       if (outcome != web::kNothing)
         return outcome;
-    } else if (part.rubbish) {
+    } else if (part.garbage) {
       if (r.at == 0)
         look_at_version (r.bytes ());
-      r.rubbish += r.any_access_unit ? 0 : part.rubbish;
-      skip (part.rubbish);
-      if (r.rubbish > kMaxLeadingRubbish)
+      r.garbage += r.any_access_unit ? 0 : part.garbage;
+      skip (part.garbage);
+      if (r.garbage > kMaxLeadingGarbage)
         return web::fail (missing_data ());
     } else if (r.any_frame_set) {
       web::set_message (r.ending);
@@ -165,21 +162,6 @@ next (bool whole)
       return web::fail (missing_data ());
     }
   }
-}
-
-/* The rig that holds at a place of the file is repeated in front of it. */
-void
-use_rig_at (std::uint64_t offset, const rangecast::AccessUnitHeader &header)
-{
-  std::vector<std::uint8_t> units (header.size);
-  const std::uint32_t got = rc_read (double (offset + kStreamPrefixSize),
-      static_cast<std::uint32_t> (units.size ()), units.data ());
-  rangecast::UnitReader reader (
-      std::span (units).first (std::min<std::size_t> (got, units.size ())));
-  rangecast::UnitHeader unit_header;
-  while (const auto unit = reader.next (unit_header))
-    if (unit_header.type == static_cast<std::uint8_t> (rangecast::UnitType::kRigView))
-      web::add_units (*unit);
 }
 
 void
@@ -226,8 +208,6 @@ RC_EXPORT (rc_recording_seek) std::int32_t rc_recording_seek (double ms)
   const auto &place = target.before ? target.before : target.after;
   if (!place)
     return web::kNothing;
-  if (target.rig)
-    use_rig_at (target.rig->offset, target.rig->header);
   go_to (place->offset);
   return web::kDone;
 }

@@ -21,8 +21,8 @@ using Coded = std::vector<std::vector<std::uint8_t>>;
  *  all of them again and again; a codec may refer to earlier ones. One thread each. */
 class Codec {
 public:
-  Codec (std::string name, std::string settings, bool whole)
-      : name_ (std::move (name)), settings_ (std::move (settings)), whole_ (whole)
+  Codec (std::string name, std::string settings)
+      : name_ (std::move (name)), settings_ (std::move (settings))
   {
   }
   virtual ~Codec () = default;
@@ -31,8 +31,6 @@ public:
 
   [[nodiscard]] const std::string &name () const { return name_; }
   [[nodiscard]] const std::string &settings () const { return settings_; }
-  /** Codes whole pictures, not only the ROI. */
-  [[nodiscard]] bool whole () const { return whole_; }
 
   /** The next frame set to encode is the first one again: nothing may refer to earlier ones. */
   virtual void begin () {}
@@ -43,13 +41,9 @@ public:
   /** Decodes a frame set. Measured.
    *  @param pictures  one for each view in order, of the right size, to be filled */
   virtual rangecast::Status decode (const Coded &from, std::vector<Picture> &pictures) = 0;
-  /** What decode() left to do before pictures can be compared. Not measured.
-   *  @param set  the original, for what is not the codec's to know: which pixel a point was */
-  virtual rangecast::Status finish (const FrameSet &set, std::vector<Picture> &pictures);
 
 private:
   std::string name_, settings_;
-  bool whole_;
 };
 
 using Codecs = std::vector<std::unique_ptr<Codec>>;
@@ -65,23 +59,16 @@ std::string read_settings (const std::string &text, rangecast::EncoderSettings &
 rangecast::Status make_neighbour_code (const rangecast::Rig &rig,
     const rangecast::EncoderSettings &settings, std::unique_ptr<Codec> &codec);
 
-/** @name Peers
- *  Nothing for a peer whose library was not there when this was built. @{ */
-enum class DepthCode { kRvl, kRvlZstd, kPngFast, kPng };
-enum class ColourCode { kJpeg, kPngFast, kPng };
-/** Depth and colour each with a code of its own. @param quality  of JPEG, 1 to 100 */
-std::unique_ptr<Codec> make_pair (DepthCode depth, ColourCode colour, int quality, bool whole);
-/** A point cloud: sequential, positions of 11 bits in the box of the view's points, colour exact.
- */
-std::unique_ptr<Codec> make_draco (const rangecast::Rig &rig);
-/** Two video streams of each view: colour in 4:2:0, depth as hues in 4:4:4. x264, preset veryfast,
- *  tune zerolatency, a key frame every 30.
- *  @param colour_crf, depth_crf  constant rate factors, 0 (best) to 51 */
-std::unique_ptr<Codec> make_x264 (const rangecast::Rig &rig, int colour_crf, int depth_crf);
-/** @} */
+/** The peer: RVL for depth and JPEG for colour. @param quality  of JPEG, 1 to 100 */
+std::unique_ptr<Codec> make_peer (int quality);
 
 inline constexpr const char *kPeerName = "RVL + JPEG"; ///< what all are compared with
-/** The name of a codec that may code whole pictures. */
-std::string name_of (const std::string &code, bool whole);
+
+/** RVL + JPEG at all qualities. */
+void add_peers (Codecs &codecs);
+
+/** The neighbour code: every profile at several thresholds and choices.
+ *  @param sequence  there are several frame sets, so that temporal ones make sense */
+rangecast::Status add_profiles (const rangecast::Rig &rig, bool sequence, Codecs &codecs);
 
 } // namespace bench

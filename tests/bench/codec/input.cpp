@@ -39,7 +39,6 @@ make_view (int view_id, Picture whole)
     std::copy_n (whole.depth.begin () + from, view.roi.width, view.person.depth.begin () + to);
     std::copy_n (whole.colour.begin () + from, view.roi.width, view.person.colour.begin () + to);
   }
-  view.whole = std::move (whole);
   return view;
 }
 

@@ -24,14 +24,11 @@ struct Picture {
   rangecast::RangeImage image (int view_id, const rangecast::Roi &roi);
 };
 
-/** One view of a frame set, twice. */
+/** One view of a frame set. */
 struct ViewPictures {
   int view_id = 0;
   rangecast::Roi roi; ///< of all pixels with depth
-  Picture whole;      ///< everything outside the person black
   Picture person;     ///< cut to the ROI
-
-  [[nodiscard]] const Picture &area (bool all) const { return all ? whole : person; }
 };
 
 using FrameSet = std::vector<ViewPictures>;

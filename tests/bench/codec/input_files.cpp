@@ -134,7 +134,6 @@ make_camera (int id, const Picture &picture, double depth_unit_m)
   view.id = id;
   view.width = picture.width;
   view.height = picture.height;
-  /* Only Draco asks, which codes points rather than pixels: an angle of 53 degrees. */
   view.intrinsics = {double (picture.width), double (picture.width), (picture.width - 1) / 2.0,
       (picture.height - 1) / 2.0};
   view.depth_unit_m = depth_unit_m;

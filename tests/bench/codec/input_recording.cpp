@@ -12,20 +12,6 @@ using namespace rangecast;
 namespace bench {
 namespace {
 
-/* Puts a decoded ROI back into its picture. */
-Picture
-uncrop (Picture &cut, const Roi &roi, const View &view)
-{
-  Picture whole (view.width, view.height);
-  for (int y = 0; y < roi.height; y++) {
-    const std::ptrdiff_t to = std::ptrdiff_t{roi.y + y} * view.width + roi.x;
-    const std::ptrdiff_t from = std::ptrdiff_t{y} * roi.width;
-    std::copy_n (cut.depth.begin () + from, roi.width, whole.depth.begin () + to);
-    std::copy_n (cut.colour.begin () + from, roi.width, whole.colour.begin () + to);
-  }
-  return whole;
-}
-
 class RecordingReader {
 public:
   RecordingReader (std::string path, int skip, Input &input)
@@ -56,8 +42,9 @@ public:
       return fail ("damaged or lossy, expected a recording with all slices");
     FrameSet set;
     for (std::size_t i = 0; i < images.size (); i++) {
-      const View &view = *input_.rig.find (images[i].view_id);
-      set.push_back (make_view (view.id, uncrop (pictures[i], images[i].roi, view)));
+      set.push_back (make_view (images[i].view_id, std::move (pictures[i])));
+      set.back ().roi.x += images[i].roi.x;
+      set.back ().roi.y += images[i].roi.y;
       if (set.back ().roi.empty ())
         set.pop_back ();
     }
@@ -116,10 +103,10 @@ load_recording (const std::string &path, int skip, int frames, Input &input)
     const StreamPart part = next_part (rest, true);
     if (part.length)
       if (Status s =
-              reader.take (rest.subspan (kStreamPrefixSize, part.length - kStreamPrefixSize));
+              reader.take (rest.subspan (kAccessUnitHeaderSize, part.length - kAccessUnitHeaderSize));
           !s.ok ())
         return s;
-    rest = rest.subspan (part.length ? part.length : part.rubbish);
+    rest = rest.subspan (part.length ? part.length : part.garbage);
   }
   if (input.sets.empty ())
     return {StatusCode::kBadData,

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The neighbour code beside other codes of RGB-D pictures, on the same pixels in the same run.
+/* The neighbour code beside RVL + JPEG, on the same pixels in the same run.
  * docs/guide/settings.md says how to read it. */
 #include <cstdio>
 #include <opencv2/core/utils/logger.hpp>
 
 #include "../options.hpp"
-#include "report.hpp"
-#include "settings.hpp"
+#include "measure.hpp"
 
 using namespace rangecast;
 using namespace bench;
@@ -20,8 +19,8 @@ const char *const kUsage =
     "       codec_bench [--model FILE] [--size WxH] [--frames N] [--noise LEVELS]\n"
     "                   [--depth-noise MM]\n"
     "       with any of them: [--rounds N] [--try \"PROPERTY=VALUE ...\"] [--only TEXT]\n"
-    "                         [--depth-rms MM] [--json FILE]\n"
-    "Codes frame sets with every profile of the neighbour code and with its peers, and prints\n"
+    "                         [--json FILE]\n"
+    "Codes frame sets with every profile of the neighbour code and with its peer, and prints\n"
     "size, quality and time of each. Frame sets are pictures, a recording, or rendered.\n"
     "  --color FILE       colour picture; what follows it belongs to the same view\n"
     "  --depth FILE       its depth: 16 bits, one channel, 0 = none\n"
@@ -33,7 +32,7 @@ const char *const kUsage =
     "  --depth-unit M     metres that a depth of 1 is (default 0.001)\n"
     "  --near M, --far M  depths outside are cleared, and depth codes lie between (default: the\n"
     "                     least and the greatest depth of the pictures)\n"
-    "  --recording FILE   byte stream of neighbourcodeparse, recorded without loss for "
+    "  --recording FILE   recording of neighbourcodeenc, coded without loss for "
     "preference:\n"
     "                     depth-bits=16 depth-threshold=0 colour-threshold=0\n"
     "  --skip N           frame sets at its beginning to leave out (default 0)\n"
@@ -52,7 +51,6 @@ const char *const kUsage =
     "                     temporal=true\"; may be repeated\n"
     "  --only TEXT        only codecs with TEXT in their names (temporal: ', temporal'), and\n"
     "                     RVL + JPEG; \"RVL + JPEG\": nothing else\n"
-    "  --depth-rms MM     worst depth error in the list of best settings (default 1)\n"
     "  --json FILE        also write all rows as an array of objects\n"
     "Sizes and times are of a frame set, all views, one thread, means over frame sets.\n";
 
@@ -61,7 +59,7 @@ struct Job {
   SceneSettings scene;
   std::string recording, json, only;
   std::vector<EncoderSettings> tries;
-  double depth_noise_mm = 0, depth_rms_mm = 1;
+  double depth_noise_mm = 0;
   int skip = 0, frames = 0, rounds = 11;
 };
 
@@ -95,7 +93,6 @@ add_options (Options &options, Job &job)
   options.size ("--size", job.scene.width, job.scene.height, 16, 4096);
   options.number ("--noise", job.scene.noise_sigma, 0.0, 20.0);
   options.number ("--depth-noise", job.depth_noise_mm, 0.0, 1000.0);
-  options.number ("--depth-rms", job.depth_rms_mm, 0.0, 1e5);
   options.number ("--skip", job.skip, 0, 1000000);
   options.number ("--frames", job.frames, 1, 10000);
   options.number ("--rounds", job.rounds, 1, 100000);
@@ -162,8 +159,7 @@ Status
 make_codecs (const Job &job, const Input &input, Codecs &codecs)
 {
   const Rig &rig = input.rig;
-  for (const std::string &name : add_peers (rig, input.sets.size () > 1, codecs))
-    std::printf ("left out, not in this build: %s\n", name.c_str ());
+  add_peers (codecs);
   if (Status s = add_profiles (rig, input.sets.size () > 1, codecs); !s.ok ())
     return s;
   if (const std::string wrong = check_only (job, codecs); !wrong.empty ())
@@ -181,9 +177,6 @@ make_codecs (const Job &job, const Input &input, Codecs &codecs)
 Status
 run (const Job &job)
 {
-  if (!job.json.empty ()) /* before all the work */
-    if (Status s = check_json (job.json); !s.ok ())
-      return s;
   Input input;
   if (Status s = load (job, input); !s.ok ())
     return s;
@@ -202,7 +195,6 @@ run (const Job &job)
   if (Status s = measure (input, codecs, job.rounds, rows); !s.ok ())
     return s;
   print_rows (rows);
-  print_choices (rows, job.depth_rms_mm);
   return job.json.empty () ? Status{} : write_json (job.json, rows);
 }
 

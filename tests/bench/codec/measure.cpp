@@ -71,11 +71,9 @@ public:
       make_room (set, true);
       if (Status s = codec_.decode (coded_[i], pictures_); !s.ok ())
         return s;
-      if (Status s = codec_.finish (set, pictures_); !s.ok ())
-        return s;
       for (std::size_t v = 0; v < set.size (); v++)
-        if (!errors.add (set[v].area (codec_.whole ()), pictures_[v],
-                input_.rig.find (set[v].view_id)->depth_unit_m))
+        if (!errors.add (
+                set[v].person, pictures_[v], input_.rig.find (set[v].view_id)->depth_unit_m))
           return {StatusCode::kBadData, "other pixels have depth after decoding"};
     }
     report (errors, row);
@@ -142,7 +140,7 @@ private:
   {
     pictures_.resize (set.size ());
     for (std::size_t v = 0; v < set.size (); v++) {
-      const Picture &as = set[v].area (codec_.whole ());
+      const Picture &as = set[v].person;
       Picture &to = pictures_[v];
       to.width = as.width;
       to.height = as.height;
@@ -163,7 +161,6 @@ private:
         bytes += piece.size ();
     row.codec = codec_.name ();
     row.settings = codec_.settings ();
-    row.whole = codec_.whole ();
     row.bytes = double (bytes) / double (coded_.size ());
     row.bpvp = 8 * double (bytes) / errors.points;
     row.psnr_db = errors.colour > 0

@@ -8,7 +8,6 @@ namespace bench {
 /** What a codec came to; means over the frame sets. Quality is that of the pixels with depth. */
 struct Row {
   std::string codec, settings;
-  bool whole = false;
   double bytes = 0;   ///< of a frame set, all views
   double bpvp = 0;    ///< bits per valid pixel, depth and colour together
   double psnr_db = 0; ///< of R, G and B together; infinite without loss
@@ -20,5 +19,11 @@ struct Row {
  *  machine does hits all alike. A first round, which is not timed, gives bytes and quality.
  *  @return an error that names the codec which failed or lost pixels */
 rangecast::Status measure (Input &input, const Codecs &codecs, int rounds, std::vector<Row> &rows);
+
+/** Prints rows in groups of one codec, each with its size beside the peer's at the same PSNR. */
+void print_rows (const std::vector<Row> &rows);
+
+/** Writes an array of objects, one a row. @return kNotFound if the file cannot be written */
+rangecast::Status write_json (const std::string &path, const std::vector<Row> &rows);
 
 } // namespace bench

@@ -25,7 +25,7 @@ name_of_profile (const EncoderSettings &settings)
 class NeighbourCode final : public Codec {
 public:
   explicit NeighbourCode (const EncoderSettings &settings)
-      : Codec (name_of_profile (settings), settings_text (settings), false)
+      : Codec (name_of_profile (settings), settings_text (settings))
   {
   }
 
@@ -97,12 +97,6 @@ set_property (const std::string &name, const std::string &value, EncoderSettings
   }
   if (name == "temporal")
     return "temporal=true or false";
-  if (name == "depth-scale" && (value == "linear" || value == "inverse")) {
-    settings.depth_scale = value == "inverse" ? DepthScale::kInverse : DepthScale::kLinear;
-    return {};
-  }
-  if (name == "depth-scale")
-    return "depth-scale=linear or inverse";
   const std::pair<const char *, int *> numbers[] = {{"depth-bits", &settings.depth_bits},
       {"colour-bits", &settings.colour_bits}, {"depth-threshold", &settings.depth_threshold},
       {"colour-threshold", &settings.colour_threshold},
@@ -119,18 +113,6 @@ set_property (const std::string &name, const std::string &value, EncoderSettings
 
 } // namespace
 
-Status
-Codec::finish (const FrameSet &, std::vector<Picture> &)
-{
-  return {};
-}
-
-std::string
-name_of (const std::string &code, bool whole)
-{
-  return code + (whole ? ", whole picture" : ", ROI");
-}
-
 std::string
 settings_text (const EncoderSettings &s)
 {
@@ -142,8 +124,6 @@ settings_text (const EncoderSettings &s)
     text << " colour-bits=" << s.colour_bits;
   if (s.choice != defaults.choice)
     text << " choice=best";
-  if (s.depth_scale != defaults.depth_scale)
-    text << " depth-scale=inverse";
   if (s.temporal)
     text << " temporal=true";
   if (s.max_slice_size != defaults.max_slice_size)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Which codecs at which settings codec_bench runs. */
-#include "settings.hpp"
+#include "codec.hpp"
 
 #include <algorithm>
 
@@ -9,26 +9,18 @@ using namespace rangecast;
 namespace bench {
 namespace {
 
-/* What is run at all thresholds below, one line each. With slices longer than a packet: only at the
- * default thresholds, to show what slices that fit cost. */
+/* What is run at all thresholds below, one line each. */
 constexpr EncoderSettings kFamilies[] = {
     {.profile = Profile::kPlain},
-    {.max_slice_size = 65535, .profile = Profile::kPlain},
     {.profile = Profile::kPacked},
     {.profile = Profile::kPacked, .choice = NeighbourChoice::kBest},
-    {.max_slice_size = 65535, .profile = Profile::kPacked},
     {.profile = Profile::kEntropy},
     {.profile = Profile::kEntropy, .choice = NeighbourChoice::kBest},
-    {.max_slice_size = 65535, .profile = Profile::kEntropy},
-    {.profile = Profile::kPlain, .temporal = true},
     {.profile = Profile::kPacked, .temporal = true},
     {.profile = Profile::kEntropy, .temporal = true},
     {.profile = Profile::kEntropy, .choice = NeighbourChoice::kBest, .temporal = true},
 };
 constexpr double kDepthThresholdsMm[] = {0, 0.8, 1.6};
-/* Of x264, for colour and for depth. */
-constexpr std::pair<int, int> kRateFactors[] = {{17, 2}, {20, 2}, {20, 8}, {23, 2}, {23, 8},
-    {23, 14}, {26, 2}, {26, 8}, {26, 14}, {29, 8}, {29, 14}, {29, 20}, {32, 20}};
 constexpr int kColourThresholds[] = {4, 7, 9, 11, 13, 16, 20};
 
 /* Thresholds in codes for 16 bits, each once: where a code is a millimetre, some are the same. */
@@ -48,8 +40,6 @@ std::vector<EncoderSettings>
 settings_of (const EncoderSettings &family, double code_mm)
 {
   std::vector<EncoderSettings> all = {family};
-  if (family.max_slice_size > EncoderSettings ().max_slice_size)
-    return all;
   EncoderSettings exact = family;
   exact.depth_bits = 16;
   for (const int depth : depth_thresholds (code_mm))
@@ -66,36 +56,11 @@ settings_of (const EncoderSettings &family, double code_mm)
 
 } // namespace
 
-std::vector<std::string>
-add_peers (const Rig &rig, bool sequence, Codecs &codecs)
+void
+add_peers (Codecs &codecs)
 {
-  std::vector<std::string> missing;
-  const auto add = [&] (std::unique_ptr<Codec> codec, const char *name) {
-    if (codec)
-      codecs.push_back (std::move (codec));
-    else if (std::ranges::count (missing, name) == 0)
-      missing.emplace_back (name);
-  };
-  constexpr auto kJpeg = ColourCode::kJpeg;
-  for (const bool whole : {false, true})
-    for (const int q : {20, 30, 40, 50, 60, 70, 75, 80, 85, 90, 95})
-      add (make_pair (DepthCode::kRvl, kJpeg, q, whole), kPeerName);
-  for (const bool whole : {false, true})
-    for (const int q : {20, 35, 50, 75, 90, 95})
-      add (make_pair (DepthCode::kRvlZstd, kJpeg, q, whole), "RVL + zstd + JPEG (libzstd)");
-  const char *png = "PNG (libpng)";
-  for (const DepthCode depth : {DepthCode::kPngFast, DepthCode::kPng})
-    for (const int q : {50, 75, 90})
-      add (make_pair (depth, kJpeg, q, false), png);
-  for (const ColourCode colour : {ColourCode::kPngFast, ColourCode::kPng})
-    add (make_pair (DepthCode::kRvl, colour, 0, false), png);
-  for (const ColourCode colour : {ColourCode::kPngFast, ColourCode::kPng})
-    add (make_pair (DepthCode::kRvl, colour, 0, true), png);
-  add (make_draco (rig), "Draco (libdraco)");
-  if (sequence)
-    for (const auto &[colour, depth] : kRateFactors)
-      add (make_x264 (rig, colour, depth), "x264 (libavcodec)");
-  return missing;
+  for (const int q : {20, 30, 40, 50, 60, 70, 75, 80, 85, 90, 95})
+    codecs.push_back (make_peer (q));
 }
 
 Status

@@ -25,7 +25,7 @@ using namespace bench;
 namespace {
 
 const char *const kUsage =
-    "usage: render_bench [--model FILE] [--dress PIECES] [--size WxH] [--rounds N] [--json FILE] "
+    "usage: render_bench [--model FILE] [--size WxH] [--rounds N] [--json FILE] "
     "[--pictures DIR]\n"
     "Draws four views of the test scene in 640x480, as striprender does, in each mode, and judges\n"
     "the pictures by the scene rendered from the same places: 0, 20 and 45 degrees off the "
@@ -49,14 +49,8 @@ const char *const kUsage =
     "  bad     share of the pixels inside that are more than 40 levels off\n"
     "  spill   pixels drawn beside the figure, as a share of the figure's\n"
     "  --model FILE    glTF or OBJ model (default: the built-in figure)\n"
-    "  --dress PIECES  of the built-in figure: none, all, or hair, glasses, collar and hand with "
-    "+\n"
-    "                  between (default: none, then all)\n"
     "  --size WxH      of the range images (default 320x240)\n"
     "  --rounds N      times are medians of so many (default 15)\n"
-    "  --merge N       of the strips (default 1)\n"
-    "  --view-gap M    of the strips, metres (default 0.012)\n"
-    "  --max-gap N     of the strips, pixels (default: the element's)\n"
     "  --overlap PIXELS  of the cylinder (default: the element's)\n"
     "  --mode NAME     only that row of the table\n"
     "  --depth KIND    only that depth\n"
@@ -95,11 +89,7 @@ constexpr std::pair<const char *, StripMode> kModes[] = {{"blend", StripMode::kB
 struct Job {
   SceneSettings scene;
   std::string scene_name;
-  std::optional<unsigned> dress; /* empty: the figure bare and dressed */
   int rounds = 15;
-  double merge = StripSettings{}.merge;
-  double view_gap_m = RenderPicture{}.view_gap_m;
-  int max_gap = StripSettings{}.max_gap;
   CylinderSettings cylinder;
   std::string json, pictures, mode, depth; /* mode, depth: empty, or the only one */
   std::vector<RenderRow> rows;
@@ -124,7 +114,7 @@ orbit_at (double azimuth_deg)
 }
 
 RenderPicture
-make_picture (const FrameSet &set, double azimuth_deg, double view_gap_m)
+make_picture (const FrameSet &set, double azimuth_deg)
 {
   const SceneFrame frame = scene_frame (set.rig);
   std::vector<Vec3> hull;
@@ -136,7 +126,6 @@ make_picture (const FrameSet &set, double azimuth_deg, double view_gap_m)
       orbit_matrices (frame, orbit, double (kWidth) / kHeight, true, {}, hull).clip_from_world;
   picture.point_size = 1;
   picture.pixels_per_unit = float (kHeight / (2 * std::tan (frame.fov_deg * M_PI / 360)));
-  picture.view_gap_m = view_gap_m;
   picture.width = kWidth;
   picture.height = kHeight;
   picture.part = {0, 0, kWidth, kHeight};
@@ -150,8 +139,6 @@ make_ways (Job &job, Kind &kind)
   const auto strips = [&] (const char *name, const FrameSet &set, StripMode mode) {
     StripSettings settings;
     settings.mode = mode;
-    settings.merge = job.merge;
-    settings.max_gap = job.max_gap;
     kind.ways.push_back (make_strip_way (name, job.painter, set, settings));
   };
   for (const auto &[name, mode] : kModes)
@@ -159,8 +146,6 @@ make_ways (Job &job, Kind &kind)
   if (!kind.coded.images.empty ()) { /* of exact depth */
     strips ("strips-merged", kind.coded, StripMode::kStrips);
     StripSettings settings;
-    settings.merge = job.merge;
-    settings.max_gap = job.max_gap;
     kind.ways.push_back (make_strip_way ("blend-held", job.held_painter, kind.set, settings, true));
   }
   for (auto [name, peer] : {std::pair{"grid", Peer::kGrid}, {"point-cloud", Peer::kPoints}}) {
@@ -199,7 +184,7 @@ void
 time_all (
     Job &job, const Kind &kind, Target &target, double azimuth_deg, std::vector<RenderRow> &rows)
 {
-  const RenderPicture picture = make_picture (kind.set, azimuth_deg, job.view_gap_m);
+  const RenderPicture picture = make_picture (kind.set, azimuth_deg);
   std::vector<std::vector<double>> processor (rows.size ()), total (rows.size ());
   for (int round = -1; round < job.rounds; round++) /* the first one allocates */
     for (std::size_t i = 0; i < rows.size (); i++) {
@@ -228,11 +213,10 @@ judge (Job &job, const Kind &kind, Target &target, const std::vector<Shot> &shot
   Score score;
   for (const Shot &shot : shots) {
     kind.ways[i]->build (orbit_at (shot.azimuth_deg));
-    target.draw (*kind.ways[i], make_picture (kind.set, shot.azimuth_deg, job.view_gap_m));
+    target.draw (*kind.ways[i], make_picture (kind.set, shot.azimuth_deg));
     const cv::Mat rgba = target.read ();
     score.add (shot, rgba);
-    const std::string scene = row.scene == "dressed" ? "dressed-" : "";
-    const std::string path = job.pictures + "/" + scene + row.depth + "-" + row.mode + "-" +
+    const std::string path = job.pictures + "/" + row.depth + "-" + row.mode + "-" +
                              std::to_string (int (shot.azimuth_deg)) + ".png";
     if (!job.pictures.empty () && !cv::imwrite (path, comparison (shot, rgba)))
       job.status = {StatusCode::kNotFound, "--pictures: " + path + " cannot be written"};
@@ -296,16 +280,8 @@ run (Job &job)
     return {StatusCode::kUnsupported, why};
   }
   print_head ();
-  Status status;
-  for (const unsigned dress : {0u, unsigned (kDressAll)}) {
-    job.scene.dress = job.dress.value_or (dress);
-    job.scene_name = !job.scene.model.empty () ? "model" : job.scene.dress ? "dressed" : "figure";
-    if (status.ok ())
-      status = run_scene (job);
-    if (job.dress || !job.scene.model.empty ())
-      break;
-  }
-  return status;
+  job.scene_name = job.scene.model.empty () ? "figure" : "model";
+  return run_scene (job);
 }
 
 /* Whether an argument is one of some names; if not, says so. */
@@ -342,12 +318,8 @@ main (int argc, char **argv)
   Job job;
   Options options ("render_bench", kUsage);
   options.text ("--model", job.scene.model);
-  options.dress ("--dress", job.dress);
   options.size ("--size", job.scene.width, job.scene.height, 16, 1920);
   options.number ("--rounds", job.rounds, 1, 100000);
-  options.number ("--merge", job.merge, 0, 100);
-  options.number ("--view-gap", job.view_gap_m, 0, 1);
-  options.number ("--max-gap", job.max_gap, 0, 1000);
   options.number ("--overlap", job.cylinder.overlap, 0.0, kMaxOverlap);
   options.text ("--mode", job.mode);
   options.text ("--depth", job.depth);

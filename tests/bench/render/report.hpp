@@ -12,7 +12,7 @@ namespace bench {
 
 /** What one way of drawing came to at one angle. */
 struct RenderRow {
-  std::string scene, mode, depth; ///< scene: figure, dressed, model; depth: exact, stereo, noise
+  std::string scene, mode, depth; ///< scene: figure, model; depth: exact, stereo, noise
   int angle_deg = 0;
   std::uint64_t vertices = 0, triangles = 0, bytes = 0;
   double ms = 0, processor_ms = 0; ///< of a picture: by the clock; of all threads

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "ways.hpp"
 
-#include "render/scene.hpp"
+#include <rangecast/surface/surface_scene.hpp>
 
 using namespace rangecast;
 
@@ -21,7 +21,11 @@ public:
   void build (const Orbit &orbit) override
   {
     scene_.build (set_.images, settings_, orbit, held_);
-    scene_.count_into (stats_);
+    vertices_ = triangles_ = 0;
+    for (std::size_t i = 0; i < scene_.layers ().size (); i++) {
+      vertices_ += scene_.vertices (i);
+      triangles_ += scene_.result (i).triangles;
+    }
   }
 
   guint64 draw (const RenderPicture &picture) override
@@ -36,16 +40,16 @@ public:
     return bytes;
   }
 
-  [[nodiscard]] std::size_t vertices () const override { return stats_.vertices; }
-  [[nodiscard]] std::size_t triangles () const override { return stats_.triangles; }
+  [[nodiscard]] std::size_t vertices () const override { return vertices_; }
+  [[nodiscard]] std::size_t triangles () const override { return triangles_; }
 
 private:
   StripPainter &painter_;
   const FrameSet &set_;
   const bool held_;
-  StripRenderSettings settings_;
-  StripScene scene_;
-  RenderStats stats_;
+  SurfaceSettings settings_;
+  SurfaceScene scene_;
+  std::size_t vertices_ = 0, triangles_ = 0;
   guint64 uploaded_ = 0;
 };
 

@@ -5,7 +5,6 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 
 #include "../options.hpp"
 #include "matchers.hpp"
@@ -44,8 +43,6 @@ const char *const kUsage =
     "from\n"
     "                       the true surface, and errors, beside OpenCV at the same settings\n"
     "  --model FILE         glTF or OBJ model to render (default: the built-in figure)\n"
-    "  --dress PIECES       of the built-in figure: none, all, or hair, glasses, collar and hand\n"
-    "                       with + between (default: none, then all)\n"
     "  --size WxH           (default 320x240)\n"
     "  --distance M         from the cameras, 0.5 to 1.2 (default 0.8; at 1.1 the person's ROI is "
     "a\n"
@@ -60,7 +57,6 @@ struct Job {
   double focal = 0, baseline = 0, offset = 0, scale = 1, near_m = 0, far_m = 0;
   bool scene = false;
   SceneJob rendered;
-  std::optional<unsigned> dress; /* empty: the figure bare and dressed */
 };
 
 void
@@ -79,7 +75,6 @@ add_options (Options &options, Job &job)
   options.flag ("--scene", job.scene);
   SceneSettings &s = job.rendered.scene;
   options.text ("--model", s.model);
-  options.dress ("--dress", job.dress);
   options.size ("--size", s.width, s.height, 64, 4096);
   options.number ("--distance", s.distance_m, 0.5, 1.2);
   options.number ("--noise", s.noise_sigma, 0.0, 20.0);
@@ -193,28 +188,15 @@ measure (const Job &job, const Pair &pair)
 }
 
 Status
-run_scenes (const Job &job)
-{
-  SceneJob rendered = job.rendered;
-  for (const unsigned dress : {0u, unsigned (kDressAll)}) {
-    rendered.scene.dress = job.dress.value_or (dress);
-    std::vector<SceneRow> rows;
-    if (Status s = run_scene (rendered, rows); !s.ok ())
-      return s;
-    const bool model = !rendered.scene.model.empty ();
-    std::printf ("%s\n", model ? "model" : rendered.scene.dress ? "dressed figure" : "bare figure");
-    print_scene_rows (rows);
-    if (job.dress || model)
-      break;
-  }
-  return {};
-}
-
-Status
 run (const Job &job)
 {
-  if (job.scene)
-    return run_scenes (job);
+  if (job.scene) {
+    std::vector<SceneRow> rows;
+    const Status s = run_scene (job.rendered, rows);
+    if (s.ok ())
+      print_scene_rows (rows);
+    return s;
+  }
   Pair pair;
   if (Status s = read_pictures (job, pair); !s.ok ())
     return s;

@@ -21,7 +21,7 @@ process.on ('exit', () => fs.rmSync (folder, { recursive: true }));
 const record = (name, ...settings) => {
   const file = path.join (folder, name + '.rcnc');
   execFileSync ('gst-launch-1.0', ['-q', 'avatartestsrc', 'views=4', 'num-buffers=30', 'range-person-only=true', '!', 'video/x-range,width=320,height=240', '!',
-    'neighbourcodeenc', ...settings, '!', 'neighbourcodeparse', '!', 'video/x-neighbour-code,alignment=byte-stream', '!', 'filesink', `location=${file}`],
+    'neighbourcodeenc', ...settings, '!', 'filesink', `location=${file}`],
   { env: { ...process.env, GST_PLUGIN_PATH: path.join (build, 'gst') } });
   return { name, file };
 };

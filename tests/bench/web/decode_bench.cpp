@@ -21,12 +21,12 @@ std::vector<std::span<const std::uint8_t>>
 access_units (std::span<const std::uint8_t> bytes)
 {
   std::vector<std::span<const std::uint8_t>> units;
-  for (auto part = rangecast::next_part (bytes, true); part.length || part.rubbish;
+  for (auto part = rangecast::next_part (bytes, true); part.length || part.garbage;
        part = rangecast::next_part (bytes, true)) {
     if (part.length)
       units.push_back (
-          bytes.subspan (rangecast::kStreamPrefixSize, part.length - rangecast::kStreamPrefixSize));
-    bytes = bytes.subspan (part.length + part.rubbish);
+          bytes.subspan (rangecast::kAccessUnitHeaderSize, part.length - rangecast::kAccessUnitHeaderSize));
+    bytes = bytes.subspan (part.length + part.garbage);
   }
   return units;
 }

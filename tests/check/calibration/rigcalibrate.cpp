@@ -178,15 +178,7 @@ struct Calibrate {
       g_usleep (10000);
     fail_unless_equals_uint64 (stat ("examined"), moments);
   }
-  guint64 stat (const char *field)
-  {
-    GstStructure *stats;
-    guint64 value = G_MAXUINT64;
-    g_object_get (element, "stats", &stats, nullptr);
-    gst_structure_get_uint64 (stats, field, &value);
-    gst_structure_free (stats);
-    return value;
-  }
+  guint64 stat (const char *field) { return stats_field (element, field); }
 };
 
 static double
@@ -289,25 +281,25 @@ GST_END_TEST;
 
 GST_START_TEST (test_still_pictures_stand_side_by_side)
 {
-  Calibrate c (2, "tile-width=160");
+  Calibrate c (2);
   c.push_boards (1, 3);
   GstBuffer *still = gst_harness_pull (c.out);
   GstCaps *caps = gst_pad_get_current_caps (c.out->sinkpad);
   GstVideoInfo info;
   fail_unless (gst_video_info_from_caps (&info, caps));
   gst_caps_unref (caps);
-  fail_unless_equals_int (info.width, 320);
-  fail_unless_equals_int (info.height, 120);
+  fail_unless_equals_int (info.width, 960);
+  fail_unless_equals_int (info.height, 360);
   fail_unless_equals_int (GST_VIDEO_INFO_FORMAT (&info), GST_VIDEO_FORMAT_RGBx);
   fail_unless_equals_uint64 (GST_BUFFER_PTS (still), 3 * GST_SECOND);
   GstMapInfo map;
   gst_buffer_map (still, &map, GST_MAP_READ);
   fail_unless_equals_int (map.size, info.size);
   int coloured[2] = {0, 0}; /* what was drawn into grey pictures */
-  for (int y = 10; y < 110; y++)
-    for (int x = 0; x < 320; x++) {
-      const guint8 *p = map.data + 4 * (320 * y + x);
-      coloured[x / 160] += std::abs (p[0] - p[2]) > 60 && x % 160 > 10 && x % 160 < 150;
+  for (int y = 10; y < 350; y++)
+    for (int x = 0; x < 960; x++) {
+      const guint8 *p = map.data + 4 * (960 * y + x);
+      coloured[x / 480] += std::abs (p[0] - p[2]) > 60 && x % 480 > 10 && x % 480 < 470;
     }
   ck_assert_int_gt (coloured[0], 50);
   ck_assert_int_gt (coloured[1], 50);
@@ -316,38 +308,36 @@ GST_START_TEST (test_still_pictures_stand_side_by_side)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_pictures_without_a_board_are_one_error_at_eos)
+GST_START_TEST (test_what_cannot_be_calibrated_is_one_error_at_eos)
 {
-  Calibrate c (2);
-  for (int i = 0; i < 10; i++)
+  {
+    Calibrate c (2);
     for (int pad = 0; pad < 2; pad++)
-      c.push_grey (pad, i * GST_SECOND);
+      c.push_grey (pad, 0);
+    c.end ();
+    c.expect_error ("sink_0 (view 0, left): no board was found; show one with 9x6 inner corners");
+  }
+  {
+    Calibrate c (1, "min-frames=6");
+    c.push_boards (4);
+    c.end ();
+    c.expect_error (
+        "sink_0 (view 0, left): the board was found in 4 frames; show it in at least 6");
+  }
+  {
+    Calibrate c (1);
+    c.push_picture (0, 0, std::vector<std::uint8_t> (100));
+    c.expect_error ("pad sink_0: a buffer is smaller than its caps require");
+  }
+  Calibrate c (1);
+  GstPad *lonely = gst_element_request_pad_simple (c.element, "sink_%u");
+  c.push_grey (0, 0);
+  gst_pad_send_event (lonely, gst_event_new_stream_start ("lonely"));
+  gst_pad_send_event (lonely, gst_event_new_eos ());
   c.end ();
-  c.expect_error ("sink_0 (view 0, left): no board was found; expected 9x6 inner corners");
-}
-GST_END_TEST;
-
-GST_START_TEST (test_too_few_boards_are_one_error_with_their_number)
-{
-  Calibrate c (1, "min-frames=6");
-  c.push_boards (4);
-  c.end ();
-  c.expect_error ("sink_0 (view 0, left): the board was found in 4 frames; expected at least 6");
-}
-GST_END_TEST;
-
-GST_START_TEST (test_boards_that_were_seen_but_not_kept_are_counted)
-{
-  Calibrate c (1, "selection=spread min-frames=6");
-  Pose board = {kIdentity3, -0.5 * BoardSpec{}.corner (53)};
-  board.translation.z = 0.4;
-  const auto picture = c.renderers[0].render (board, 1, c.random);
-  for (int i = 0; i < 5; i++)
-    c.push_picture (0, i * GST_SECOND, picture);
-  c.end ();
-  c.expect_error (
-      "sink_0 (view 0, left): the board was found in 5 pictures, but only 1 were kept; "
-      "expected at least 6. Of the rest 4 were similar to an earlier one: hold the board still");
+  c.expect_error ("pad sink_1: no images arrived");
+  gst_element_release_request_pad (c.element, lonely);
+  gst_object_unref (lonely);
 }
 GST_END_TEST;
 
@@ -370,58 +360,6 @@ GST_START_TEST (test_new_size_in_the_stream_is_an_error_that_names_the_pad)
       c.in[0], "video/x-raw,format=GRAY8,width=64,height=48,framerate=1/1");
   c.push_picture (0, GST_SECOND, std::vector<std::uint8_t> (64 * 48));
   c.expect_error ("pad sink_0: images changed from 320x240 to 64x48");
-}
-GST_END_TEST;
-
-GST_START_TEST (test_new_size_after_a_reset_is_taken)
-{
-  Calibrate c (1);
-  c.push_boards (1);
-  c.wait_until_examined (1);
-  g_signal_emit_by_name (c.element, "reset");
-  g_signal_emit_by_name (c.element, "calibrate"); /* says so when the reset is over */
-  fail_if (next_message_text (c.bus, GST_MESSAGE_WARNING).empty ());
-  gst_harness_set_src_caps_str (
-      c.in[0], "video/x-raw,format=GRAY8,width=64,height=48,framerate=1/1");
-  fail_unless_equals_int (
-      c.push_picture (0, GST_SECOND, std::vector<std::uint8_t> (64 * 48)), GST_FLOW_OK);
-  c.push_picture (0, 2 * GST_SECOND, std::vector<std::uint8_t> (64 * 48));
-  gst_message_unref (c.message ("rigcalibrate-board"));
-  gst_message_unref (c.message ("rigcalibrate-board"));
-}
-GST_END_TEST;
-
-GST_START_TEST (test_pair_of_two_sizes_is_one_error)
-{
-  Calibrate c (2);
-  gst_harness_set_src_caps_str (
-      c.in[1], "video/x-raw,format=GRAY8,width=64,height=48,framerate=1/1");
-  c.push_grey (0, 0);
-  c.push_picture (1, 0, std::vector<std::uint8_t> (64 * 48));
-  c.expect_error ("sink_1 (view 0, right) is 64x48; expected the size of sink_0");
-}
-GST_END_TEST;
-
-GST_START_TEST (test_board_without_a_way_up_is_one_error_with_the_first_pictures)
-{
-  Calibrate c (2, "columns=8");
-  c.push_grey (0, 0);
-  c.push_grey (1, 0);
-  c.expect_error ("looks the same upside down");
-}
-GST_END_TEST;
-
-GST_START_TEST (test_pad_without_pictures_is_one_error_at_eos)
-{
-  Calibrate c (1);
-  GstPad *lonely = gst_element_request_pad_simple (c.element, "sink_%u");
-  c.push_grey (0, 0);
-  gst_pad_send_event (lonely, gst_event_new_stream_start ("lonely"));
-  gst_pad_send_event (lonely, gst_event_new_eos ());
-  c.end ();
-  c.expect_error ("pad sink_1: no images arrived");
-  gst_element_release_request_pad (c.element, lonely);
-  gst_object_unref (lonely);
 }
 GST_END_TEST;
 
@@ -460,18 +398,6 @@ GST_START_TEST (test_calibrate_signal_gives_a_result_and_the_stream_goes_on)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_reset_forgets_all_frames)
-{
-  Calibrate c (1, "min-frames=4");
-  c.push_boards (5);
-  c.wait_until_examined (5);
-  g_signal_emit_by_name (c.element, "reset");
-  c.push_boards (3, 5);
-  c.end ();
-  c.expect_error ("the board was found in 3 frames; expected at least 4");
-}
-GST_END_TEST;
-
 GST_START_TEST (test_complete_coverage_ends_the_stream_with_auto_finish)
 {
   Calibrate c (1, "auto-finish=true");
@@ -481,92 +407,15 @@ GST_START_TEST (test_complete_coverage_ends_the_stream_with_auto_finish)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_auto_finish_that_cannot_write_is_one_error_and_the_rig_is_in_the_result)
-{
-  if (!g_file_test ("/dev/full", G_FILE_TEST_EXISTS))
-    return;
-  ck_assert_int_eq (symlink ("/dev/full", temporary_rig ().c_str ()), 0);
-  Calibrate c (1, "min-frames=5 auto-finish=true location=" + temporary_rig ());
-  c.show_everywhere ();
-  GstMessage *message = c.message ("rigcalibrate-result");
-  const GstStructure *result = gst_message_get_structure (message);
-  fail_unless (gst_structure_has_field (result, "rig"));
-  fail_if (gst_structure_has_field (result, "location"));
-  gst_message_unref (message);
-  c.expect_error ("cannot be written to its end");
-}
-GST_END_TEST;
-
-/* Tiles have an end, whatever the caps say. */
-GST_START_TEST (test_pictures_of_any_shape_make_a_still)
-{
-  for (const char *shape : {"width=4,height=16384", "width=16384,height=4", "width=1,height=1"})
-    for (const char *tile : {"tile-width=64", "tile-width=4096"}) {
-      GstElement *pipeline = gst_parse_launch (
-          (std::string ("videotestsrc num-buffers=2 ! video/x-raw,format=GRAY8,") + shape +
-              ",framerate=1/1 ! rigcalibrate " + tile + " ! fakesink")
-              .c_str (),
-          nullptr);
-      GstBus *bus = gst_element_get_bus (pipeline);
-      gst_element_set_state (pipeline, GST_STATE_PLAYING);
-      const std::string said = next_message_text (bus, GST_MESSAGE_ERROR);
-      fail_unless (
-          said.find ("no board was found") != std::string::npos, "%s: %s", shape, said.c_str ());
-      gst_element_set_state (pipeline, GST_STATE_NULL);
-      gst_object_unref (bus);
-      gst_object_unref (pipeline);
-    }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_released_pad_takes_its_frames_along)
-{
-  Calibrate c (2, "min-frames=4");
-  c.push_boards (2);
-  gst_harness_teardown (c.in[1]); /* releases it */
-  c.in.pop_back ();
-  c.cameras.pop_back ();
-  c.push_boards (8, 2);
-  c.end ();
-  GstMessage *message = c.message ("rigcalibrate-result");
-  const GValue *cameras = gst_structure_get_value (gst_message_get_structure (message), "cameras");
-  fail_unless_equals_int (gst_value_array_get_size (cameras), 1);
-  gst_message_unref (message);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_flush_costs_no_frames)
-{
-  Calibrate c (1, "min-frames=5");
-  c.push_boards (4);
-  fail_unless (gst_harness_push_event (c.in[0], gst_event_new_flush_start ()));
-  fail_unless (gst_harness_push_event (c.in[0], gst_event_new_flush_stop (TRUE)));
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  gst_harness_push_event (c.in[0], gst_event_new_segment (&segment));
-  c.push_boards (4, 4);
-  c.end ();
-  gst_message_unref (c.message ("rigcalibrate-result"));
-}
-GST_END_TEST;
-
-GST_START_TEST (test_pictures_smaller_than_their_caps_are_one_error)
-{
-  Calibrate c (1);
-  c.push_picture (0, 0, std::vector<std::uint8_t> (100));
-  c.expect_error ("pad sink_0: a buffer is smaller than its caps require");
-}
-GST_END_TEST;
-
 /* Without these the work of minutes would be lost in the end. */
 GST_START_TEST (test_what_cannot_end_well_does_not_start)
 {
   const std::pair<const char *, const char *> cases[] = {
       {"location=/nowhere/rig.yaml", "/nowhere/rig.yaml: its folder does not exist"},
-      {"location=rig.txt", "rig.txt: cannot be written; expected a file name that ends in .yml"},
+      {"location=rig.txt", "rig.txt: cannot be written; use a name that ends in .yml"},
       {"location=/proc/rig.yaml", "/proc/rig.yaml: cannot be opened for writing"},
-      {"near=2 far=1", "expected 0 < near < far"},
-      {"min-frames=20 max-frames=10", "expected at least min-frames, 20"},
+      {"near=2 far=1", "set near between 0 and far"},
+      {"min-frames=101", "set it to min-frames, 101, or more"},
       {"board=charuco marker-size=0.1", "marker size"},
       {"board=charuco columns=20 rows=20", "4x4-50 has 50 markers"},
   };
@@ -600,12 +449,8 @@ GST_START_TEST (test_live_pictures_go_unseen_while_the_last_ones_are_looked_at)
     GstMessage *message = gst_bus_timed_pop_filtered (bus, 60 * GST_SECOND, GST_MESSAGE_ERROR);
     fail_unless (message != nullptr); /* no board, told at EOS */
     gst_message_unref (message);
-    GstStructure *stats;
-    guint64 examined = 0, skipped = 0;
-    g_object_get (element, "stats", &stats, nullptr);
-    gst_structure_get (
-        stats, "examined", G_TYPE_UINT64, &examined, "skipped", G_TYPE_UINT64, &skipped, nullptr);
-    gst_structure_free (stats);
+    const guint64 examined = stats_field (element, "examined"),
+                  skipped = stats_field (element, "skipped");
     ck_assert_uint_ge (examined, 1);
     fail_unless (skipped >= 1, "nobody looks for boards in a millisecond");
     ck_assert_uint_le (examined + skipped, 100);
@@ -656,62 +501,11 @@ GST_START_TEST (test_live_pictures_of_one_moment_stay_together_when_they_arrive_
 }
 GST_END_TEST;
 
-GST_START_TEST (test_camera_that_sends_nothing_does_not_stop_a_live_one)
-{
-  GstElement *pipeline = gst_parse_launch (
-      "rigcalibrate name=c ! fakesink videotestsrc is-live=true num-buffers=60 ! "
-      "video/x-raw,width=64,height=48,framerate=30/1 ! c.sink_0 "
-      "videotestsrc is-live=true num-buffers=1 ! video/x-raw,width=64,height=48,framerate=30/1 ! "
-      "identity name=silent ! c.sink_1",
-      nullptr);
-  GstElement *silent = gst_bin_get_by_name (GST_BIN (pipeline), "silent");
-  GstPad *pad = gst_element_get_static_pad (silent, "sink");
-  gst_pad_add_probe (/* after the first image it neither sends nor ends */
-      pad, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
-      [] (GstPad *, GstPadProbeInfo *info, gpointer) {
-        return GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_EOS
-                   ? GST_PAD_PROBE_DROP
-                   : GST_PAD_PROBE_OK;
-      },
-      nullptr, nullptr);
-  GstElement *element = gst_bin_get_by_name (GST_BIN (pipeline), "c");
-  gst_element_set_state (pipeline, GST_STATE_PLAYING);
-  guint64 examined = 0;
-  for (int i = 0; i < 1000 && examined < 5; i++) {
-    g_usleep (10000);
-    GstStructure *stats;
-    g_object_get (element, "stats", &stats, nullptr);
-    gst_structure_get_uint64 (stats, "examined", &examined);
-    gst_structure_free (stats);
-  }
-  ck_assert_uint_ge (examined, 5);
-  gst_element_set_state (pipeline, GST_STATE_NULL);
-  gst_object_unref (pad);
-  gst_object_unref (silent);
-  gst_object_unref (element);
-  gst_object_unref (pipeline);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_stops_in_the_middle_and_starts_again)
-{
-  Calibrate c (1, "min-frames=4");
-  for (int i = 0; i < 2; i++) {
-    c.push_boards (3, 3 * i); /* too few, unless the first three are still there */
-    gst_element_set_state (c.element, GST_STATE_READY);
-    c.play_again ();
-  }
-  c.push_boards (2, 6);
-  c.end ();
-  c.expect_error ("the board was found in 2 frames; expected at least 4");
-}
-GST_END_TEST;
-
 /* Whatever the job is at then: looking for a board, or calibrating. */
 GST_START_TEST (test_ready_interrupts_a_calibration_without_a_word)
 {
   Calibrate c (2);
-  for (int i = 0; i < 4; i++) {
+  for (int i = 0; i < 2; i++) {
     c.push_boards (9, 9 * i);
     c.wait_until_examined (9);
     g_signal_emit_by_name (c.element, "calibrate");
@@ -721,23 +515,7 @@ GST_START_TEST (test_ready_interrupts_a_calibration_without_a_word)
     fail_unless (gst_bus_pop_filtered (c.bus, GST_MESSAGE_WARNING) == nullptr);
     c.play_again ();
   }
-  c.push_boards (9, 36);
-  c.end ();
-  gst_message_unref (c.message ("rigcalibrate-result"));
-}
-GST_END_TEST;
-
-GST_START_TEST (test_flush_does_not_wait_for_a_calibration)
-{
-  Calibrate c (1, "min-frames=5");
-  c.push_boards (8);
-  c.end (); /* the streaming thread now waits for the job, or soon will */
-  fail_unless (gst_harness_push_event (c.in[0], gst_event_new_flush_start ()));
-  fail_unless (gst_harness_push_event (c.in[0], gst_event_new_flush_stop (TRUE)));
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  gst_harness_push_event (c.in[0], gst_event_new_segment (&segment));
-  c.push_boards (1, 8);
+  c.push_boards (9, 18);
   c.end ();
   gst_message_unref (c.message ("rigcalibrate-result"));
 }
@@ -752,31 +530,16 @@ rigcalibrate_suite ()
   tcase_add_test (tc, test_boards_in_two_cameras_become_a_rig_file_at_eos);
   tcase_add_test (tc, test_messages_say_which_camera_saw_the_board);
   tcase_add_test (tc, test_still_pictures_stand_side_by_side);
-  tcase_add_test (tc, test_pictures_without_a_board_are_one_error_at_eos);
-  tcase_add_test (tc, test_too_few_boards_are_one_error_with_their_number);
-  tcase_add_test (tc, test_boards_that_were_seen_but_not_kept_are_counted);
+  tcase_add_test (tc, test_what_cannot_be_calibrated_is_one_error_at_eos);
   tcase_add_test (tc, test_swapped_cameras_are_one_error);
   tcase_add_test (tc, test_new_size_in_the_stream_is_an_error_that_names_the_pad);
-  tcase_add_test (tc, test_new_size_after_a_reset_is_taken);
-  tcase_add_test (tc, test_pair_of_two_sizes_is_one_error);
-  tcase_add_test (tc, test_board_without_a_way_up_is_one_error_with_the_first_pictures);
-  tcase_add_test (tc, test_pad_without_pictures_is_one_error_at_eos);
   tcase_add_test (tc, test_pictures_of_other_times_are_dropped);
   tcase_add_test (tc, test_calibrate_signal_gives_a_result_and_the_stream_goes_on);
-  tcase_add_test (tc, test_reset_forgets_all_frames);
   tcase_add_test (tc, test_complete_coverage_ends_the_stream_with_auto_finish);
-  tcase_add_test (tc, test_auto_finish_that_cannot_write_is_one_error_and_the_rig_is_in_the_result);
-  tcase_add_test (tc, test_pictures_of_any_shape_make_a_still);
-  tcase_add_test (tc, test_released_pad_takes_its_frames_along);
-  tcase_add_test (tc, test_flush_costs_no_frames);
-  tcase_add_test (tc, test_pictures_smaller_than_their_caps_are_one_error);
   tcase_add_test (tc, test_what_cannot_end_well_does_not_start);
   tcase_add_test (tc, test_live_pictures_go_unseen_while_the_last_ones_are_looked_at);
   tcase_add_test (tc, test_live_pictures_of_one_moment_stay_together_when_they_arrive_late);
-  tcase_add_test (tc, test_camera_that_sends_nothing_does_not_stop_a_live_one);
-  tcase_add_test (tc, test_stops_in_the_middle_and_starts_again);
   tcase_add_test (tc, test_ready_interrupts_a_calibration_without_a_word);
-  tcase_add_test (tc, test_flush_does_not_wait_for_a_calibration);
   return suite;
 }
 

@@ -124,7 +124,7 @@ public:
   {
     for (;;) {
       CameraFrame frame = next ();
-      if (frame.state == FrameState::kComplete)
+      if (frame.buffer)
         return frame;
     }
   }
@@ -139,11 +139,6 @@ public:
   {
     std::lock_guard guard (heard_->lock);
     return heard_->losses.size ();
-  }
-  std::size_t n_frames ()
-  {
-    std::lock_guard guard (heard_->lock);
-    return heard_->frames.size ();
   }
 
 private:

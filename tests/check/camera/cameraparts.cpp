@@ -1,106 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What of the layer over Aravis needs no camera: features strings, action commands, frame numbers,
- * permissions of USB devices. */
+/* What of the layer over Aravis needs no camera: action commands, frame numbers, permissions of USB
+ * devices. */
 #include "camera/aravis/action_command.hpp"
-#include "camera/aravis/camera.hpp"
 #include "camera/aravis/discovery.hpp"
-#include "camera/aravis/features.hpp"
-#include "camera/aravis/frame_counter.hpp"
-#include "camera/aravis/receive_buffer.hpp"
-#include "camera/aravis/teardown_queue.hpp"
+#include "camera/aravis/stream.hpp"
 #include "camera/aravis/user_name.hpp"
-#include <atomic>
-#include <cerrno>
-#include <dlfcn.h>
 #include <filesystem>
 #include <fstream>
-#include <pthread.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include "../rangecast-check.hpp"
 
 using namespace rangecast::testing;
-
-/* Features */
-
-static std::vector<CameraFeature>
-parsed (const char *text)
-{
-  std::vector<CameraFeature> features;
-  const CameraStatus status = parse_camera_features (text, features);
-  fail_unless (status.ok (), "%s", status.message ().c_str ());
-  return features;
-}
-
-GST_START_TEST (test_features_are_split_at_spaces_commas_and_semicolons)
-{
-  const std::vector<CameraFeature> expected = {{"Gamma", "0.7", false},
-      {"LineSelector", "Line2", false}, {"TimerReset", "", true}, {"_x", "-3", false}};
-  for (const char *text : {"Gamma=0.7 LineSelector=Line2 TimerReset _x=-3",
-           " Gamma=0.7,LineSelector=Line2;TimerReset\n\t_x=-3 ; ",
-           "Gamma='0.7', LineSelector=\"Line2\", TimerReset, _x=-3"})
-    fail_unless (parsed (text) == expected, "%s", text);
-  fail_unless (parsed ("").empty ());
-  fail_unless (parsed (" ,; ").empty ());
-}
-GST_END_TEST;
-
-GST_START_TEST (test_quotes_keep_spaces_and_empty_values)
-{
-  const auto features = parsed ("A='two, words=1; ' B=\"it's\" C=''");
-  assert_equals_int (features.size (), 3);
-  assert_equals_string (features[0].value.c_str (), "two, words=1; ");
-  assert_equals_string (features[1].value.c_str (), "it's");
-  assert_equals_string (features[2].value.c_str (), "");
-  fail_unless (!features[2].command);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_wrong_features_strings_are_refused_at_the_place)
-{
-  const struct {
-    const char *text, *expected;
-  } cases[] = {
-      {"=3", "a feature's name (letters, digits, '_') at '=3'"},
-      {"Gamma=1 7up=2", "a feature's name (letters, digits, '_') at '7up=2'"},
-      {"Gamma=", "a value for 'Gamma' at its end"},
-      {"Gamma= 3", "a value for 'Gamma' at ' 3'"},
-      {"Gamma:3", "'=' and a value after 'Gamma' at ':3'"},
-      {"Gamma='3", "a closing ' at ''3'"},
-      {"Gamma='3'x", "a space after the quoted value of 'Gamma' at 'x'"},
-      {"A=1=2", "a space before the next feature at '=2'"},
-      {"\xff\xfe", "a feature's name"},
-  };
-  for (const auto &c : cases) {
-    std::vector<CameraFeature> features = {{"Old", "1", false}};
-    const CameraStatus status = parse_camera_features (c.text, features);
-    fail_unless (status.fault () == CameraFault::kBadSetting, "%s", c.text);
-    fail_unless (status.message ().find (c.expected) != std::string::npos, "'%s' has no '%s'",
-        status.message ().c_str (), c.expected);
-    fail_unless (g_utf8_validate (status.message ().c_str (), -1, nullptr));
-    fail_unless (features.empty ());
-  }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_any_bytes_are_parsed_or_refused)
-{
-  static const char letters[] = "Aa0_= '\",;\n\x80:";
-  GRand *random = g_rand_new_with_seed (1);
-  for (int i = 0; i < 20000; i++) {
-    std::string text;
-    for (int n = g_rand_int_range (random, 0, 12); n > 0; n--)
-      text += letters[g_rand_int_range (random, 0, sizeof letters)]; /* with NUL */
-    std::vector<CameraFeature> features;
-    const CameraStatus status = parse_camera_features (text, features);
-    for (const CameraFeature &feature : features)
-      fail_unless (!feature.name.empty () && (!feature.command || feature.value.empty ()));
-    fail_unless (status.ok () || features.empty ());
-  }
-  g_rand_free (random);
-}
-GST_END_TEST;
 
 GST_START_TEST (test_texts_of_devices_are_made_valid)
 {
@@ -114,114 +24,9 @@ GST_END_TEST;
 
 GST_START_TEST (test_action_command_has_the_bytes_of_the_standard)
 {
-  ActionCommand command;
-  command.device_key = 0x12345678;
-  command.group_key = 0x9abcdef0;
-  command.group_mask = 0x00000101;
-  command.request_id = 0xbeef;
-  static const guint8 plain[] = {0x42, 0x00, 0x01, 0x00, 0x00, 0x0c, 0xbe, 0xef, 0x12, 0x34, 0x56,
-      0x78, 0x9a, 0xbc, 0xde, 0xf0, 0x00, 0x00, 0x01, 0x01};
-  const ActionCommandBytes packet = action_command_bytes (command);
-  assert_equals_int (packet.size, sizeof plain);
-  ck_assert_int_eq (memcmp (packet.bytes.data (), plain, sizeof plain), 0);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_scheduled_action_command_carries_the_time)
-{
-  ActionCommand command;
-  command.device_key = 1;
-  command.group_key = 2;
-  command.group_mask = 0xffffffff;
-  command.request_id = 1;
-  command.acknowledge = true;
-  command.time_ns = 0x0102030405060708;
-  static const guint8 scheduled[] = {0x42, 0x81, 0x01, 0x00, 0x00, 0x14, 0x00, 0x01, 0, 0, 0, 1, 0,
-      0, 0, 2, 0xff, 0xff, 0xff, 0xff, 1, 2, 3, 4, 5, 6, 7, 8};
-  const ActionCommandBytes packet = action_command_bytes (command);
-  assert_equals_int (packet.size, sizeof scheduled);
-  ck_assert_int_eq (memcmp (packet.bytes.data (), scheduled, sizeof scheduled), 0);
-}
-GST_END_TEST;
-
-/** A socket that hears broadcasts on the loopback interface. */
-class Ear {
-public:
-  Ear ()
-      : socket_ (g_socket_new (
-            G_SOCKET_FAMILY_IPV4, G_SOCKET_TYPE_DATAGRAM, G_SOCKET_PROTOCOL_UDP, nullptr))
-  {
-    GSocketAddress *any = g_inet_socket_address_new_from_string ("0.0.0.0", 0);
-    fail_unless (g_socket_bind (socket_, any, FALSE, nullptr));
-    g_object_unref (any);
-    g_socket_set_timeout (socket_, 10);
-  }
-  Ear (const Ear &) = delete;
-  Ear &operator= (const Ear &) = delete;
-  ~Ear () { g_object_unref (socket_); }
-
-  [[nodiscard]] guint16 port () const
-  {
-    GSocketAddress *local = g_socket_get_local_address (socket_, nullptr);
-    const guint16 port = g_inet_socket_address_get_port (G_INET_SOCKET_ADDRESS (local));
-    g_object_unref (local);
-    return port;
-  }
-  std::vector<guint8> hear ()
-  {
-    guint8 bytes[100];
-    const gssize n = g_socket_receive (
-        socket_, reinterpret_cast<gchar *> (bytes), sizeof bytes, nullptr, nullptr);
-    fail_unless (n > 0, "nothing was heard");
-    return {bytes, bytes + n};
-  }
-
-  [[nodiscard]] GSocket *socket () const { return socket_; }
-
-private:
-  GSocket *socket_;
-};
-
-GST_START_TEST (test_action_command_is_heard_once_from_each_interface)
-{
-  Ear ear;
-  ActionSender sender;
-  const std::string interfaces[] = {"127.0.0.1", "127.0.0.1"};
-  const CameraStatus opened = sender.open (interfaces, ear.port ());
-  fail_unless (opened.ok (), "%s", opened.message ().c_str ());
-  ActionCommand command;
-  command.device_key = 0xcafe;
-  command.group_key = 5;
-  command.group_mask = 6;
-  fail_unless_ok (sender.send (command));
-  command.time_ns = 1000;
-  fail_unless_ok (sender.send (command));
-  for (const std::uint16_t id : {1, 2}) {
-    command.request_id = id;
-    command.time_ns = id == 1 ? std::nullopt : std::optional<std::uint64_t> (1000);
-    const std::vector<guint8> heard = ear.hear ();
-    const ActionCommandBytes expected = action_command_bytes (command);
-    fail_unless (std::equal (
-        heard.begin (), heard.end (), expected.span ().begin (), expected.span ().end ()));
-  }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_request_ids_are_never_zero)
-{
-  Ear ear;
-  ActionSender sender;
-  const std::string interfaces[] = {"127.0.0.1"};
-  fail_unless_ok (sender.open (interfaces, ear.port ()));
-  std::uint32_t last = 0;
-  for (int i = 0; i < 65540; i++) {
-    fail_unless_ok (sender.send ({}));
-    const std::vector<guint8> heard = ear.hear ();
-    const std::uint32_t id = heard[6] << 8 | heard[7];
-    ck_assert_int_ne (id, 0);
-    ck_assert_int_eq (id, last % 65535 + 1);
-    last = id;
-  }
+  static constexpr std::array<guint8, 20> expected = {0x42, 0x00, 0x01, 0x00, 0x00, 0x0c, 0xbe,
+      0xef, 0x12, 0x34, 0x56, 0x78, 0x00, 0x00, 0x00, 0x01, 0x00, 0x00, 0x00, 0x01};
+  fail_unless (action_command_bytes (0x12345678, 0xbeef) == expected);
 }
 GST_END_TEST;
 
@@ -235,18 +40,6 @@ GST_START_TEST (test_foreign_interface_is_refused_by_name)
     fail_unless (status.message ().find (std::string ("'") + name + "'") != std::string::npos, "%s",
         status.message ().c_str ());
   }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_receive_buffer_of_a_port_is_enlarged)
-{
-  Ear ear;
-  gint before = 0, after = 0;
-  fail_unless (g_socket_get_option (ear.socket (), SOL_SOCKET, SO_RCVBUF, &before, nullptr));
-  fail_unless (enlarge_receive_buffer (ear.port (), before / 4)); /* the system doubles it */
-  fail_unless (g_socket_get_option (ear.socket (), SOL_SOCKET, SO_RCVBUF, &after, nullptr));
-  assert_equals_int (after, before / 4 * 2);
-  fail_unless (!enlarge_receive_buffer (1, before));
 }
 GST_END_TEST;
 
@@ -369,90 +162,21 @@ GST_START_TEST (test_usb_camera_without_permission_is_found_once)
 }
 GST_END_TEST;
 
-/* ---- teardown ---- */
-
-static std::atomic<bool> no_threads = false;
-
-/* In place of the C library's: fails where a test says so. */
-extern "C" int
-pthread_create (
-    pthread_t *thread, const pthread_attr_t *attributes, void *(*start) (void *), void *data)
-{
-  using Create = decltype (&pthread_create);
-  static const auto create = reinterpret_cast<Create> (dlsym (RTLD_NEXT, "pthread_create"));
-  return no_threads ? EAGAIN : create (thread, attributes, start, data);
-}
-
-static void
-allow_threads ()
-{
-  no_threads = false;
-}
-
-GST_START_TEST (test_teardown_runs_in_a_thread_of_its_own)
-{
-  GThread *here = g_thread_self (), *there = nullptr;
-  auto held = std::make_shared<int> (1);
-  std::vector<int> ran;
-  {
-    TeardownQueue queue;
-    fail_unless (queue.error () == nullptr);
-    queue.run ([&there, held] { there = g_thread_self (); }, true);
-    fail_unless (queue.wait (TeardownQueue::kMaxWait));
-    fail_unless (there && there != here);
-    assert_equals_int (held.use_count (), 1);
-    for (const int number : {1, 2, 3})
-      queue.run ([&ran, number] { ran.push_back (number); }, false);
-    fail_unless (queue.wait (TeardownQueue::kMaxWait));
-  }
-  fail_unless (ran == std::vector<int> ({1, 2, 3}));
-}
-GST_END_TEST;
-
-GST_START_TEST (test_camera_without_a_teardown_thread_is_refused)
-{
-  g_thread_pool_set_max_unused_threads (0);
-  g_thread_pool_stop_unused_threads ();
-  while (g_thread_pool_get_num_unused_threads () > 0)
-    g_usleep (1000);
-  no_threads = true;
-  std::unique_ptr<Camera> camera;
-  const CameraStatus status = Camera::open ("Fake-1", camera);
-  fail_unless (!status.ok () && !camera);
-  fail_unless (status.message ().find ("the thread that releases the camera") != std::string::npos,
-      "%s", status.message ().c_str ());
-}
-GST_END_TEST;
-
 static Suite *
 cameraparts_suite ()
 {
   Suite *suite = suite_create ("cameraparts");
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
-  tcase_add_test (tc, test_features_are_split_at_spaces_commas_and_semicolons);
-  tcase_add_test (tc, test_quotes_keep_spaces_and_empty_values);
-  tcase_add_test (tc, test_wrong_features_strings_are_refused_at_the_place);
-  tcase_add_test (tc, test_any_bytes_are_parsed_or_refused);
   tcase_add_test (tc, test_texts_of_devices_are_made_valid);
   tcase_add_test (tc, test_action_command_has_the_bytes_of_the_standard);
-  tcase_add_test (tc, test_scheduled_action_command_carries_the_time);
-  tcase_add_test (tc, test_action_command_is_heard_once_from_each_interface);
-  tcase_add_test (tc, test_request_ids_are_never_zero);
   tcase_add_test (tc, test_foreign_interface_is_refused_by_name);
-  tcase_add_test (tc, test_receive_buffer_of_a_port_is_enlarged);
   tcase_add_test (tc, test_frame_numbers_count_on_over_16_bits);
   tcase_add_test (tc, test_64_bit_frame_ids_need_no_rounds);
   tcase_add_test (tc, test_frame_numbers_grow_whatever_the_camera_says);
   tcase_add_test (tc, test_user_name_is_asked_for_with_the_bytes_of_the_standard);
   tcase_add_test (tc, test_user_name_is_taken_from_answers_of_the_standard_alone);
   tcase_add_test (tc, test_usb_camera_without_permission_is_found_once);
-  tcase_add_test (tc, test_teardown_runs_in_a_thread_of_its_own);
-
-  TCase *no_thread = tcase_create ("without threads");
-  tcase_add_checked_fixture (no_thread, nullptr, allow_threads);
-  suite_add_tcase (suite, no_thread);
-  tcase_add_test (no_thread, test_camera_without_a_teardown_thread_is_refused);
   return suite;
 }
 

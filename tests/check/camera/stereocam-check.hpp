@@ -75,14 +75,14 @@ struct CamerasOnSockets {
   std::vector<std::unique_ptr<GigeCamera>> list;
   std::unique_ptr<GigeListener> listener;
 
-  explicit CamerasOnSockets (int count, double loss)
+  explicit CamerasOnSockets (int count, double loss, bool resend)
   {
     settings.width = 64;
     settings.height = 48;
     settings.fps = 50;
     settings.pixel_format = kMono8;
     settings.loss = loss;
-    settings.resend = false;
+    settings.resend = resend;
     list.resize (count);
     for (int i = 0; i < count; i++)
       plug (i);
@@ -143,8 +143,8 @@ struct CamerasOnSockets {
  *  one begins, or at exit. */
 class TestCameras {
 public:
-  explicit TestCameras (int count = 2, double loss = 0)
-      : cameras ((of_this_process ().reset (), new CamerasOnSockets (count, loss))),
+  explicit TestCameras (int count = 2, double loss = 0, bool resend = false)
+      : cameras ((of_this_process ().reset (), new CamerasOnSockets (count, loss, resend))),
         list (cameras->list), listener (cameras->listener)
   {
     of_this_process ().reset (cameras);
@@ -175,7 +175,6 @@ struct SeenPicture {
   GstClockTime pts, capture, duration;
   PictureMark mark;
   bool discont;
-  const void *memory;
 };
 
 /** What a streaming thread adds to and a test looks at. */
@@ -308,16 +307,18 @@ public:
     for (auto &list : seen_)
       list.clear ();
   }
-  guint64 stat (const char *name)
-  {
-    GstStructure *stats = nullptr;
-    guint64 value = G_MAXUINT64;
-    g_object_get (source_, "stats", &stats, nullptr);
-    gst_structure_get_uint64 (stats, name, &value);
-    gst_structure_free (stats);
-    return value;
-  }
+  guint64 stat (const char *name) { return stats_field (source_, name); }
 
+  /** The capsfilter of a pad. */
+  [[nodiscard]] std::shared_ptr<GstElement> filter (int side) const
+  {
+    GstPad *pad = gst_element_get_static_pad (source_, kSides[side]),
+           *peer = gst_pad_get_peer (pad);
+    std::shared_ptr<GstElement> found (gst_pad_get_parent_element (peer), gst_object_unref);
+    gst_object_unref (peer);
+    gst_object_unref (pad);
+    return found;
+  }
   [[nodiscard]] GstElement *pipeline () const { return pipeline_; }
   [[nodiscard]] GstElement *source () const { return source_; }
   [[nodiscard]] GstBus *bus () const { return bus_; }
@@ -327,11 +328,10 @@ private:
   {
     SeenPicture picture{GST_BUFFER_PTS (buffer), gst_range_buffer_get_capture_time (buffer),
         GST_BUFFER_DURATION (buffer), {},
-        GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DISCONT) != 0, nullptr};
+        GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DISCONT) != 0};
     GstMapInfo map;
     fail_unless (gst_buffer_map (buffer, &map, GST_MAP_READ));
     std::memcpy (&picture.mark, map.data, sizeof picture.mark);
-    picture.memory = map.data;
     gst_buffer_unmap (buffer, &map);
     std::lock_guard guard (self->lock_);
     for (int i = 0; i < 3; i++)

@@ -13,11 +13,11 @@ static constexpr std::int64_t kPeriod = GST_SECOND / 50;
 GST_START_TEST (test_software_pairs_share_pts_and_capture_time_on_ticks)
 {
   TestCameras cameras;
-  CameraPipeline p ("trigger=software num-buffers=50");
+  CameraPipeline p ("trigger=software num-buffers=30");
   p.play_to_the_end ();
   expect_pairs (p, 2, kPeriod / 2);
   const GstClockTime base = gst_element_get_base_time (p.source ());
-  fail_unless_equals_int (int (p.seen (0).size ()), 50);
+  fail_unless_equals_int (int (p.seen (0).size ()), 30);
   for (const SeenPicture &picture : p.seen (0)) {
     fail_unless_equals_uint64 (picture.capture % kPeriod, 0);
     fail_unless_equals_uint64 (picture.pts, picture.capture - base);
@@ -25,17 +25,7 @@ GST_START_TEST (test_software_pairs_share_pts_and_capture_time_on_ticks)
     /* the system clock is CLOCK_MONOTONIC: it was taken after its tick */
     ck_assert_int_ge (picture.mark.taken_ns, static_cast<std::int64_t> (picture.capture));
   }
-  fail_unless_equals_uint64 (p.stat ("sets"), 50);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_third_camera_belongs_to_the_set)
-{
-  TestCameras cameras (3);
-  CameraPipeline p ("trigger=software num-buffers=30", 3);
-  p.play_to_the_end ();
-  expect_pairs (p, 3, kPeriod / 2);
-  fail_unless_equals_int (int (p.seen (2).size ()), 30);
+  fail_unless_equals_uint64 (p.stat ("sets"), 30);
 }
 GST_END_TEST;
 
@@ -122,57 +112,22 @@ GST_START_TEST (test_downstream_chooses_format_size_and_rate)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_left_cameras_present_format_is_taken_where_any_will_do)
-{
-  TestCameras cameras;
-  for (const std::uint32_t format : {kRgb8, kMono8}) {
-    cameras.list[0]->regulate (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT, format);
-    while (read_register (0, ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT) != format)
-      g_usleep (1000);
-    expect_caps (
-        "", "ANY", format == kRgb8 ? "video/x-raw,format=RGB" : "video/x-raw,format=GRAY8");
-  }
-}
-GST_END_TEST;
-
-static std::string
-error_with_caps (const std::string &left, const std::string &right)
-{
-  CameraPipeline p ("trigger=software", 2, "ANY");
-  const std::string caps[] = {left, right};
-  for (int side = 0; side < 2; side++) {
-    GstPad *pad = gst_element_get_static_pad (p.source (), kSides[side]);
-    GstPad *peer = gst_pad_get_peer (pad);
-    GstElement *filter = gst_pad_get_parent_element (peer);
-    gst_util_set_object_arg (G_OBJECT (filter), "caps", caps[side].c_str ());
-    gst_object_unref (filter);
-    gst_object_unref (peer);
-    gst_object_unref (pad);
-  }
-  p.play ();
-  return p.next_text (GST_MESSAGE_ERROR);
-}
-
-GST_START_TEST (test_caps_that_nobody_has_are_one_error_that_names_pad_field_and_values)
+GST_START_TEST (test_caps_that_no_camera_has_are_one_error_that_names_the_pad)
 {
   TestCameras cameras;
   const struct {
-    std::string left, right, expected;
+    const char *left, *right, *expected;
   } rows[] = {
-      {"ANY", "video/x-raw,width=1920,height=1080",
-          "pad right: downstream asks for width 1920; the cameras have [ 4, 64, 4 ]"},
-      {"video/x-raw,height=4000", "ANY",
-          "pad left: downstream asks for height 4000; the cameras have [ 1, 48 ]"},
-      {"video/x-raw,framerate=0/1", "ANY", "pad left: downstream asks for framerate 0/1; the"},
-      {"video/x-raw,format=NV12", "ANY", "pad left: downstream asks for format video/x-raw NV12;"},
+      {"ANY", "video/x-raw,width=1920",
+          "pad right: downstream accepts video/x-raw, width=(int)1920; the cameras and the pads"},
       {"video/x-raw,format=RGB", "video/x-raw,format=GRAY8",
-          "pad right: downstream asks for format video/x-raw GRAY8; with pad left there is "
-          "video/x-raw RGB"},
-      {"video/x-raw,width=32", "video/x-raw,width=64",
-          "pad right: downstream asks for width 64; with pad left there is 32"},
+          "pad right: downstream accepts video/x-raw, format=(string)GRAY8; the cameras"},
   };
   for (const auto &row : rows) {
-    const std::string text = error_with_caps (row.left, row.right);
+    CameraPipeline p ("trigger=software", 2, row.left);
+    gst_util_set_object_arg (G_OBJECT (p.filter (1).get ()), "caps", row.right);
+    p.play ();
+    const std::string text = p.next_text (GST_MESSAGE_ERROR);
     fail_unless_contains (text, row.expected);
   }
 }
@@ -212,17 +167,6 @@ write_rig (bool with_names)
   return path;
 }
 
-GST_START_TEST (test_rig_file_names_the_cameras)
-{
-  TestCameras cameras;
-  const std::string path = write_rig (true);
-  CameraPipeline p ("trigger=software num-buffers=3 rig=" + path, 2, "ANY", false);
-  p.play_to_the_end ();
-  expect_pairs (p, 2, kPeriod);
-  unlink (path.c_str ());
-}
-GST_END_TEST;
-
 static std::string
 error_going_to_paused (const std::string &properties)
 {
@@ -232,8 +176,14 @@ error_going_to_paused (const std::string &properties)
   return p.next_text (GST_MESSAGE_ERROR);
 }
 
-GST_START_TEST (test_cameras_that_are_not_named_are_one_error)
+GST_START_TEST (test_cameras_are_named_by_properties_or_a_rig_file)
 {
+  {
+    TestCameras cameras;
+    CameraPipeline p ("trigger=software num-buffers=3 rig=" + write_rig (true), 2, "ANY", false);
+    p.play_to_the_end ();
+    expect_pairs (p, 2, kPeriod);
+  }
   const std::string path = write_rig (false);
   const struct {
     std::string properties, expected;
@@ -241,15 +191,14 @@ GST_START_TEST (test_cameras_that_are_not_named_are_one_error)
       {"", "property left"},
       {"left=a", "property right"},
       {"left=a right=a", "named twice"},
-      {"left=a rig=" + path, "no right camera: property left names one, so rig is ignored"},
-      {"left=a right=b single-shot=true", "single-shot with trigger=free-run"},
-      {"left=a right=b single-shot=true trigger=hardware", "single-shot with trigger=hardware"},
-      {"rig=/nowhere.yaml", "/nowhere.yaml: no such file"},
+      {"left=a rig=" + path, "set property right; rig is ignored where one of left and right"},
+      {"left=a right=b single-shot=true", "single-shot needs trigger=software or action"},
+      {"rig=/nowhere.yaml", "/nowhere.yaml: no such rig file"},
       {"rig=" + path, "does not name its left camera"},
       {"view-id=7 rig=" + path, "view-id 7"},
-      {"left=a right=b clock-server=here", "clock-server here: expected HOST:PORT"},
-      {"left=a right=b clock-server=here:0", "clock-server here:0: expected HOST:PORT"},
-      {"left=a right=b clock-server=ptp:900", "clock-server ptp:900: expected HOST:PORT"},
+      {"left=a right=b clock-server=here", "clock-server here is neither HOST:PORT"},
+      {"left=a right=b clock-server=here:0", "clock-server here:0 is neither HOST:PORT"},
+      {"left=a right=b clock-server=ptp:900", "clock-server ptp:900 is neither HOST:PORT"},
   };
   for (const auto &row : rows) {
     const std::string text = error_going_to_paused (row.properties);
@@ -287,6 +236,23 @@ GST_START_TEST (test_blocked_branch_does_not_hold_up_the_other)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_pad_goes_on_after_its_downstream_was_in_ready)
+{
+  TestCameras cameras;
+  CameraPipeline p ("trigger=software");
+  p.play ();
+  fail_unless (p.wait_for_pictures (0, 3));
+  gst_element_set_state (p.filter (0).get (), GST_STATE_READY);
+  p.forget ();
+  fail_unless (p.wait_for_pictures (1, 8)); /* more than the left pad's queue holds */
+  fail_unless_equals_int (p.seen (0).size (), 0);
+  gst_element_set_state (p.filter (0).get (), GST_STATE_PLAYING);
+  fail_unless (p.wait_for_pictures (0, 3));
+  fail_unless (p.wait_for_pictures (1, p.seen (1).size () + 3));
+  fail_unless (p.seen (0)[0].discont);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_one_pad_alone_may_be_linked)
 {
   TestCameras cameras;
@@ -318,52 +284,24 @@ GST_END_TEST;
 
 /* ---- life ---- */
 
-GST_START_TEST (test_runs_again_after_null_and_after_ready)
+GST_START_TEST (test_runs_again_after_any_state_and_after_quick_changes)
 {
   TestCameras cameras;
   CameraPipeline p ("trigger=software");
-  for (GstState between : {GST_STATE_NULL, GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_NULL}) {
+  for (GstState between : {GST_STATE_NULL, GST_STATE_READY, GST_STATE_PAUSED}) {
     p.forget ();
     p.play ();
     fail_unless (p.wait_for_pictures (0, 5) && p.wait_for_pictures (1, 5));
     gst_element_set_state (p.pipeline (), between);
   }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_states_may_change_at_once)
-{
-  TestCameras cameras;
-  CameraPipeline p ("trigger=software");
-  for (int i = 0; i < 5; i++)
+  for (int i = 0; i < 3; i++)
     for (GstState state : {GST_STATE_PLAYING, GST_STATE_READY, GST_STATE_PAUSED, GST_STATE_NULL}) {
       gst_element_set_state (p.pipeline (), state);
       g_usleep (g_random_int_range (0, 3000));
     }
+  p.forget ();
   p.play ();
   fail_unless (p.wait_for_pictures (0, 3));
-}
-GST_END_TEST;
-
-GST_START_TEST (test_it_is_live_and_says_its_latency)
-{
-  TestCameras cameras;
-  CameraPipeline p ("trigger=software exposure=5000");
-  fail_unless_equals_int (
-      gst_element_set_state (p.pipeline (), GST_STATE_PAUSED), GST_STATE_CHANGE_NO_PREROLL);
-  p.play ();
-  fail_unless (p.wait_for_pictures (0, 3));
-  GstQuery *query = gst_query_new_latency ();
-  GstPad *pad = gst_element_get_static_pad (p.source (), "left");
-  fail_unless (gst_pad_query (pad, query));
-  gboolean live = FALSE;
-  GstClockTime least = 0;
-  gst_query_parse_latency (query, &live, &least, nullptr);
-  fail_unless (live);
-  ck_assert_uint_ge (least, 5 * GST_MSECOND + kPeriod);
-  ck_assert_uint_le (least, slowdown () * (5 * GST_MSECOND + kPeriod));
-  gst_query_unref (query);
-  gst_object_unref (pad);
 }
 GST_END_TEST;
 
@@ -373,30 +311,32 @@ latency_now (CameraPipeline &p)
   GstQuery *query = gst_query_new_latency ();
   GstPad *pad = gst_element_get_static_pad (p.source (), "left");
   GstClockTime least = 0;
+  gboolean live = FALSE;
   fail_unless (gst_pad_query (pad, query));
-  gst_query_parse_latency (query, nullptr, &least, nullptr);
+  gst_query_parse_latency (query, &live, &least, nullptr);
+  fail_unless (live);
   gst_query_unref (query);
   gst_object_unref (pad);
   return least;
 }
 
 /* Sinks ask when the pipeline goes to PLAYING, which is before cameras have answered. */
-GST_START_TEST (test_latency_before_the_cameras_answer_has_exposure_and_a_period)
+GST_START_TEST (test_latency_is_exposure_and_a_period_also_before_the_cameras_answer)
 {
-  {
-    CameraPipeline p ("trigger=software exposure=5000"); /* of cameras that are not there */
-    gst_element_set_state (p.pipeline (), GST_STATE_PAUSED);
-    fail_unless_equals_uint64 (latency_now (p), 5 * GST_MSECOND + GST_SECOND / 30);
-  }
   TestCameras cameras;
   CameraPipeline p ("trigger=software exposure=5000");
+  fail_unless_equals_int (
+      gst_element_set_state (p.pipeline (), GST_STATE_PAUSED), GST_STATE_CHANGE_NO_PREROLL);
+  fail_unless_equals_uint64 (latency_now (p), 5 * GST_MSECOND + GST_SECOND / 30);
   p.play ();
   fail_unless (p.wait_for_pictures (0, 3));
-  gst_element_set_state (p.pipeline (), GST_STATE_READY);
-  gst_element_set_state (p.pipeline (), GST_STATE_PAUSED);
-  const GstClockTime now = latency_now (p); /* as it was */
-  ck_assert_uint_ge (now, 5 * GST_MSECOND + kPeriod);
-  ck_assert_uint_le (now, slowdown () * (5 * GST_MSECOND + kPeriod));
+  for (int i = 0; i < 2; i++) {
+    const GstClockTime now = latency_now (p);
+    ck_assert_uint_ge (now, 5 * GST_MSECOND + kPeriod);
+    ck_assert_uint_le (now, slowdown () * (5 * GST_MSECOND + kPeriod));
+    gst_element_set_state (p.pipeline (), GST_STATE_READY);
+    gst_element_set_state (p.pipeline (), GST_STATE_PAUSED); /* then it is as it was */
+  }
 }
 GST_END_TEST;
 
@@ -407,15 +347,23 @@ GST_START_TEST (test_no_picture_is_taken_while_paused)
   p.play ();
   fail_unless (p.wait_for_pictures (0, 5));
   gst_element_set_state (p.pipeline (), GST_STATE_PAUSED);
-  g_usleep (200000);
-  const std::uint64_t taken = cameras.list[0]->pictures ();
-  g_usleep (200000);
-  fail_unless_equals_uint64 (cameras.list[0]->pictures (), taken);
+  std::uint64_t taken = cameras.list[0]->pictures (), before = 0;
+  for (int i = 0; i < 100 && before != taken; i++, taken = cameras.list[0]->pictures ()) {
+    before = taken; /* until ten periods pass without one */
+    g_usleep (200000);
+  }
+  fail_unless_equals_uint64 (before, taken);
 }
 GST_END_TEST;
 
-GST_START_TEST (test_eos_event_ends_all_pads)
+GST_START_TEST (test_eos_event_ends_all_pads_also_before_cameras_answer)
 {
+  {
+    CameraPipeline p ("trigger=software"); /* nobody answers there */
+    p.play ();
+    fail_unless (gst_element_send_event (p.source (), gst_event_new_eos ()));
+    p.wait_for_eos ();
+  }
   TestCameras cameras;
   CameraPipeline p ("trigger=software");
   p.play ();
@@ -425,95 +373,15 @@ GST_START_TEST (test_eos_event_ends_all_pads)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_eos_event_ends_a_stream_that_has_not_begun)
-{
-  CameraPipeline p ("trigger=software"); /* nobody answers there */
-  p.play ();
-  fail_unless (gst_element_send_event (p.source (), gst_event_new_eos ()));
-  GstMessage *message = gst_bus_timed_pop_filtered (p.bus (), 20 * GST_SECOND, GST_MESSAGE_EOS);
-  fail_unless (message != nullptr);
-  gst_message_unref (message);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_flush_goes_out_on_all_pads_and_pictures_go_on)
-{
-  TestCameras cameras;
-  CameraPipeline p ("trigger=software");
-  p.play ();
-  fail_unless (p.wait_for_pictures (0, 5));
-  fail_unless (gst_element_send_event (p.source (), gst_event_new_flush_start ()));
-  g_usleep (100000);
-  p.forget ();
-  g_usleep (100000);
-  fail_unless_equals_int (int (p.seen (0).size ()), 0);
-  fail_unless (gst_element_send_event (p.source (), gst_event_new_flush_stop (FALSE)));
-  fail_unless (p.wait_for_pictures (0, 5) && p.wait_for_pictures (1, 5));
-  fail_unless (p.seen (0)[0].discont);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_pictures_go_on_after_a_flush_that_the_application_pushes_on_one_pad)
-{
-  TestCameras cameras;
-  CameraPipeline p ("trigger=software");
-  p.play ();
-  fail_unless (p.wait_for_pictures (0, 5));
-  GstPad *left = gst_element_get_static_pad (p.source (), "left");
-  for (const bool with_time_between : {true, false}) {
-    gst_pad_push_event (left, gst_event_new_flush_start ());
-    if (with_time_between)
-      g_usleep (200000);
-    gst_pad_push_event (left, gst_event_new_flush_stop (FALSE));
-    p.forget ();
-    fail_unless (p.wait_for_pictures (0, 5) && p.wait_for_pictures (1, 5));
-    GstEvent *segment = gst_pad_get_sticky_event (left, GST_EVENT_SEGMENT, 0);
-    fail_unless (segment != nullptr);
-    gst_event_unref (segment);
-  }
-  p.stop ();
-  expect_pairs (p, 2, kPeriod / 2);
-  gst_object_unref (left);
-}
-GST_END_TEST;
-
-/* The pipeline takes a new base time, so running time begins at 0 again. */
-GST_START_TEST (test_running_time_starts_over_after_a_flush_that_resets_it)
-{
-  TestCameras cameras;
-  CameraPipeline p ("trigger=free-run");
-  p.play ();
-  fail_unless (p.wait_for_pictures (0, 50));
-  gst_element_send_event (p.source (), gst_event_new_flush_start ());
-  gst_element_send_event (p.source (), gst_event_new_flush_stop (TRUE));
-  gst_element_set_state (p.pipeline (), GST_STATE_PAUSED);
-  p.forget ();
-  gst_element_set_start_time (p.pipeline (), 0);
-  p.play ();
-  fail_unless (p.wait_for_pictures (0, 20));
-  const auto pictures = p.seen (0);
-  const GstClockTime step = pictures[19].pts - pictures[10].pts;
-  fail_unless (step > 5 * kPeriod, "9 pictures in %" G_GUINT64_FORMAT " ns", step);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_downstream_may_want_another_size_mid_stream)
 {
   TestCameras cameras;
   CameraPipeline p ("trigger=software");
   p.play ();
   fail_unless (p.wait_for_pictures (0, 5));
-  for (int side = 0; side < 2; side++) {
-    GstPad *pad = gst_element_get_static_pad (p.source (), kSides[side]);
-    GstPad *peer = gst_pad_get_peer (pad);
-    GstElement *filter = gst_pad_get_parent_element (peer);
-    GstCaps *caps = gst_caps_from_string ("video/x-raw,format=GRAY8,width=32,framerate=50/1");
-    g_object_set (filter, "caps", caps, nullptr);
-    gst_caps_unref (caps);
-    gst_object_unref (filter);
-    gst_object_unref (peer);
-    gst_object_unref (pad);
-  }
+  for (int side = 0; side < 2; side++)
+    gst_util_set_object_arg (G_OBJECT (p.filter (side).get ()), "caps",
+        "video/x-raw,format=GRAY8,width=32,framerate=50/1");
   GstPad *pad = gst_element_get_static_pad (p.source (), "right");
   int width = 0;
   for (int i = 0; i < 1000 && width != 32; i++, g_usleep (10000))
@@ -535,28 +403,20 @@ stereocamsrc_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_software_pairs_share_pts_and_capture_time_on_ticks);
-  tcase_add_test (tc, test_third_camera_belongs_to_the_set);
   tcase_add_test (tc, test_third_pad_is_there_only_while_its_camera_is_named);
   tcase_add_test (tc, test_pixels_are_not_copied);
   tcase_add_test (tc, test_downstream_chooses_format_size_and_rate);
-  tcase_add_test (tc, test_left_cameras_present_format_is_taken_where_any_will_do);
-  tcase_add_test (tc, test_caps_that_nobody_has_are_one_error_that_names_pad_field_and_values);
+  tcase_add_test (tc, test_caps_that_no_camera_has_are_one_error_that_names_the_pad);
   tcase_add_test (tc, test_format_that_is_not_there_is_one_error_that_lists_the_cameras);
-  tcase_add_test (tc, test_rig_file_names_the_cameras);
-  tcase_add_test (tc, test_cameras_that_are_not_named_are_one_error);
+  tcase_add_test (tc, test_cameras_are_named_by_properties_or_a_rig_file);
   tcase_add_test (tc, test_blocked_branch_does_not_hold_up_the_other);
+  tcase_add_test (tc, test_pad_goes_on_after_its_downstream_was_in_ready);
   tcase_add_test (tc, test_one_pad_alone_may_be_linked);
   tcase_add_test (tc, test_downstream_that_refuses_is_one_error_and_eos);
-  tcase_add_test (tc, test_runs_again_after_null_and_after_ready);
-  tcase_add_test (tc, test_states_may_change_at_once);
-  tcase_add_test (tc, test_it_is_live_and_says_its_latency);
-  tcase_add_test (tc, test_latency_before_the_cameras_answer_has_exposure_and_a_period);
+  tcase_add_test (tc, test_runs_again_after_any_state_and_after_quick_changes);
+  tcase_add_test (tc, test_latency_is_exposure_and_a_period_also_before_the_cameras_answer);
   tcase_add_test (tc, test_no_picture_is_taken_while_paused);
-  tcase_add_test (tc, test_eos_event_ends_all_pads);
-  tcase_add_test (tc, test_eos_event_ends_a_stream_that_has_not_begun);
-  tcase_add_test (tc, test_flush_goes_out_on_all_pads_and_pictures_go_on);
-  tcase_add_test (tc, test_pictures_go_on_after_a_flush_that_the_application_pushes_on_one_pad);
-  tcase_add_test (tc, test_running_time_starts_over_after_a_flush_that_resets_it);
+  tcase_add_test (tc, test_eos_event_ends_all_pads_also_before_cameras_answer);
   tcase_add_test (tc, test_downstream_may_want_another_size_mid_stream);
   return suite;
 }

@@ -50,27 +50,17 @@ struct Receiver {
 struct Session {
   Rig rig = ring_rig (1);
   GstHarness *h;
-  GstBus *bus = gst_bus_new ();
   Receiver receiver;
   int frame = 0;
-  std::vector<gsize> sizes;         /* of what came out */
-  std::vector<GstClockTime> times;  /* its PTS */
-  std::vector<GstBuffer *> buffers; /* itself, where `keeps` */
-  bool keeps = false;
+  std::vector<gsize> sizes;        /* of what came out */
+  std::vector<GstClockTime> times; /* its PTS */
 
   explicit Session (const std::string &properties)
       : h (harness_of ("neighbourcodeenc profile=packed " + properties))
   {
-    gst_element_set_bus (h->element, bus);
     gst_harness_set_src_caps (h, range_caps (rig));
   }
-  ~Session ()
-  {
-    unref_all (buffers);
-    gst_element_set_bus (h->element, nullptr);
-    gst_object_unref (bus);
-    gst_harness_teardown (h);
-  }
+  ~Session () { gst_harness_teardown (h); }
   void play (int n, bool reports = true)
   {
     for (const int end = frame + n; frame < end; frame++) {
@@ -82,10 +72,7 @@ struct Session {
         bytes = gst_buffer_get_size (buffer);
         sizes.push_back (bytes);
         times.push_back (GST_BUFFER_PTS (buffer));
-        if (keeps)
-          buffers.push_back (buffer);
-        else
-          gst_buffer_unref (buffer);
+        gst_buffer_unref (buffer);
       }
       if (reports && bytes > 0)
         fail_unless (gst_harness_push_upstream_event (h, receiver.report (bytes)));
@@ -93,36 +80,8 @@ struct Session {
         receiver.frame++;
     }
   }
-  guint64 estimate () const
-  {
-    guint64 bitrate = 0;
-    g_object_get (h->element, "estimated-bitrate", &bitrate, nullptr);
-    return bitrate;
-  }
-  guint64 stat (const char *name) const
-  {
-    GstStructure *stats = nullptr;
-    guint64 value = 0;
-    g_object_get (h->element, "stats", &stats, nullptr);
-    fail_unless (gst_structure_get_uint64 (stats, name, &value), "%s", name);
-    gst_structure_free (stats);
-    return value;
-  }
-  int messages () const
-  {
-    int n = 0;
-    while (GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_ELEMENT)) {
-      const GstStructure *structure = gst_message_get_structure (message);
-      if (gst_structure_has_name (structure, "neighbourcodeenc-adaptive-bitrate")) {
-        n++;
-        for (const char *field :
-            {"one-of", "estimated-bitrate", "receiver-reports", "receiver-loss", "receiver-queue"})
-          fail_unless (gst_structure_has_field (structure, field), "%s", field);
-      }
-      gst_message_unref (message);
-    }
-    return n;
-  }
+  guint64 estimate () const { return stat ("estimated-bitrate"); }
+  guint64 stat (const char *name) const { return stats_field (h->element, name); }
 };
 
 /* Bits/s of the default thresholds. */
@@ -142,7 +101,6 @@ GST_START_TEST (test_without_trouble_thresholds_are_as_configured)
   fail_unless_cmp (plain.sizes, ==, adaptive.sizes);
   fail_unless_equals_uint64 (adaptive.estimate (), 0);
   fail_unless_equals_uint64 (adaptive.stat ("receiver-reports"), 30);
-  fail_unless_equals_int (adaptive.messages (), 0);
 }
 GST_END_TEST;
 
@@ -156,7 +114,6 @@ GST_START_TEST (test_a_queue_that_grows_lowers_the_rate_and_its_end_raises_it)
   const guint64 low = session.estimate ();
   fail_unless (low > 0 && double (low) < 0.95 * before, "%" G_GUINT64_FORMAT " of %g", low, before);
   ck_assert_uint_lt (session.sizes.back (), session.sizes.front ());
-  ck_assert_int_gt (session.messages (), 0);
   session.receiver.queue_growth_s = -session.receiver.queue_s / 10;
   session.play (10);
   session.receiver.queue_growth_s = 0;
@@ -166,17 +123,6 @@ GST_START_TEST (test_a_queue_that_grows_lowers_the_rate_and_its_end_raises_it)
     session.play (10);
   }
   ck_assert_uint_gt (session.estimate (), low);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_lost_packets_lower_the_rate)
-{
-  Session session ("adaptive-bitrate=true");
-  session.play (15);
-  session.receiver.lost_of_10 = 4;
-  session.play (40);
-  ck_assert_uint_gt (session.estimate (), 0);
-  ck_assert_uint_lt (session.sizes.back (), session.sizes.front ());
 }
 GST_END_TEST;
 
@@ -213,13 +159,13 @@ GST_START_TEST (test_below_the_worst_thresholds_whole_frame_sets_are_left_out_ev
   session.play (90);
   session.times.clear ();
   const gsize events = gst_harness_events_received (session.h);
-  const guint64 before = session.stat ("left-out");
+  const guint64 before = session.stat ("skipped");
   session.play (90);
   fail_unless (session.times.size () < 46, "%d frame sets", int (session.times.size ()));
   const GstClockTime step = session.times[1] - session.times[0];
   for (gsize i = 1; i < session.times.size (); i++)
     ck_assert_uint_eq (session.times[i] - session.times[i - 1], step);
-  fail_unless_equals_uint64 (session.stat ("left-out") - before, 90 - session.times.size ());
+  fail_unless_equals_uint64 (session.stat ("skipped") - before, 90 - session.times.size ());
   /* Each is a GAP downstream. */
   fail_unless_equals_int (
       gst_harness_events_received (session.h) - events, 90 - int (session.times.size ()));
@@ -235,58 +181,6 @@ GST_START_TEST (test_below_the_worst_thresholds_whole_frame_sets_are_left_out_ev
   ck_assert_uint_gt (time, 88 * kInterval);
   ck_assert_uint_lt (time, 180 * kInterval);
   gst_event_unref (last);
-  ck_assert_int_gt (session.messages (), 0);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_min_framerate_is_kept)
-{
-  Session session ("adaptive-bitrate=true min-bitrate=1000 target-bitrate=1000 min-framerate=15/1");
-  session.play (60);
-  session.times.clear ();
-  session.play (60);
-  fail_unless_equals_int (session.times.size (), 30);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_what_refers_to_earlier_frame_sets_decodes_where_some_are_left_out)
-{
-  Session session ("adaptive-bitrate=true temporal=true min-bitrate=10000 min-framerate=1/1 "
-                   "target-bitrate=" +
-                   std::to_string (int (usual_rate () / 60)));
-  session.keeps = true;
-  session.play (90);
-  ck_assert_uint_gt (session.stat ("left-out"), 20);
-  GstHarness *decoder = harness_of ("neighbourcodedec");
-  gst_harness_set_src_caps (decoder, coded_caps (session.rig));
-  for (GstBuffer *buffer : session.buffers)
-    gst_buffer_unref (gst_harness_push_and_pull (decoder, gst_buffer_ref (buffer)));
-  GstStructure *stats = nullptr;
-  guint64 missing = 1, unknown = 1;
-  g_object_get (decoder->element, "stats", &stats, nullptr);
-  fail_unless (gst_structure_get (stats, "missing-pixels", G_TYPE_UINT64, &missing,
-      "unknown-pixels", G_TYPE_UINT64, &unknown, nullptr));
-  gst_structure_free (stats);
-  fail_unless_equals_uint64 (missing + unknown, 0);
-  gst_harness_teardown (decoder);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_key_frame_set_that_is_asked_for_comes_with_the_next_one_kept)
-{
-  Session session ("adaptive-bitrate=true temporal=true min-bitrate=1000 target-bitrate=1000 "
-                   "min-framerate=5/1");
-  session.play (60);
-  session.keeps = true;
-  session.play (1); /* somewhere between two that are kept */
-  gst_harness_push_upstream_event (session.h,
-      gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM,
-          gst_structure_new ("GstForceKeyUnit", "running-time", G_TYPE_UINT64, GST_CLOCK_TIME_NONE,
-              "all-headers", G_TYPE_BOOLEAN, TRUE, "count", G_TYPE_UINT, 1, nullptr)));
-  const gsize before = session.buffers.size ();
-  session.play (6, false);
-  fail_unless_equals_int (session.buffers.size () - before, 1);
-  fail_if (GST_BUFFER_FLAG_IS_SET (session.buffers[before], GST_BUFFER_FLAG_DELTA_UNIT));
 }
 GST_END_TEST;
 
@@ -294,8 +188,8 @@ GST_START_TEST (test_events_that_hold_nonsense_are_borne)
 {
   Session session ("adaptive-bitrate=true");
   session.play (5);
-  const char *const nonsense[] = {"RTPTWCCPackets", "RTPTWCCPackets, packets=(int)3",
-      "RTPTWCCPackets, packets=(string)x"};
+  const char *const nonsense[] = {
+      "RTPTWCCPackets", "RTPTWCCPackets, packets=(int)3", "RTPTWCCPackets, packets=(string)x"};
   for (const char *text : nonsense) {
     GstStructure *structure = gst_structure_from_string (text, nullptr);
     fail_unless (structure != nullptr, "%s", text);
@@ -319,39 +213,18 @@ GST_START_TEST (test_events_that_hold_nonsense_are_borne)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_ready_forgets_the_receivers)
-{
-  Session session ("adaptive-bitrate=true");
-  session.receiver.lost_of_10 = 5;
-  session.play (40);
-  ck_assert_uint_gt (session.estimate (), 0);
-  gst_element_set_state (session.h->element, GST_STATE_READY);
-  gst_harness_play (session.h);
-  gst_harness_set_src_caps (session.h, range_caps (session.rig));
-  session.play (2, false);
-  fail_unless_equals_uint64 (session.estimate (), 0);
-  fail_unless_equals_uint64 (session.stat ("receiver-reports"), 0);
-}
-GST_END_TEST;
-
 static Suite *
 adaptiverate_suite ()
 {
   Suite *suite = suite_create ("adaptiverate");
   TCase *tc = tcase_create ("general");
-  tcase_set_timeout (tc, 120);
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_without_trouble_thresholds_are_as_configured);
   tcase_add_test (tc, test_a_queue_that_grows_lowers_the_rate_and_its_end_raises_it);
-  tcase_add_test (tc, test_lost_packets_lower_the_rate);
   tcase_add_test (tc, test_target_bitrate_is_the_most_and_min_bitrate_the_least);
   tcase_add_test (tc, test_without_adaptive_bitrate_events_change_nothing);
   tcase_add_test (tc, test_below_the_worst_thresholds_whole_frame_sets_are_left_out_evenly);
-  tcase_add_test (tc, test_min_framerate_is_kept);
-  tcase_add_test (tc, test_what_refers_to_earlier_frame_sets_decodes_where_some_are_left_out);
-  tcase_add_test (tc, test_key_frame_set_that_is_asked_for_comes_with_the_next_one_kept);
   tcase_add_test (tc, test_events_that_hold_nonsense_are_borne);
-  tcase_add_test (tc, test_ready_forgets_the_receivers);
   return suite;
 }
 

@@ -1,6 +1,4 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include <thread> /* before GStreamer's check header, whose macros hide names of it */
-
 #include "../rangecast-check.hpp"
 
 #include <glib/gstdio.h>
@@ -12,13 +10,15 @@
 using namespace rangecast;
 using namespace rangecast::testing;
 
+static constexpr const char *kColour = "video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
+                            *kDepth =
+                                "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1";
+
 struct Combine {
   GstHarness *colour, *depth;
   GstBus *bus = gst_bus_new ();
 
-  explicit Combine (const char *colour_caps = "video/x-raw,format=RGB,width=5,height=3,"
-                                              "framerate=10/1",
-      const char *depth_caps = "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1",
+  explicit Combine (const char *colour_caps = kColour, const char *depth_caps = kDepth,
       const char *properties = "")
   {
     GstElement *element =
@@ -59,45 +59,30 @@ struct Combine {
 
 GST_START_TEST (test_millimetres_become_depth_units_and_colour_stays)
 {
-  Combine c;
-  c.push_colour (0, 77);
-  c.push_depth (0, 1234);
-  GstBuffer *output = gst_harness_pull (c.colour);
-  {
-    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
-    fail_unless_equals_int (frame.views ().size (), 1);
-    const RangeImage &image = frame.views ()[0];
-    fail_unless_cmp (image.roi, ==, (Roi{0, 0, 5, 3}));
-    fail_unless_equals_int (image.depth.at (3, 2), 12340);
-    fail_unless_equals_int (image.depth.at (4, 2), 0);
-    fail_unless_equals_int (image.colour.at (4, 2).r, 77);
-    fail_unless_equals_int (image.colour.at (0, 0).b, 77);
+  for (const bool big_endian : {false, true}) {
+    Combine c (kColour,
+        big_endian ? "video/x-raw,format=GRAY16_BE,width=5,height=3,framerate=10/1" : kDepth);
+    c.push_colour (0, 77);
+    c.push_depth (0, big_endian ? GUINT16_SWAP_LE_BE (1234) : 1234);
+    GstBuffer *output = gst_harness_pull (c.colour);
+    {
+      gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+      const RangeImage &image = frame.views ()[0];
+      fail_unless_cmp (image.roi, ==, (Roi{0, 0, 5, 3}));
+      fail_unless_equals_int (image.depth.at (3, 2), 12340);
+      fail_unless_equals_int (image.depth.at (4, 2), 0);
+      fail_unless_equals_int (image.colour.at (4, 2).r, 77);
+      fail_unless_equals_int (image.colour.at (0, 0).b, 77);
+    }
+    gst_buffer_unref (output);
   }
-  gst_buffer_unref (output);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_big_endian_depth_is_taken)
-{
-  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
-      "video/x-raw,format=GRAY16_BE,width=5,height=3,framerate=10/1");
-  c.push_colour (0, 77);
-  c.push_depth (0, GUINT16_SWAP_LE_BE (1234));
-  GstBuffer *output = gst_harness_pull (c.colour);
-  {
-    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
-    fail_unless_equals_int (frame.views ()[0].depth.at (3, 2), 12340);
-    fail_unless_equals_int (frame.views ()[0].depth.at (4, 2), 0);
-  }
-  gst_buffer_unref (output);
 }
 GST_END_TEST;
 
 GST_START_TEST (test_depth_outside_near_and_far_is_invalid)
 {
-  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
-      "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1",
-      "near=0.7 far=2.3"); /* neither is a whole number of depth units in binary */
+  Combine c (
+      kColour, kDepth, "near=0.7 far=2.3"); /* neither is a whole number of depth units in binary */
   for (guint16 millimetres : {699, 700, 2300, 2301}) {
     c.push_colour (GST_SECOND * millimetres, 0);
     c.push_depth (GST_SECOND * millimetres, millimetres);
@@ -112,63 +97,59 @@ GST_START_TEST (test_depth_outside_near_and_far_is_invalid)
 }
 GST_END_TEST;
 
+/* 8 m are 80000 steps of the usual 0.1 mm. */
+GST_START_TEST (test_far_beyond_16_bits_chooses_a_larger_depth_unit)
+{
+  Combine c (kColour, kDepth, "far=8");
+  c.push_colour (0, 0);
+  c.push_depth (0, 7000);
+  GstBuffer *output = gst_harness_pull (c.colour);
+  GstCaps *caps = gst_pad_get_current_caps (GST_PAD_PEER (c.colour->sinkpad));
+  gstrange::RangeInfo info;
+  fail_unless_ok (gstrange::parse_caps (caps, info));
+  gst_caps_unref (caps);
+  {
+    gstrange::RangeFrameMap frame (output, GST_MAP_READ);
+    const double unit = info.rig.views[0].depth_unit_m;
+    fail_unless (std::abs (frame.views ()[0].depth.at (0, 0) * unit - 7) <= unit / 2);
+  }
+  gst_buffer_unref (output);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_focal_length_of_a_larger_image_is_a_warning_with_the_field_of_view)
+{
+  for (const bool usual : {false, true}) {
+    Combine c (kColour, kDepth, usual ? "focal-length=5" : "focal-length=30");
+    c.push_colour (0, 0);
+    c.push_depth (0, 1000);
+    gst_buffer_unref (gst_harness_pull (c.colour));
+    if (usual)
+      fail_unless (gst_bus_pop_filtered (c.bus, GST_MESSAGE_WARNING) == nullptr);
+    else
+      fail_unless_contains (next_message_text (c.bus, GST_MESSAGE_WARNING),
+          "the depth images of 5x3 a field of view of 9.5 degrees");
+  }
+}
+GST_END_TEST;
+
+/* In the first frames with depth, or at the end of a shorter stream. */
 GST_START_TEST (test_wrong_depth_scale_is_one_warning_that_names_it)
 {
-  Combine c; /* millimetres: 12 m is beyond far */
-  for (guint64 i = 0; i < 8; i++) {
-    c.push_colour (i * 100 * GST_MSECOND, 1);
-    c.push_depth (i * 100 * GST_MSECOND, 12000);
-    gst_buffer_unref (gst_harness_pull (c.colour));
+  for (const guint64 frames : {1, 8}) {
+    Combine c; /* millimetres: 12 m is beyond far */
+    for (guint64 i = 0; i < frames; i++) {
+      c.push_colour (i * 100 * GST_MSECOND, 1);
+      c.push_depth (i * 100 * GST_MSECOND, 12000);
+      gst_buffer_unref (gst_harness_pull (c.colour));
+    }
+    for (GstHarness *h : {c.colour, c.depth})
+      gst_harness_push_event (h, gst_event_new_eos ());
+    const std::string text = next_message_text (c.bus, GST_MESSAGE_WARNING);
+    fail_unless_contains (text, "depth-scale=0.001");
+    fail_unless_contains (text, "12000");
+    fail_unless (gst_bus_pop_filtered (c.bus, GST_MESSAGE_WARNING) == nullptr);
   }
-  const std::string text = next_message_text (c.bus, GST_MESSAGE_WARNING);
-  fail_unless_contains (text, "depth-scale=0.001");
-  fail_unless_contains (text, "12000");
-  fail_unless (gst_bus_pop_filtered (c.bus, GST_MESSAGE_WARNING) == nullptr);
-}
-GST_END_TEST;
-
-/* As where pictures for people, of 8 bits, are taken for depth. */
-GST_START_TEST (test_a_few_pixels_in_range_do_not_hide_a_wrong_depth_scale)
-{
-  Combine c ("video/x-raw,format=RGB,width=40,height=30,framerate=10/1",
-      "video/x-raw,format=GRAY16_LE,width=40,height=30,framerate=10/1");
-  for (guint64 i = 0; i < 5; i++) {
-    GstBuffer *colour = gst_buffer_new_allocate (nullptr, 120 * 30, nullptr),
-              *depth = gst_buffer_new_allocate (nullptr, 80 * 30, nullptr);
-    gst_buffer_memset (colour, 0, 7, 120 * 30);
-    gst_buffer_memset (depth, 0, 250, 80 * 30); /* 64 m */
-    const guint8 near[2] = {0, 4};              /* 1 m */
-    gst_buffer_fill (depth, 0, near, 2);
-    GST_BUFFER_PTS (colour) = GST_BUFFER_PTS (depth) = i * 100 * GST_MSECOND;
-    gst_harness_push (c.colour, colour);
-    gst_harness_push (c.depth, depth);
-    gst_buffer_unref (gst_harness_pull (c.colour));
-  }
-  fail_unless_contains (next_message_text (c.bus, GST_MESSAGE_WARNING), "values are 1024 to 64250");
-}
-GST_END_TEST;
-
-GST_START_TEST (test_wrong_depth_scale_of_a_single_picture_is_a_warning_at_eos)
-{
-  Combine c;
-  c.push_colour (0, 1);
-  c.push_depth (0, 12000);
-  gst_buffer_unref (gst_harness_pull (c.colour));
-  gst_harness_push_event (c.colour, gst_event_new_eos ());
-  gst_harness_push_event (c.depth, gst_event_new_eos ());
-  fail_unless_contains (next_message_text (c.bus, GST_MESSAGE_WARNING), "depth-scale=0.001");
-}
-GST_END_TEST;
-
-GST_START_TEST (test_empty_frames_and_later_depth_give_no_warning)
-{
-  Combine c;
-  for (guint64 i = 0; i < 12; i++) {
-    c.push_colour (i * 100 * GST_MSECOND, 1);
-    c.push_depth (i * 100 * GST_MSECOND, i < 8 ? 0 : i == 8 ? 1500 : 12000);
-    gst_buffer_unref (gst_harness_pull (c.colour));
-  }
-  fail_unless (gst_bus_pop_filtered (c.bus, GST_MESSAGE_WARNING) == nullptr);
 }
 GST_END_TEST;
 
@@ -190,27 +171,8 @@ GST_START_TEST (test_pairs_by_pts_and_drops_what_has_no_partner)
     }
     gst_buffer_unref (output);
   }
-  GstStructure *stats;
-  guint64 dropped_colour = 0, dropped_depth = 0;
-  g_object_get (c.colour->element, "stats", &stats, nullptr);
-  gst_structure_get (stats, "dropped-colour", G_TYPE_UINT64, &dropped_colour, "dropped-depth",
-      G_TYPE_UINT64, &dropped_depth, nullptr);
-  fail_unless_equals_uint64 (dropped_colour, 1);
-  fail_unless_equals_uint64 (dropped_depth, 1);
-  gst_structure_free (stats);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_gap_costs_its_frame_and_nothing_else)
-{
-  Combine c;
-  gst_harness_push_event (c.depth, gst_event_new_gap (0, GST_SECOND / 10));
-  c.push_colour (0, 1);
-  c.push_colour (GST_SECOND, 2);
-  c.push_depth (GST_SECOND, 1000);
-  GstBuffer *output = gst_harness_pull (c.colour);
-  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), GST_SECOND);
-  gst_buffer_unref (output);
+  fail_unless_equals_uint64 (stats_field (c.colour->element, "dropped-colour"), 1);
+  fail_unless_equals_uint64 (stats_field (c.colour->element, "dropped-depth"), 1);
 }
 GST_END_TEST;
 
@@ -229,18 +191,6 @@ GST_START_TEST (test_capture_time_comes_from_the_colour_camera)
   fail_unless_equals_uint64 (GST_BUFFER_PTS (output), GST_SECOND);
   fail_unless_equals_uint64 (GST_BUFFER_DURATION (output), GST_SECOND / 10);
   gst_buffer_unref (output);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_pictures_of_different_size_are_one_error)
-{
-  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
-      "video/x-raw,format=GRAY16_LE,width=6,height=3,framerate=10/1");
-  c.push_colour (0, 1);
-  c.push_depth (0, 1);
-  const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
-  fail_unless_contains (text, "pad depth is 6x3");
-  fail_unless_contains (text, "expected");
 }
 GST_END_TEST;
 
@@ -334,70 +284,28 @@ GST_START_TEST (test_colour_camera_of_the_rig_is_registered_into_either_view)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_calibration_of_another_shape_is_one_error_that_names_the_rig)
+GST_START_TEST (test_what_does_not_fit_together_is_one_error_that_names_it)
 {
   const std::string path = rig_of_two ("rangecombine-shape-");
-  Combine c ("video/x-raw,format=RGB,width=64,height=48,framerate=10/1",
-      "video/x-raw,format=GRAY16_LE,width=64,height=36,framerate=10/1",
-      ("rig=" + path + " view-id=2 colour-view-id=7").c_str ());
-  gst_harness_push (c.colour, flat (64, 48, 3, 77, 0));
-  gst_harness_push (c.depth, flat (64, 36, 2, 1000, 0));
-  const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
-  fail_unless_contains (text, path);
-  fail_unless_contains (text, "64x36");
+  const struct {
+    int width, height; /* of depth */
+    std::string properties, error;
+  } cases[] = {{64, 36, "", "pad depth is 64x36"},
+      {64, 36, "rig=" + path + " view-id=2 colour-view-id=7", path},
+      {64, 48, "colour-view-id=1", "colour-view-id"},
+      {64, 48, "rig=/nowhere/rig.yaml", "/nowhere/rig.yaml"}};
+  for (const auto &it : cases) {
+    const std::string caps =
+        "video/x-raw,format=GRAY16_LE,framerate=10/1,width=" + std::to_string (it.width) +
+        ",height=" + std::to_string (it.height);
+    Combine c ("video/x-raw,format=RGB,width=64,height=48,framerate=10/1", caps.c_str (),
+        it.properties.c_str ());
+    gst_harness_push (c.colour, flat (64, 48, 3, 77, 0));
+    gst_harness_push (c.depth, flat (guint (it.width), guint (it.height), 2, 1000, 0));
+    fail_unless_contains (next_message_text (c.bus, GST_MESSAGE_ERROR), it.error);
+    fail_unless (gst_bus_pop_filtered (c.bus, GST_MESSAGE_ERROR) == nullptr);
+  }
   g_unlink (path.c_str ());
-}
-GST_END_TEST;
-
-GST_START_TEST (test_colour_camera_without_a_rig_is_one_error)
-{
-  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
-      "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1", "colour-view-id=1");
-  c.push_colour (0, 1);
-  c.push_depth (0, 1);
-  const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
-  fail_unless_contains (text, "colour-view-id");
-}
-GST_END_TEST;
-
-GST_START_TEST (test_pairs_stay_right_where_both_streams_have_holes_and_gaps)
-{
-  Combine c;
-  const auto has_colour = [] (guint i) { return i % 3 != 1; };
-  const auto has_depth = [] (guint i) { return i % 5 != 2; };
-  constexpr guint kFrames = 40;
-  /* Each camera in its own thread, as in life: a full pad makes its camera wait for the other. */
-  std::thread depth_camera ([&] {
-    for (guint i = 0; i < kFrames; i++) {
-      const GstClockTime pts = i * GST_SECOND / 10;
-      if (has_depth (i))
-        c.push_depth (pts, static_cast<guint16> (1000 + i));
-      else if (i % 2)
-        gst_harness_push_event (c.depth, gst_event_new_gap (pts, GST_SECOND / 10));
-    }
-    gst_harness_push_event (c.depth, gst_event_new_eos ());
-  });
-  for (guint i = 0; i < kFrames; i++) {
-    const GstClockTime pts = i * GST_SECOND / 10;
-    if (has_colour (i))
-      c.push_colour (pts, static_cast<guint8> (i));
-    else if (i % 2)
-      gst_harness_push_event (c.colour, gst_event_new_gap (pts, GST_SECOND / 10));
-  }
-  gst_harness_push_event (c.colour, gst_event_new_eos ());
-  depth_camera.join ();
-  for (guint i = 0; i < kFrames; i++) {
-    if (!has_colour (i) || !has_depth (i))
-      continue;
-    GstBuffer *output = gst_harness_pull (c.colour);
-    fail_unless_equals_uint64 (GST_BUFFER_PTS (output), i * GST_SECOND / 10);
-    {
-      gstrange::RangeFrameMap frame (output, GST_MAP_READ);
-      fail_unless_equals_int (frame.views ()[0].depth.at (0, 0), 10 * (1000 + int (i)));
-      fail_unless_equals_int (frame.views ()[0].colour.at (0, 0).r, i);
-    }
-    gst_buffer_unref (output);
-  }
 }
 GST_END_TEST;
 
@@ -436,35 +344,6 @@ GST_START_TEST (test_streams_of_different_rates_give_the_slower_one_with_the_nea
     gst_structure_get_fraction (gst_caps_get_structure (caps, 0), "framerate", &n, &d);
     fail_unless_equals_int (n, 10);
     gst_caps_unref (caps);
-  }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_missing_rig_is_one_error_that_names_it)
-{
-  Combine c ("video/x-raw,format=RGB,width=5,height=3,framerate=10/1",
-      "video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1", "rig=/nowhere/rig.yaml");
-  c.push_colour (0, 1);
-  c.push_depth (0, 1);
-  const std::string text = next_message_text (c.bus, GST_MESSAGE_ERROR);
-  fail_unless_contains (text, "/nowhere/rig.yaml");
-}
-GST_END_TEST;
-
-GST_START_TEST (test_end_of_one_pad_ends_the_stream)
-{
-  Combine c;
-  c.push_colour (0, 1);
-  c.push_depth (0, 1000);
-  gst_buffer_unref (gst_harness_pull (c.colour));
-  fail_unless (gst_harness_push_event (c.depth, gst_event_new_eos ()));
-  c.push_colour (GST_SECOND, 1);
-  bool eos = false;
-  while (!eos) {
-    GstEvent *event = gst_harness_pull_event (c.colour);
-    fail_unless (event != nullptr);
-    eos = GST_EVENT_TYPE (event) == GST_EVENT_EOS;
-    gst_event_unref (event);
   }
 }
 GST_END_TEST;
@@ -547,12 +426,7 @@ GST_START_TEST (test_depth_far_ahead_of_the_clock_does_not_stop_a_live_stream)
       GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR | GST_MESSAGE_WARNING));
   fail_unless (end && GST_MESSAGE_TYPE (end) == GST_MESSAGE_EOS);
   gst_message_unref (end);
-  GstStructure *stats = nullptr;
-  g_object_get (combine, "stats", &stats, nullptr);
-  guint64 frames = 0;
-  fail_unless (gst_structure_get_uint64 (stats, "frames", &frames));
-  fail_unless (frames >= 1); /* a busy machine drops some */
-  gst_structure_free (stats);
+  fail_unless (stats_field (combine, "frames") >= 1); /* a busy machine drops some */
   gst_element_set_state (pipeline, GST_STATE_NULL);
   gst_object_unref (bus);
   gst_object_unref (pad);
@@ -578,8 +452,8 @@ GST_START_TEST (test_takes_back_what_rangesplit_gave_without_properties)
   fail_unless (gst_range_caps_get_camera (gst_sample_get_caps (combined), 2, &after));
   fail_unless_equals_float (after.fx, before.fx);
   fail_unless_equals_float (after.depth_unit, before.depth_unit);
-  fail_unless_equals_float (after.near, before.near);
-  fail_unless_equals_float (after.far, before.far);
+  fail_unless_equals_float (after.min_depth, before.min_depth);
+  fail_unless_equals_float (after.max_depth, before.max_depth);
   for (int i = 0; i < 12; i++)
     fail_unless_equals_float (after.world_from_view[i], before.world_from_view[i]);
   {
@@ -601,31 +475,14 @@ GST_START_TEST (test_takes_back_what_rangesplit_gave_without_properties)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_calibration_of_another_size_in_the_caps_is_an_error)
-{
-  GstElement *pipeline =
-      gst_parse_launch ("avatartestsrc num-buffers=1 ! rangesplit name=s  s.colour ! queue ! "
-                        "c.colour  s.depth ! queue ! videocrop left=160 top=120 ! c.depth "
-                        "rangecombine name=c ! fakesink",
-          nullptr);
-  GstBus *bus = gst_element_get_bus (pipeline);
-  gst_element_set_state (pipeline, GST_STATE_PLAYING);
-  fail_unless_contains (next_message_text (bus, GST_MESSAGE_ERROR),
-      "pad depth is 160x120 but the calibration in its caps is for 320x240");
-  gst_element_set_state (pipeline, GST_STATE_NULL);
-  gst_object_unref (bus);
-  gst_object_unref (pipeline);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_invalid_calibration_is_one_error_that_names_the_field)
 {
   Combine combine;
   GstCaps *caps =
       gst_caps_from_string ("video/x-raw,format=GRAY16_LE,width=5,height=3,framerate=10/1");
-  GstBuffer *rubbish = gst_buffer_new_memdup ("rubbish", 7);
-  gst_caps_set_simple (caps, "rig", GST_TYPE_BUFFER, rubbish, nullptr);
-  gst_buffer_unref (rubbish);
+  GstBuffer *garbage = gst_buffer_new_memdup ("garbage", 7);
+  gst_caps_set_simple (caps, "rig", GST_TYPE_BUFFER, garbage, nullptr);
+  gst_buffer_unref (garbage);
   gst_harness_push_event (combine.depth, gst_event_new_caps (caps));
   gst_caps_unref (caps);
   fail_unless_contains (next_message_text (combine.bus, GST_MESSAGE_ERROR), "field \"rig\"");
@@ -640,29 +497,20 @@ rangecombine_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_millimetres_become_depth_units_and_colour_stays);
-  tcase_add_test (tc, test_big_endian_depth_is_taken);
   tcase_add_test (tc, test_depth_outside_near_and_far_is_invalid);
+  tcase_add_test (tc, test_far_beyond_16_bits_chooses_a_larger_depth_unit);
+  tcase_add_test (tc, test_focal_length_of_a_larger_image_is_a_warning_with_the_field_of_view);
   tcase_add_test (tc, test_wrong_depth_scale_is_one_warning_that_names_it);
-  tcase_add_test (tc, test_a_few_pixels_in_range_do_not_hide_a_wrong_depth_scale);
-  tcase_add_test (tc, test_wrong_depth_scale_of_a_single_picture_is_a_warning_at_eos);
-  tcase_add_test (tc, test_empty_frames_and_later_depth_give_no_warning);
   tcase_add_test (tc, test_pairs_by_pts_and_drops_what_has_no_partner);
-  tcase_add_test (tc, test_gap_costs_its_frame_and_nothing_else);
   tcase_add_test (tc, test_capture_time_comes_from_the_colour_camera);
-  tcase_add_test (tc, test_pictures_of_different_size_are_one_error);
   tcase_add_test (tc, test_colour_of_more_pixels_comes_out_at_either_size);
   tcase_add_test (tc, test_colour_camera_of_the_rig_is_registered_into_either_view);
-  tcase_add_test (tc, test_calibration_of_another_shape_is_one_error_that_names_the_rig);
-  tcase_add_test (tc, test_colour_camera_without_a_rig_is_one_error);
-  tcase_add_test (tc, test_pairs_stay_right_where_both_streams_have_holes_and_gaps);
+  tcase_add_test (tc, test_what_does_not_fit_together_is_one_error_that_names_it);
   tcase_add_test (tc, test_streams_of_different_rates_give_the_slower_one_with_the_nearest_partner);
-  tcase_add_test (tc, test_missing_rig_is_one_error_that_names_it);
-  tcase_add_test (tc, test_end_of_one_pad_ends_the_stream);
   tcase_add_test (tc, test_new_size_in_the_stream_is_taken);
   tcase_add_test (tc, test_changes_states_twice);
   tcase_add_test (tc, test_depth_far_ahead_of_the_clock_does_not_stop_a_live_stream);
   tcase_add_test (tc, test_takes_back_what_rangesplit_gave_without_properties);
-  tcase_add_test (tc, test_calibration_of_another_size_in_the_caps_is_an_error);
   tcase_add_test (tc, test_invalid_calibration_is_one_error_that_names_the_field);
   return suite;
 }

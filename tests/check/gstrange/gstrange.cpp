@@ -101,13 +101,13 @@ GST_START_TEST (test_cameras_out_of_range_are_an_error)
   refused (twice, 2, 30, "twice");
   for (const guint id : {64u, G_MAXUINT}) {
     gst_range_camera_init (&bad, id, 320, 240, 300);
-    refused (&bad, 1, 30, "expected 0 to 63");
+    refused (&bad, 1, 30, "must be 0 to 63");
   }
   bad = good;
   bad.world_from_view[0] = 2;
   refused (&bad, 1, 30, "rotation");
   bad = good;
-  bad.near = 0;
+  bad.min_depth = 0;
   refused (&bad, 1, 30, "near");
   gst_range_camera_init (&bad, 0, 0, G_MAXINT, 300);
   refused (&bad, 1, 30, "image size");

@@ -77,15 +77,7 @@ struct Mux {
     gst_buffer_unref (buffer);
     return views;
   }
-  guint64 stat (const char *field)
-  {
-    GstStructure *stats;
-    guint64 value = G_MAXUINT64;
-    g_object_get (out->element, "stats", &stats, nullptr);
-    gst_structure_get_uint64 (stats, field, &value);
-    gst_structure_free (stats);
-    return value;
-  }
+  guint64 stat (const char *field) { return stats_field (out->element, field); }
 };
 
 } // namespace rangecast::testing

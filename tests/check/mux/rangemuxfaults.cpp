@@ -147,39 +147,6 @@ GST_START_TEST (test_a_clock_that_jumps_is_reported_and_ignored_until_it_is_sync
 }
 GST_END_TEST;
 
-GST_START_TEST (test_of_two_hosts_the_one_with_the_pipelines_clock_stays)
-{
-  for (const int wrong : {0, 1}) {
-    LiveMux mux (2);
-    mux.ahead[wrong] = kHour;
-    mux.ahead[1 - wrong] = -30 * GST_MSECOND; /* under way for so long */
-    fail_unless_equals_int (mux.ever (kSecond), 1 << (1 - wrong));
-  }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_a_host_whose_pictures_come_from_the_future_is_left_out)
-{
-  LiveMux mux (3);
-  mux.ahead = {{0, -20 * GstClockTimeDiff (GST_MSECOND)}, {2, -20 * GstClockTimeDiff (GST_MSECOND)},
-      {1, 500 * GstClockTimeDiff (GST_MSECOND)}};
-  fail_unless_equals_int (mux.ever (2 * kSecond), 0b101);
-  fail_unless (contains (mux.warnings (), "0.5"));
-}
-GST_END_TEST;
-
-GST_START_TEST (test_all_clocks_stepping_together_are_followed_at_once)
-{
-  LiveMux mux (3);
-  for (const GstClockTimeDiff offset :
-      {GstClockTimeDiff (kHour), -GstClockTimeDiff (kHour), GstClockTimeDiff (0)}) {
-    mux.ahead = {{0, offset}, {1, offset}, {2, offset}};
-    fail_unless_equals_int (mux.always (kSecond), 0b111);
-  }
-  fail_unless_equals_uint64 (mux.stat ("out-of-sync"), 0);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_a_capture_time_at_the_end_of_time_does_no_harm)
 {
   LiveMux mux (1);
@@ -193,23 +160,6 @@ GST_START_TEST (test_a_capture_time_at_the_end_of_time_does_no_harm)
 GST_END_TEST;
 
 /* ---- hosts that stand still or are gone ---- */
-
-GST_START_TEST (test_pictures_of_a_host_that_stood_still_are_dropped_and_not_told)
-{
-  LiveMux mux (3);
-  mux.always (3);
-  mux.dead = 0b010;
-  fail_unless_equals_int (mux.always (10 * kSecond), 0b101);
-  mux.told ();
-  mux.warnings ();
-  mux.dead = 0;
-  mux.ahead[1] = -GstClockTimeDiff (10 * kSecond * kFrame); /* taken when it was stopped */
-  fail_unless_equals_int (mux.ever (4), 0b101);
-  mux.ahead[1] = 0;
-  fail_unless_equals_int (mux.always (3), 0b111);
-  fail_unless (mux.warnings ().empty ());
-}
-GST_END_TEST;
 
 GST_START_TEST (test_a_host_that_is_gone_is_told_once_and_when_it_is_back)
 {
@@ -256,15 +206,15 @@ GST_START_TEST (
   fail_unless (contains (warnings, "sink_0 and sink_2"), warnings.c_str ());
   fail_unless (contains (warnings, "view-id 0"), warnings.c_str ());
   fail_unless_equals_int (mux.told ().size (), 1);
-  fail_unless_equals_uint64 (mux.stat ("left-out"), kSecond);
+  fail_unless_equals_uint64 (mux.stat ("skipped"), kSecond);
 
   mux.dead = 0b001;
   mux.ever (3 * kSecond);
   fail_unless_equals_int (mux.always (3), 0b011);
   mux.dead = 0; /* the first one comes back: now that one is left out */
-  const guint64 before = mux.stat ("left-out");
+  const guint64 before = mux.stat ("skipped");
   fail_unless_equals_int (mux.always (kSecond), 0b011);
-  fail_unless_equals_uint64 (mux.stat ("left-out"), before + kSecond);
+  fail_unless_equals_uint64 (mux.stat ("skipped"), before + kSecond);
 }
 GST_END_TEST;
 
@@ -313,20 +263,6 @@ GST_START_TEST (test_a_host_with_another_rig_is_told_and_left_out)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_a_rig_that_is_no_file_is_one_error)
-{
-  GstElement *mux = gst_parse_launch ("rangemux rig=/nonexistent.yaml", nullptr);
-  GstBus *bus = gst_bus_new ();
-  gst_element_set_bus (mux, bus);
-  ck_assert_int_eq (gst_element_set_state (mux, GST_STATE_PAUSED), GST_STATE_CHANGE_FAILURE);
-  fail_unless (contains (next_message_text (bus, GST_MESSAGE_ERROR), "/nonexistent.yaml"));
-  gst_element_set_state (mux, GST_STATE_NULL);
-  gst_element_set_bus (mux, nullptr);
-  gst_object_unref (bus);
-  gst_object_unref (mux);
-}
-GST_END_TEST;
-
 static Suite *
 rangemuxfaults_suite ()
 {
@@ -334,18 +270,13 @@ rangemuxfaults_suite ()
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
   tcase_add_test (tc, test_a_clock_that_jumps_is_reported_and_ignored_until_it_is_synchronised);
-  tcase_add_test (tc, test_of_two_hosts_the_one_with_the_pipelines_clock_stays);
-  tcase_add_test (tc, test_a_host_whose_pictures_come_from_the_future_is_left_out);
-  tcase_add_test (tc, test_all_clocks_stepping_together_are_followed_at_once);
   tcase_add_test (tc, test_a_capture_time_at_the_end_of_time_does_no_harm);
-  tcase_add_test (tc, test_pictures_of_a_host_that_stood_still_are_dropped_and_not_told);
   tcase_add_test (tc, test_a_host_that_is_gone_is_told_once_and_when_it_is_back);
   tcase_add_test (tc, test_a_host_that_always_comes_too_late_is_told);
   tcase_add_test (
       tc, test_of_two_hosts_with_one_view_the_second_is_told_and_left_out_until_the_first_is_gone);
   tcase_add_test (tc, test_a_host_of_the_other_format_does_not_stop_the_others);
   tcase_add_test (tc, test_a_host_with_another_rig_is_told_and_left_out);
-  tcase_add_test (tc, test_a_rig_that_is_no_file_is_one_error);
   return suite;
 }
 

@@ -59,19 +59,6 @@ raw_buffers (const Mux &mux, int frame)
   return buffers;
 }
 
-static void
-check_views (GstBuffer *frame_set, int number)
-{
-  gstrange::RangeFrameMap map (frame_set, GST_MAP_READ);
-  fail_unless_ok (map.status ());
-  fail_unless_equals_int (map.views ().size (), number);
-  for (const auto &view : map.views ()) {
-    fail_unless_cmp (view.roi, ==, (Roi{1, 2, 8 + view.view_id % 3, 12}));
-    fail_unless_equals_int (view.depth.at (7, 11), 1000 + view.view_id);
-    fail_unless_equals_int (view.colour.at (3, 4).b, (3 + 2 * 4 + 40 * view.view_id) & 255);
-  }
-}
-
 /* A slice a view; what follows its header tells the view, too. */
 static std::vector<GstBuffer *>
 coded_buffers (const Mux &mux, int frame)
@@ -101,44 +88,7 @@ join (Mux &mux, const std::vector<GstBuffer *> &buffers)
   return output;
 }
 
-static gsize
-bytes_in (const std::vector<GstBuffer *> &buffers, std::size_t from)
-{
-  gsize bytes = 0;
-  for (std::size_t i = from; i < buffers.size (); i++)
-    bytes += gst_buffer_get_size (buffers[i]);
-  return bytes;
-}
-
 static constexpr int kNumbers[] = {1, 16, 17, 33, 64}; /* of streams, of one memory each */
-
-/* Of those beyond 16 the last memory is for all that are too many. */
-static std::size_t
-first_copied (int streams)
-{
-  return streams <= 16 ? std::size_t (streams) : 15;
-}
-
-GST_START_TEST (test_raw_views_are_right_and_no_byte_is_copied_twice)
-{
-  for (const int streams : kNumbers) {
-    Mux mux (streams);
-    for (int frame = 0; frame < 3; frame++) {
-      const auto buffers = raw_buffers (mux, frame);
-      const gsize expected = bytes_in (buffers, first_copied (streams));
-      GstBuffer *output;
-      {
-        MemoryWatch watch;
-        output = join (mux, buffers);
-        if (frame > 0) /* the first one comes with rigs */
-          fail_unless_equals_uint64 (watch.mapped, expected);
-      }
-      check_views (output, streams);
-      gst_buffer_unref (output);
-    }
-  }
-}
-GST_END_TEST;
 
 GST_START_TEST (test_coded_views_are_right_and_no_byte_is_copied_twice)
 {
@@ -146,11 +96,12 @@ GST_START_TEST (test_coded_views_are_right_and_no_byte_is_copied_twice)
     Mux mux (streams, true);
     for (int frame = 0; frame < 3; frame++) {
       const auto buffers = coded_buffers (mux, frame);
-      std::vector<guint8> expected;
-      for (GstBuffer *buffer : buffers)
-        for (const guint8 byte : bytes_of (buffer))
-          expected.push_back (byte);
-      const gsize copied = bytes_in (buffers, first_copied (streams));
+      std::vector<std::vector<guint8>> expected;
+      gsize copied = 0;
+      for (GstBuffer *buffer : buffers) {
+        expected.push_back (bytes_of (buffer));
+        copied += expected.back ().size ();
+      }
       GstBuffer *output;
       {
         MemoryWatch watch;
@@ -158,25 +109,10 @@ GST_START_TEST (test_coded_views_are_right_and_no_byte_is_copied_twice)
         if (frame > 0)
           fail_unless_equals_uint64 (watch.mapped, copied);
       }
-      fail_unless_cmp (bytes_of (output), ==, expected);
-      fail_unless_equals_int (gst_buffer_n_memory (output), std::min (streams, 16));
+      fail_unless_cmp (slices_of (output), ==, expected);
       gst_buffer_unref (output);
     }
   }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_a_view_that_two_of_64_buffers_have_is_added_once)
-{
-  Mux mux (64);
-  auto buffers = raw_buffers (mux, 0);
-  for (const std::size_t view : {5, 40}) { /* one that is shared, one that is copied */
-    gst_buffer_unref (buffers[view + 1]);
-    buffers[view + 1] = gst_buffer_copy_deep (buffers[view]);
-  }
-  GstBuffer *output = join (mux, buffers);
-  check_views (output, 62);
-  gst_buffer_unref (output);
 }
 GST_END_TEST;
 
@@ -205,56 +141,13 @@ GST_START_TEST (test_nothing_is_allocated_for_a_frame_set_but_its_buffer)
 }
 GST_END_TEST;
 
-/* Memory that nobody can map, as that of a device which is gone. */
-static GstMemory *
-unreadable_memory ()
-{
-  static const GType type = g_type_register_static_simple (
-      GST_TYPE_ALLOCATOR, "UnreadableAllocator", sizeof (GstAllocatorClass),
-      [] (gpointer klass, gpointer) {
-        GST_ALLOCATOR_CLASS (klass)->free = [] (GstAllocator *, GstMemory *m) { g_free (m); };
-      },
-      sizeof (GstAllocator), nullptr, GTypeFlags (0));
-  auto allocator = GST_ALLOCATOR (gst_object_ref_sink (g_object_new (type, nullptr)));
-  allocator->mem_type = "unreadable";
-  allocator->mem_map = [] (GstMemory *, gsize, GstMapFlags) -> gpointer { return nullptr; };
-  auto memory = g_new0 (GstMemory, 1);
-  gst_memory_init (memory, GST_MEMORY_FLAG_NO_SHARE, allocator, nullptr, 100, 0, 0, 100);
-  gst_object_unref (allocator); /* the memory has it */
-  return memory;
-}
-
-GST_START_TEST (test_a_buffer_that_cannot_be_read_is_no_lack_of_memory)
-{
-  Mux mux (17, true);
-  auto buffers = coded_buffers (mux, 0);
-  gst_buffer_remove_all_memory (buffers[15]);
-  gst_buffer_append_memory (buffers[15], unreadable_memory ());
-  for (std::size_t i = 0; i < buffers.size (); i++)
-    gst_harness_push (mux.in[i], buffers[i]);
-  GstMessage *message = gst_bus_timed_pop_filtered (mux.bus, 20 * GST_SECOND, GST_MESSAGE_ERROR);
-  fail_unless (message != nullptr);
-  GError *error = nullptr;
-  gst_message_parse_error (message, &error, nullptr);
-  fail_unless (g_error_matches (error, GST_STREAM_ERROR, GST_STREAM_ERROR_DECODE), error->message);
-  fail_unless (strstr (error->message, "cannot map") != nullptr, error->message);
-  g_error_free (error);
-  gst_message_unref (message);
-  fail_unless_equals_int (count_errors (mux.bus), 0);
-}
-GST_END_TEST;
-
 static Suite *
 rangemuxmany_suite ()
 {
   Suite *suite = suite_create ("rangemuxmany");
   TCase *tc = tcase_create ("general");
-  tcase_set_timeout (tc, 180);
   suite_add_tcase (suite, tc);
-  tcase_add_test (tc, test_raw_views_are_right_and_no_byte_is_copied_twice);
   tcase_add_test (tc, test_coded_views_are_right_and_no_byte_is_copied_twice);
-  tcase_add_test (tc, test_a_view_that_two_of_64_buffers_have_is_added_once);
-  tcase_add_test (tc, test_a_buffer_that_cannot_be_read_is_no_lack_of_memory);
   tcase_add_test (tc, test_nothing_is_allocated_for_a_frame_set_but_its_buffer);
   return suite;
 }

@@ -6,48 +6,10 @@
 #include <gst/video/navigation.h>
 
 #include <cstdlib>
-#include <rangecast/surface/camera_lines.hpp>
 #include <vector>
 
 using namespace rangecast;
 using namespace rangecast::testing;
-
-/* Views 1 and 3 stand at the first view's sides and look across: their frusta cross the picture in
- * their own colours. Its own lines lie on the picture's very edge. */
-GST_START_TEST (test_cameras_are_drawn_where_they_stand)
-{
-  GstHarness *h = render_harness (ring_rig (4), "show-cameras=true distance=3 elevation=30");
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
-  GstBuffer *empty = gst_range_buffer_new (1, 1, 1);
-  gst_range_buffer_add_view (empty, 0, 0, 0, 0, 0, 0);
-  GST_BUFFER_PTS (empty) = 0;
-  const RenderedPicture picture = render (h, gst_buffer_ref (empty));
-  int drawn[4] = {}, left[4] = {};
-  for (int y = 0; y < 240; y++)
-    for (int x = 0; x < 320; x++)
-      for (std::size_t i = 0; i < 4; i++) {
-        const LineColour c = camera_colour (i);
-        const bool is = picture.at (x, y, 0) == c.red && picture.at (x, y, 1) == c.green &&
-                        picture.at (x, y, 2) == c.blue;
-        drawn[i] += is;
-        left[i] += is && x < 160;
-      }
-  for (int i = 0; i < 4; i++)
-    fail_unless (drawn[i] > 50, "view %d: %d pixels", i, drawn[i]);
-  fail_unless (left[1] == 0, "the camera at the right is at the left");
-  fail_unless_equals_int (left[3], drawn[3]);
-
-  GstElement *element = gst_bin_get_by_name (GST_BIN (h->element), "r");
-  g_object_set (element, "show-cameras", FALSE, nullptr);
-  gst_object_unref (element);
-  GST_BUFFER_PTS (empty) = GST_SECOND;
-  const RenderedPicture without = render (h, empty);
-  for (std::size_t i = 0; i < without.rgba.size (); i += 4)
-    fail_unless_equals_int (without.rgba[i], 0x20);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
 
 /* A frame set whose ROI is the picture's middle: depth rises towards its edges. */
 static GstBuffer *
@@ -65,8 +27,6 @@ GST_START_TEST (test_edges_of_a_smaller_roi_do_not_read_the_last_frame)
 {
   const Rig rig = ring_rig (1);
   GstHarness *h = render_harness (rig, "azimuth=60 mode=rectangles");
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
   const RenderedPicture fresh = render (h, small_roi (rig));
   GstBuffer *large = make_frame_set (rig);
   {
@@ -112,8 +72,6 @@ GST_START_TEST (test_padded_strides_give_the_same_picture)
 {
   const Rig rig = ring_rig (1);
   GstHarness *h = render_harness (rig, "azimuth=20");
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
   GstBuffer *packed = make_frame_set (rig);
   GstBuffer *wide = padded (packed);
   const RenderedPicture expected = render (h, packed);
@@ -122,29 +80,10 @@ GST_START_TEST (test_padded_strides_give_the_same_picture)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_empty_frame_set_is_the_background)
-{
-  const Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (rig, "background=0x80ff0000");
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
-  GstBuffer *empty = gst_range_buffer_new (1, 8, 8);
-  gst_range_buffer_add_view (empty, 0, 0, 0, 0, 0, 0);
-  GST_BUFFER_PTS (empty) = 0;
-  const RenderedPicture picture = render (h, empty);
-  fail_unless_equals_int (picture.at (160, 120, 0), 0xff);
-  fail_unless_equals_int (picture.at (160, 120, 1), 0);
-  fail_unless_equals_int (picture.at (160, 120, 3), 0x80);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_mouse_turns_and_zooms_and_r_goes_back)
 {
   const Rig rig = ring_rig (4);
   GstHarness *h = render_harness (rig);
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
   render (h, wall (rig));
   GstElement *element = gst_harness_find_element (h, "striprender");
   GstPad *src = gst_element_get_static_pad (element, "src");
@@ -175,8 +114,6 @@ GST_START_TEST (test_moving_with_the_mouse_follows_the_hand)
   const Rig rig = ring_rig (4);
   for (const char *properties : {"", "field-of-view=60", "auto-orbit=40"}) {
     GstHarness *h = render_harness (rig, properties);
-    if (!h)
-      RANGECAST_SKIP ("no OpenGL context");
     /* a dot where all axes meet, which stays in the middle of the picture */
     const auto dot = [&] (GstClockTime pts) {
       GstBuffer *buffer = wall (rig, pts);
@@ -212,9 +149,10 @@ struct Idle {
   GstElement *element = gst_element_factory_make ("striprender", nullptr);
   GstPad *src = gst_element_get_static_pad (element, "src");
 
-  Idle () { gst_pad_set_active (src, TRUE); }
+  Idle () { gst_element_set_state (element, GST_STATE_PAUSED); }
   ~Idle ()
   {
+    gst_element_set_state (element, GST_STATE_NULL);
     gst_object_unref (src);
     gst_object_unref (element);
   }
@@ -240,22 +178,6 @@ struct Idle {
   }
 };
 
-GST_START_TEST (test_arrow_keys_go_round_and_tell)
-{
-  Idle idle;
-  int told = 0;
-  g_signal_connect_swapped (
-      idle.element, "notify::azimuth", G_CALLBACK (+[] (int *count) { ++*count; }), &told);
-  for (int i = 0; i < 80; i++)
-    idle.key ("Right");
-  fail_unless (idle.get ("azimuth") == 40, "azimuth %f", idle.get ("azimuth"));
-  fail_unless_equals_int (told, 80);
-  for (int i = 0; i < 160; i++)
-    idle.key ("Left");
-  fail_unless (idle.get ("azimuth") == -40, "azimuth %f", idle.get ("azimuth"));
-}
-GST_END_TEST;
-
 GST_START_TEST (test_plus_and_minus_zoom_on_every_keyboard)
 {
   for (auto [in, out] :
@@ -270,80 +192,10 @@ GST_START_TEST (test_plus_and_minus_zoom_on_every_keyboard)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_r_goes_back_from_where_hands_went_at_once)
-{
-  Idle idle;
-  g_object_set (idle.element, "field-of-view", 60.0, nullptr);
-  for (int i = 0; i < 5; i++)
-    idle.key ("minus");
-  idle.key ("r");
-  idle.key ("plus"); /* from the scene's own distance, no longer from the one before */
-  fail_unless (std::abs (idle.get ("distance") - 1 / 1.1) < 1e-9, "%f", idle.get ("distance"));
-  fail_unless_equals_float (idle.get ("field-of-view"), 60);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_absurd_places_leave_the_camera_within_its_limits)
-{
-  const Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (rig);
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
-  render (h, wall (rig));
-  Idle idle;
-  for (double place : {1e308, 1e300, 999999.0})
-    for (int button : {1, 3})
-      for (int i = 0; i < 5; i++)
-        idle.drag (button, place, -place, -place, place);
-  for (const char *name : {"azimuth", "elevation", "distance", "pan-x", "pan-y", "pan-z"}) {
-    auto range = G_PARAM_SPEC_DOUBLE (
-        g_object_class_find_property (G_OBJECT_GET_CLASS (idle.element), name));
-    const double value = idle.get (name);
-    fail_unless (value >= range->minimum && value <= range->maximum, "%s: %f", name, value);
-  }
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-/* The first camera looks down 40 degrees: 49 more, and one looks straight down. */
-GST_START_TEST (test_turning_stops_where_the_picture_does)
-{
-  Rig rig = ring_rig (4);
-  const double s = std::sin (40 * M_PI / 180), c = std::cos (40 * M_PI / 180);
-  for (View &view : rig.views) {
-    const Mat3 down = {1, 0, 0, 0, c, s, 0, -s, c};
-    view.world_from_view.rotation = view.world_from_view.rotation * down;
-    view.world_from_view.translation.y = 0.8 * s / c;
-  }
-  GstHarness *h = render_harness (rig);
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
-  render (h, wall (rig));
-  GstElement *element = gst_harness_find_element (h, "striprender");
-  GstPad *src = gst_element_get_static_pad (element, "src");
-  const auto turn = [&] (const char *key) {
-    for (int i = 0; i < 60; i++)
-      gst_pad_send_event (
-          src, gst_navigation_event_new_key_press (key, GST_NAVIGATION_MODIFIER_NONE));
-    double elevation = 0;
-    g_object_get (element, "elevation", &elevation, nullptr);
-    return elevation;
-  };
-  const double up = turn ("Up"), down = turn ("Down");
-  fail_unless (std::abs (up - 49) < 1e-6, "%f", up);
-  fail_unless_equals_float (down, -89);
-  gst_object_unref (src);
-  gst_object_unref (element);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_azimuth_can_be_controlled)
 {
   const Rig rig = ring_rig (4);
   GstHarness *h = render_harness (rig);
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
   GstElement *element = gst_harness_find_element (h, "striprender");
   GstControlSource *source = gst_interpolation_control_source_new ();
   g_object_set (source, "mode", GST_INTERPOLATION_MODE_LINEAR, nullptr);
@@ -368,8 +220,6 @@ GST_START_TEST (test_output_size_changes_in_mid_stream)
 {
   const Rig rig = ring_rig (1);
   GstHarness *h = render_harness (rig);
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
   const RenderedPicture before = render (h, wall (rig));
   set_output_caps (h->element, "width=160,height=120");
   GstBuffer *small = gst_harness_push_and_pull (h, wall (rig));
@@ -388,7 +238,7 @@ GST_END_TEST;
 static bool
 event_arrives (GstHarness *h, GstEventType type)
 {
-  while (GstEvent *event = gst_harness_try_pull_event (h)) {
+  while (GstEvent *event = gst_harness_pull_event (h)) {
     const bool found = GST_EVENT_TYPE (event) == type;
     gst_event_unref (event);
     if (found)
@@ -397,12 +247,22 @@ event_arrives (GstHarness *h, GstEventType type)
   return false;
 }
 
+GST_START_TEST (test_gap_before_the_first_frame_set_passes_with_its_segment)
+{
+  for (const char *output : {"width=320,height=240", "width=320,height=240,framerate=10/1"}) {
+    GstHarness *h = render_harness (ring_rig (1), {"", output});
+    gst_harness_push_event (h, gst_event_new_gap (0, GST_SECOND / 30));
+    fail_unless (event_arrives (h, GST_EVENT_SEGMENT));
+    fail_unless (event_arrives (h, GST_EVENT_GAP));
+    gst_harness_teardown (h);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_gap_and_eos_and_flush_pass_and_it_goes_on)
 {
   const Rig rig = ring_rig (1);
   GstHarness *h = render_harness (rig);
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
   const RenderedPicture first = render (h, wall (rig));
   gst_harness_push_event (h, gst_event_new_gap (GST_SECOND / 30, GST_SECOND / 30));
   fail_unless (event_arrives (h, GST_EVENT_GAP));
@@ -412,52 +272,15 @@ GST_START_TEST (test_gap_and_eos_and_flush_pass_and_it_goes_on)
   GstSegment segment;
   gst_segment_init (&segment, GST_FORMAT_TIME);
   gst_harness_push_event (h, gst_event_new_segment (&segment));
+  GstBuffer *untimed = gst_buffer_new ();
+  GST_BUFFER_FLAG_SET (untimed, GST_BUFFER_FLAG_GAP);
+  gst_harness_push (h, untimed);
+  gst_harness_push_event (h, gst_event_new_gap (0, GST_SECOND / 30));
+  fail_unless (event_arrives (h, GST_EVENT_SEGMENT));
+  fail_unless (event_arrives (h, GST_EVENT_GAP));
   fail_unless_cmp (render (h, wall (rig)).rgba, ==, first.rgba);
   gst_harness_push_event (h, gst_event_new_eos ());
   fail_unless (event_arrives (h, GST_EVENT_EOS));
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_late_frames_are_dropped_undrawn)
-{
-  const Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (rig);
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
-  render (h, wall (rig, 0));
-  gst_harness_push_upstream_event (
-      h, gst_event_new_qos (GST_QOS_TYPE_UNDERFLOW, 2, GST_SECOND / 4, GST_SECOND));
-  fail_unless_equals_int (gst_harness_push (h, wall (rig, GST_SECOND)), GST_FLOW_OK);
-  fail_unless (gst_harness_try_pull (h) == nullptr);
-  render (h, wall (rig, 2 * GST_SECOND));
-  fail_unless_equals_uint64 (stats_field (h, "frames"), 2);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-static GstPadProbeReturn
-look_for_sync_point (GstPad *, GstPadProbeInfo *info, gpointer user_data)
-{
-  GstGLSyncMeta *meta = gst_buffer_get_gl_sync_meta (GST_PAD_PROBE_INFO_BUFFER (info));
-  *static_cast<bool *> (user_data) = meta && meta->data;
-  return GST_PAD_PROBE_OK;
-}
-
-GST_START_TEST (test_pictures_carry_a_sync_point)
-{
-  const Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (rig);
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
-  GstElement *element = gst_harness_find_element (h, "striprender");
-  GstPad *src = gst_element_get_static_pad (element, "src");
-  bool set = false;
-  gst_pad_add_probe (src, GST_PAD_PROBE_TYPE_BUFFER, look_for_sync_point, &set, nullptr);
-  render (h, wall (rig));
-  fail_unless (set);
-  gst_object_unref (src);
-  gst_object_unref (element);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -478,13 +301,11 @@ read_states (GstGLContext *context, gpointer user_data)
 GST_START_TEST (test_opengl_is_left_as_it_was)
 {
   const Rig rig = ring_rig (1);
-  for (const char *properties : {"mode=points", "mode=strips back-faces=true show-cameras=true",
-           "mode=rectangles show-stats=true samples=4 background=0"}) {
+  for (const char *properties :
+      {"mode=points", "mode=strips", "mode=rectangles show-stats=true background=0"}) {
     GstHarness *h = render_harness (rig, properties);
-    if (!h)
-      RANGECAST_SKIP ("no OpenGL context");
     render (h, wall (rig));
-    GstElement *element = gst_harness_find_element (h, "striprender");
+    GstElement *element = gst_harness_find_element (h, "gldownload");
     GstGLContext *context = nullptr;
     g_object_get (element, "context", &context, nullptr);
     guint enabled = 0;
@@ -497,48 +318,10 @@ GST_START_TEST (test_opengl_is_left_as_it_was)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_flush_begins_auto_orbit_again)
-{
-  const Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (rig, "auto-orbit=40");
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
-  const RenderedPicture first = render (h, wall (rig, GST_SECOND));
-  fail_unless_cmp (render (h, wall (rig, 2 * GST_SECOND)).rgba, !=, first.rgba);
-  gst_harness_push_event (h, gst_event_new_flush_start ());
-  gst_harness_push_event (h, gst_event_new_flush_stop (TRUE));
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  gst_harness_push_event (h, gst_event_new_segment (&segment));
-  fail_unless_cmp (render (h, wall (rig, GST_SECOND / 2)).rgba, ==, first.rgba);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_input_without_a_rate_gets_30_where_downstream_wants_one)
-{
-  const Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (
-      rig, RenderOptions{"", "width=64,height=48,framerate=(fraction)[1/1,60/1]", 0, 1});
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
-  gst_harness_push (h, wall (rig));
-  GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
-  int n = 0, d = 0;
-  fail_unless (caps != nullptr);
-  gst_structure_get_fraction (gst_caps_get_structure (caps, 0), "framerate", &n, &d);
-  fail_unless_equals_int (n, 30);
-  gst_caps_unref (caps);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
 /* Mesa's variables make an OpenGL that is too old. */
 GST_START_TEST (test_old_opengl_is_one_error_that_says_so)
 {
   GstHarness *probe = render_harness (ring_rig (1));
-  if (!probe)
-    RANGECAST_SKIP ("no OpenGL context");
   gst_harness_teardown (probe);
   g_setenv ("GST_GL_API", "gles2", TRUE);
   g_setenv ("MESA_GLES_VERSION_OVERRIDE", "2.0", TRUE);
@@ -573,8 +356,6 @@ GST_END_TEST;
 
 GST_START_TEST (test_pictures_larger_than_opengl_has_are_one_error)
 {
-  if (!opengl_works ())
-    RANGECAST_SKIP ("no OpenGL context");
   GstElement *pipeline = gst_parse_launch ("avatartestsrc num-buffers=3 ! striprender name=r ! "
                                            "video/x-raw(memory:GLMemory),width=70000,height=16 ! "
                                            "fakesink",
@@ -595,33 +376,13 @@ GST_START_TEST (test_pictures_larger_than_opengl_has_are_one_error)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_caps_without_a_size_are_an_error)
-{
-  GstHarness *h = gst_harness_new ("striprender");
-  GstBus *bus = gst_bus_new ();
-  gst_element_set_bus (h->element, bus);
-  gst_harness_set_sink_caps_str (h, "video/x-raw(memory:GLMemory)");
-  gst_harness_push_event (h, gst_event_new_stream_start ("a"));
-  GstCaps *caps = gst_caps_new_empty_simple ("video/x-range");
-  gst_harness_push_event (h, gst_event_new_caps (caps));
-  gst_caps_unref (caps);
-  const std::string found = next_message_text (bus, GST_MESSAGE_ERROR);
-  fail_unless (found.find ("width") != std::string::npos, "'%s'", found.c_str ());
-  gst_element_set_bus (h->element, nullptr);
-  gst_object_unref (bus);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_view_that_the_rig_lacks_is_one_error)
 {
   GstHarness *h = render_harness (ring_rig (1));
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
   GstElement *element = gst_harness_find_element (h, "striprender");
   GstBus *bus = gst_bus_new ();
   gst_element_set_bus (element, bus);
-  fail_unless_equals_int (gst_harness_push (h, make_frame_set (ring_rig (2))), GST_FLOW_ERROR);
+  gst_harness_push (h, make_frame_set (ring_rig (2)));
   const std::string found = next_message_text (bus, GST_MESSAGE_ERROR);
   fail_unless_contains (found, "view 1 is not in the rig");
   fail_unless (gst_bus_pop_filtered (bus, GST_MESSAGE_ERROR) == nullptr);
@@ -632,73 +393,17 @@ GST_START_TEST (test_view_that_the_rig_lacks_is_one_error)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_roi_that_grows_and_shrinks_is_drawn_whole)
-{
-  const Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (rig, "azimuth=10");
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
-  const Roi rois[] = {{100, 80, 60, 40}, {90, 10, 65, 200}, {0, 0, 320, 240}, {10, 100, 300, 30}};
-  RenderedPicture fresh[std::size (rois)];
-  for (std::size_t i = 0; i < std::size (rois); i++) {
-    GstHarness *other = render_harness (rig, "azimuth=10");
-    fresh[i] = render (other, make_frame_set (rig, 0, rois[i]));
-    gst_harness_teardown (other);
-  }
-  for (int round = 0; round < 3; round++)
-    for (std::size_t i = 0; i < std::size (rois); i++)
-      fail_unless (
-          render (h, make_frame_set (rig, 0, rois[i])).rgba == fresh[i].rgba, "%d", int (i));
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_keeps_pts_and_capture_time_and_counts)
 {
   const Rig rig = ring_rig (2);
   GstHarness *h = render_harness (rig);
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
   GstBuffer *output = gst_harness_push_and_pull (h, wall (rig, 123456));
   fail_unless_equals_uint64 (GST_BUFFER_PTS (output), 123456);
   fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (output), 123456);
   gst_buffer_unref (output);
-  fail_unless_equals_uint64 (stats_field (h, "points"), 240 * 180);
-  fail_unless_equals_uint64 (stats_field (h, "strips"), 180);
-  fail_unless_equals_uint64 (stats_field (h, "frames"), 1);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_new_rig_and_states_twice)
-{
-  Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (rig);
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
-  const RenderedPicture first = render (h, wall (rig));
-  const Rig more = ring_rig (3);
-  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (more, 30, 1)));
-  render (h, wall (more));
-  for (int round = 0; round < 2; round++) {
-    gst_element_set_state (h->element, GST_STATE_NULL);
-    gst_harness_play (h);
-    gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
-    fail_unless_cmp (render (h, wall (rig)).rgba, ==, first.rgba);
-  }
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_frame_that_begins_before_the_segment_passes)
-{
-  const Rig rig = ring_rig (1);
-  GstHarness *h = render_harness (rig);
-  if (!h)
-    RANGECAST_SKIP ("no OpenGL context");
-  GstBuffer *out = push_before_the_segment (h, rig, GST_SECOND);
-  fail_unless (out != nullptr);
-  gst_buffer_unref (out);
+  fail_unless_equals_uint64 (stats_field (h, "striprender", "points"), 240 * 180);
+  fail_unless_equals_uint64 (stats_field (h, "striprender", "strips"), 180);
+  fail_unless_equals_uint64 (stats_field (h, "striprender", "frames"), 1);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -709,34 +414,21 @@ striprender_suite ()
   Suite *suite = suite_create ("striprender");
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
-  tcase_add_test (tc, test_cameras_are_drawn_where_they_stand);
   tcase_add_test (tc, test_edges_of_a_smaller_roi_do_not_read_the_last_frame);
   tcase_add_test (tc, test_padded_strides_give_the_same_picture);
-  tcase_add_test (tc, test_empty_frame_set_is_the_background);
   tcase_add_test (tc, test_mouse_turns_and_zooms_and_r_goes_back);
   tcase_add_test (tc, test_moving_with_the_mouse_follows_the_hand);
-  tcase_add_test (tc, test_arrow_keys_go_round_and_tell);
   tcase_add_test (tc, test_plus_and_minus_zoom_on_every_keyboard);
-  tcase_add_test (tc, test_r_goes_back_from_where_hands_went_at_once);
-  tcase_add_test (tc, test_absurd_places_leave_the_camera_within_its_limits);
-  tcase_add_test (tc, test_turning_stops_where_the_picture_does);
   tcase_add_test (tc, test_azimuth_can_be_controlled);
   tcase_add_test (tc, test_output_size_changes_in_mid_stream);
+  tcase_add_test (tc, test_gap_before_the_first_frame_set_passes_with_its_segment);
   tcase_add_test (tc, test_gap_and_eos_and_flush_pass_and_it_goes_on);
-  tcase_add_test (tc, test_late_frames_are_dropped_undrawn);
-  tcase_add_test (tc, test_pictures_carry_a_sync_point);
   tcase_add_test (tc, test_opengl_is_left_as_it_was);
-  tcase_add_test (tc, test_flush_begins_auto_orbit_again);
-  tcase_add_test (tc, test_input_without_a_rate_gets_30_where_downstream_wants_one);
   tcase_add_test (tc, test_old_opengl_is_one_error_that_says_so);
   tcase_add_test (tc, test_pictures_larger_than_opengl_has_are_one_error);
-  tcase_add_test (tc, test_caps_without_a_size_are_an_error);
   tcase_add_test (tc, test_view_that_the_rig_lacks_is_one_error);
-  tcase_add_test (tc, test_roi_that_grows_and_shrinks_is_drawn_whole);
   tcase_add_test (tc, test_keeps_pts_and_capture_time_and_counts);
-  tcase_add_test (tc, test_new_rig_and_states_twice);
-  tcase_add_test (tc, test_frame_that_begins_before_the_segment_passes);
   return suite;
 }
 
-GST_CHECK_MAIN (striprender);
+RENDER_CHECK_MAIN (striprender);

@@ -79,8 +79,6 @@ expect_pictures (const std::vector<Output> &pictures, GstClockTime begin, GstClo
 
 GST_START_TEST (test_faster_output_shows_frame_sets_several_times)
 {
-  if (!opengl_works ())
-    RANGECAST_SKIP ("no OpenGL context");
   guint64 repeated = 0;
   const GstClockTime d = 200 * GST_MSECOND;
   expect_pictures (convert ("", "framerate=20/1", 5, {{0, d}, {d, d}, {2 * d, d}}, &repeated), 0,
@@ -91,8 +89,6 @@ GST_END_TEST;
 
 GST_START_TEST (test_slower_output_leaves_frame_sets_out)
 {
-  if (!opengl_works ())
-    RANGECAST_SKIP ("no OpenGL context");
   const GstClockTime d = 40 * GST_MSECOND;
   expect_pictures (
       convert ("", "framerate=10/1", 25,
@@ -103,8 +99,6 @@ GST_END_TEST;
 
 GST_START_TEST (test_uneven_times_neither_repeat_a_frame_set_nor_skip_one)
 {
-  if (!opengl_works ())
-    RANGECAST_SKIP ("no OpenGL context");
   const GstClockTime ms = GST_MSECOND, d = kPeriod;
   expect_pictures (convert ("", "framerate=10/1", 0,
                        {{0, d}, {108 * ms, d}, {195 * ms, d}, {317 * ms, d}, {400 * ms, d}}),
@@ -112,38 +106,22 @@ GST_START_TEST (test_uneven_times_neither_repeat_a_frame_set_nor_skip_one)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_pictures_are_at_multiples_of_the_period_wherever_the_stream_begins)
+GST_START_TEST (test_hole_in_a_file_is_filled)
 {
-  if (!opengl_works ())
-    RANGECAST_SKIP ("no OpenGL context");
-  const GstClockTime ms = GST_MSECOND, begin = 3600 * GST_SECOND + 130 * ms;
-  const auto pictures =
-      convert ("", "framerate=10/1", 5, {{begin, 200 * ms}, {begin + 200 * ms, 200 * ms}});
-  fail_unless_equals_int (pictures.size (), 4);
-  for (std::size_t i = 0; i < 4; i++)
-    fail_unless_equals_uint64 (pictures[i].pts, 3600 * GST_SECOND + 200 * ms + i * kPeriod);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_hole_in_a_file_is_filled_as_long_as_hold_time_says)
-{
-  if (!opengl_works ())
-    RANGECAST_SKIP ("no OpenGL context");
   const GstClockTime ms = GST_MSECOND, d = 100 * ms;
   const std::initializer_list<Input> sets = {{0, d}, {500 * ms, d}};
   expect_pictures (convert ("", "framerate=10/1", 5, sets), 0, kPeriod, {0, 0, 0, 0, 0, 500});
-  const auto held = convert ("hold-time=200000000", "framerate=10/1", 5, sets);
-  fail_unless_equals_int (held.size (), 4);
-  fail_unless_equals_uint64 (held[2].pts, 200 * ms);
-  fail_unless_equals_uint64 (held[3].pts, 500 * ms);
-  fail_unless_equals_int (convert ("hold-time=0", "framerate=10/1", 5, sets).size (), 2);
+  const GstClockTime year = 365 * 24 * 3600 * GST_SECOND; /* an error of the stream */
+  const auto apart = convert ("", "framerate=10/1", 5, {{0, d}, {year, d}});
+  fail_unless_equals_int (apart.size (), 2);
+  fail_unless_equals_uint64 (apart[1].pts, year);
+  fail_unless_equals_int (
+      convert ("", "framerate=1/1", 5, {{0, GST_CLOCK_TIME_NONE - 6}}).size (), 60);
 }
 GST_END_TEST;
 
 GST_START_TEST (test_without_a_request_every_frame_set_keeps_its_time)
 {
-  if (!opengl_works ())
-    RANGECAST_SKIP ("no OpenGL context");
   const auto pictures = convert ("", "framerate=(fraction)[0/1,60/1]", 25,
       {{7, 40 * GST_MSECOND}, {13 * GST_MSECOND, GST_CLOCK_TIME_NONE}});
   fail_unless_equals_int (pictures.size (), 2);
@@ -155,11 +133,8 @@ GST_END_TEST;
 
 GST_START_TEST (test_end_of_stream_leaves_no_picture_out_that_begins_before_it)
 {
-  if (!opengl_works ())
-    RANGECAST_SKIP ("no OpenGL context");
   const GstClockTime ms = GST_MSECOND, d = 33 * ms;
   expect_pictures (convert ("", "framerate=5/1", 30, {{0, d}}), 0, 200 * ms, {0});
-  expect_pictures (convert ("hold-time=0", "framerate=5/1", 30, {{0, d}}), 0, 200 * ms, {0});
   expect_pictures (
       convert ("", "framerate=4/1", 30, {{0, d}, {300 * ms, d}, {480 * ms, d}, {733 * ms, d}}), 0,
       250 * ms, {0, 300, 480, 733});
@@ -168,8 +143,6 @@ GST_END_TEST;
 
 GST_START_TEST (test_times_that_go_back_or_lack_do_no_harm)
 {
-  if (!opengl_works ())
-    RANGECAST_SKIP ("no OpenGL context");
   const GstClockTime ms = GST_MSECOND, d = kPeriod;
   const auto pictures = convert ("", "framerate=20/1", 10,
       {{300 * ms, d}, {100 * ms, d}, {GST_CLOCK_TIME_NONE, d}, {500 * ms, 0}});
@@ -179,13 +152,29 @@ GST_START_TEST (test_times_that_go_back_or_lack_do_no_harm)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_frame_sets_without_times_follow_each_other)
+{
+  guint64 repeated = 0;
+  const GstClockTime none = GST_CLOCK_TIME_NONE, d = kPeriod;
+  expect_pictures (convert ("", "framerate=20/1", 10, {{none, d}, {none, d}, {none, d}}, &repeated),
+      0, GST_SECOND / 20, {0, 0, 0, 0, 0, 0});
+  fail_unless_equals_uint64 (repeated, 3);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_times_that_go_far_back_do_not_freeze_the_picture)
+{
+  const GstClockTime d = kPeriod;
+  expect_pictures (convert ("", "framerate=20/1", 10, {{100 * GST_SECOND, d}, {0, d}, {d, d}}), 0,
+      GST_SECOND / 20, {0, 0, 100, 100});
+}
+GST_END_TEST;
+
 /* ---- live ---- */
 
 GST_START_TEST (test_live_stream_that_stalls_is_drawn_on_and_turns)
 {
   Live live ("auto-orbit=45");
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   live.push (0);
   RenderedPicture last;
   for (guint64 i = 0; i < 12; i++) {
@@ -203,9 +192,7 @@ GST_END_TEST;
 
 GST_START_TEST (test_held_frame_set_that_turns_is_uploaded_once)
 {
-  Live live ("auto-orbit=45 show-cameras=true tint-views=true");
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
+  Live live ("auto-orbit=45 tint-views=true");
   live.push (0);
   live.next ();
   const guint64 once = stats_field (live.r, "uploaded-total");
@@ -215,7 +202,7 @@ GST_START_TEST (test_held_frame_set_that_turns_is_uploaded_once)
     live.next ();
   fail_unless_equals_uint64 (stats_field (live.r, "uploaded-bytes"), 0);
   fail_unless_equals_uint64 (stats_field (live.r, "uploaded-total"), once);
-  g_object_set (live.r, "merge", 0.0, nullptr); /* other strips */
+  g_object_set (live.r, "depth-step", 0.01, nullptr); /* other strips */
   live.next ();
   ck_assert_uint_gt (stats_field (live.r, "uploaded-bytes"), once);
   live.push (600 * GST_MSECOND);
@@ -229,8 +216,6 @@ GST_END_TEST;
 GST_START_TEST (test_held_picture_follows_keys_and_properties)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   live.push (0);
   const RenderedPicture still = live.next ();
   fail_unless_cmp (live.next ().rgba, ==, still.rgba);
@@ -248,8 +233,6 @@ GST_END_TEST;
 GST_START_TEST (test_controlled_path_goes_on_over_a_held_frame_set)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   GstControlSource *source = gst_interpolation_control_source_new ();
   g_object_set (source, "mode", GST_INTERPOLATION_MODE_LINEAR, nullptr);
   gst_object_add_control_binding (GST_OBJECT (live.r),
@@ -271,8 +254,6 @@ GST_END_TEST;
 GST_START_TEST (test_new_frame_set_is_shown_and_times_never_go_back)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   live.push (0);
   for (int i = 0; i < 7; i++)
     live.next ();
@@ -289,12 +270,10 @@ GST_END_TEST;
 GST_START_TEST (test_one_time_far_ahead_does_not_freeze_the_view)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   live.push (0);
   live.next ();
   live.push (3600 * GST_SECOND); /* a sender's clock jumps, and comes back */
-  for (guint64 i = 1; i < 100; i++) {
+  for (guint64 i = 1; i < 5; i++) {
     live.push (i * 2 * kPeriod);
     live.next ();
     fail_unless_equals_uint64 (live.next ().shows, i * 2 * kPeriod);
@@ -302,33 +281,15 @@ GST_START_TEST (test_one_time_far_ahead_does_not_freeze_the_view)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_view_stays_where_a_clock_is_ahead_for_good)
-{
-  Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
-  live.push (0);
-  for (guint64 i = 0; i < 100; i++)
-    live.push (3600 * GST_SECOND + i * kPeriod);
-  for (guint64 i = 0; i < 3; i++)
-    fail_unless_equals_uint64 (live.next ().shows, 0);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_picture_waits_for_upstreams_latency_so_that_its_frame_set_is_there)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   gst_harness_set_upstream_latency (live.h, 300 * GST_MSECOND);
-  fail_unless_equals_uint64 (gst_harness_query_latency (live.h), 300 * GST_MSECOND + kPeriod);
-  for (guint64 i = 0; i < 4; i++)
-    live.push (i * 200 * GST_MSECOND);
-  for (guint64 i = 0; i < 8; i++) {
-    const RenderedPicture picture = live.next ();
-    fail_unless_equals_uint64 (picture.pts, i * kPeriod);
-    fail_unless_equals_uint64 (picture.shows, i / 2 * 200 * GST_MSECOND);
-    fail_unless_equals_uint64 (live.now (), i * kPeriod + 300 * GST_MSECOND + kPeriod / 4);
+  live.push (0);
+  for (guint64 i = 0; i < 3; i++) {
+    fail_unless_equals_uint64 (live.next ().pts, i * kPeriod);
+    if (i > 0)
+      fail_unless_equals_uint64 (live.now (), i * kPeriod + 300 * GST_MSECOND + kPeriod / 4);
   }
 }
 GST_END_TEST;
@@ -336,8 +297,6 @@ GST_END_TEST;
 GST_START_TEST (test_latency_is_upstreams_where_the_rate_is_the_inputs)
 {
   Live live ("", "framerate=5/1");
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   gst_harness_set_upstream_latency (live.h, 70 * GST_MSECOND);
   live.push (0);
   gst_buffer_unref (gst_harness_pull (live.h));
@@ -348,16 +307,12 @@ GST_END_TEST;
 GST_START_TEST (test_keep_rate_holds_where_the_rate_is_the_inputs_and_may_change_any_time)
 {
   Live live ("keep-rate=true", "framerate=5/1");
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   live.push (0);
   for (guint64 i = 0; i < 3; i++)
     fail_unless_equals_uint64 (live.next ().pts, i * 200 * GST_MSECOND);
   g_object_set (live.r, "keep-rate", FALSE, nullptr);
-  for (int tries = 0; tries < 500 && gst_harness_query_latency (live.h) > 0; tries++)
-    g_usleep (10000); /* the thread negotiates */
   live.push (GST_SECOND + 7);
-  const RenderedPicture direct = take_rendered (gst_harness_try_pull (live.h), 320);
+  const RenderedPicture direct = take_rendered (gst_harness_pull (live.h), 320);
   fail_unless_equals_uint64 (direct.pts, GST_SECOND + 7);
   g_object_set (live.r, "keep-rate", TRUE, nullptr);
   live.push (1200 * GST_MSECOND);
@@ -365,27 +320,9 @@ GST_START_TEST (test_keep_rate_holds_where_the_rate_is_the_inputs_and_may_change
 }
 GST_END_TEST;
 
-GST_START_TEST (test_stalled_stream_is_drawn_no_longer_than_hold_time)
-{
-  Live live ("hold-time=300000000");
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
-  live.push (0);
-  for (int i = 0; i < 5; i++)
-    live.next ();
-  g_usleep (50000);
-  fail_unless_equals_int (gst_test_clock_peek_id_count (live.clock), 0);
-  fail_unless_equals_uint64 (stats_field (live.r, "frames"), 5);
-  live.push (2 * GST_SECOND);
-  fail_unless_equals_uint64 (live.next ().pts, 2 * GST_SECOND);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_flush_ends_holding_and_a_new_stream_begins)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   for (guint64 round = 0; round < 3; round++) {
     const GstClockTime begin = round * GST_SECOND;
     live.push (begin);
@@ -405,14 +342,12 @@ GST_END_TEST;
 GST_START_TEST (test_end_of_stream_shows_the_rest_and_ends_holding)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   live.push (0);
   live.next ();
   live.push (200 * GST_MSECOND);
   gst_harness_push_event (live.h, gst_event_new_eos ());
   for (guint64 i = 1; i < 4; i++) {
-    const RenderedPicture picture = take_rendered (gst_harness_try_pull (live.h), 320);
+    const RenderedPicture picture = take_rendered (gst_harness_pull (live.h), 320);
     fail_unless_equals_uint64 (picture.pts, i * kPeriod);
     fail_unless_equals_uint64 (picture.shows, i / 2 * 200 * GST_MSECOND);
   }
@@ -422,27 +357,9 @@ GST_START_TEST (test_end_of_stream_shows_the_rest_and_ends_holding)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_resize_while_the_stream_stalls)
-{
-  Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
-  live.push (0);
-  live.next ();
-  set_output_caps (live.h->element, "width=160,height=120,framerate=10/1");
-  fail_unless_equals_int (live.next (160).height, 120);
-  set_output_caps (live.h->element, "width=320,height=240,framerate=20/1");
-  const RenderedPicture faster = live.next ();
-  fail_unless_equals_uint64 (faster.duration, GST_SECOND / 20);
-  fail_unless_equals_uint64 (live.next ().pts, faster.pts + GST_SECOND / 20);
-}
-GST_END_TEST;
-
 GST_START_TEST (test_new_rig_while_live_forgets_the_frame_sets_of_the_old_one)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   live.push (0);
   live.next ();
   live.rig = ring_rig (3);
@@ -456,30 +373,9 @@ GST_START_TEST (test_new_rig_while_live_forgets_the_frame_sets_of_the_old_one)
 }
 GST_END_TEST;
 
-GST_START_TEST (test_gap_of_a_live_stream_is_filled_not_passed_on)
-{
-  Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
-  live.push (0);
-  live.next ();
-  while (GstEvent *event = gst_harness_try_pull_event (live.h))
-    gst_event_unref (event);
-  gst_harness_push_event (live.h, gst_event_new_gap (200 * GST_MSECOND, 200 * GST_MSECOND));
-  for (int i = 1; i < 5; i++)
-    live.next ();
-  while (GstEvent *event = gst_harness_try_pull_event (live.h)) {
-    ck_assert_int_ne (GST_EVENT_TYPE (event), GST_EVENT_GAP);
-    gst_event_unref (event);
-  }
-}
-GST_END_TEST;
-
 GST_START_TEST (test_pause_and_states_twice_while_holding)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   for (int round = 0; round < 2; round++) {
     live.push (10 * GST_SECOND * guint64 (round));
     live.next ();
@@ -503,8 +399,6 @@ GST_END_TEST;
 GST_START_TEST (test_flow_of_the_drawing_thread_comes_back_upstream)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   live.push (0);
   live.next ();
   GstPad *peer = gst_pad_get_peer (live.src);
@@ -521,50 +415,29 @@ GST_START_TEST (test_flow_of_the_drawing_thread_comes_back_upstream)
 }
 GST_END_TEST;
 
-/* A pool that has no thread for anybody. */
-static gpointer
-refuse_thread (GstTaskPool *, GstTaskPoolFunction, gpointer, GError **error)
+/* ---- buffers that upstream wants back ---- */
+
+static void
+count_one (gpointer count, GstMiniObject *)
 {
-  g_set_error (error, G_THREAD_ERROR, G_THREAD_ERROR_AGAIN, "no more threads");
-  return nullptr;
+  ++*static_cast<int *> (count);
 }
 
-static GstBusSyncReply
-set_refusing_pool (GstBus *, GstMessage *message, gpointer pool)
-{
-  GstStreamStatusType type;
-  GstElement *owner;
-  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_STREAM_STATUS) {
-    gst_message_parse_stream_status (message, &type, &owner);
-    if (type == GST_STREAM_STATUS_TYPE_CREATE)
-      gst_task_set_pool (
-          GST_TASK (g_value_get_object (gst_message_get_stream_status_object (message))),
-          GST_TASK_POOL (pool));
-  }
-  return GST_BUS_DROP;
-}
-
-GST_START_TEST (test_without_a_thread_a_live_stream_is_drawn_as_if_not_live)
+GST_START_TEST (test_drain_gives_the_buffer_back_and_the_picture_stays)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
-  GstTaskPool *pool = gst_task_pool_new ();
-  GST_TASK_POOL_GET_CLASS (pool)->push = refuse_thread; /* each test has a process of its own */
-  GstBus *bus = gst_bus_new ();
-  gst_bus_set_sync_handler (bus, set_refusing_pool, pool, nullptr);
-  gst_element_set_bus (live.h->element, bus);
-  ASSERT_WARNING (live.push (0));
-  live.push (200 * GST_MSECOND);
-  for (guint64 i = 0; i < 2; i++) {
-    const RenderedPicture picture = take_rendered (gst_harness_pull (live.h), 320);
-    fail_unless_equals_uint64 (picture.pts, i * kPeriod);
-    fail_unless_equals_uint64 (picture.shows, 0);
-  }
-  gst_element_set_bus (live.h->element, nullptr);
-  gst_bus_set_sync_handler (bus, nullptr, nullptr, nullptr);
-  gst_object_unref (bus);
-  gst_object_unref (pool);
+  int gone = 0;
+  GstBuffer *set = make_frame_set (live.rig);
+  gst_mini_object_weak_ref (GST_MINI_OBJECT (set), count_one, &gone);
+  fail_unless_equals_int (gst_harness_push (live.h, set), GST_FLOW_OK);
+  const RenderedPicture before = live.next ();
+  const guint64 uploads = stats_field (live.r, "uploaded-total");
+  GstQuery *query = gst_query_new_drain ();
+  gst_pad_peer_query (live.h->srcpad, query);
+  gst_query_unref (query);
+  fail_unless_equals_int (gone, 1);
+  fail_unless_cmp (live.next ().rgba, ==, before.rgba);
+  fail_unless_equals_uint64 (stats_field (live.r, "uploaded-total"), uploads);
 }
 GST_END_TEST;
 
@@ -573,8 +446,6 @@ GST_END_TEST;
 GST_START_TEST (test_late_pictures_of_a_held_frame_set_are_left_out_and_counted)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   GstBus *bus = gst_bus_new ();
   gst_element_set_bus (live.r, bus);
   live.push (0);
@@ -604,35 +475,17 @@ GST_END_TEST;
 GST_START_TEST (test_thread_that_comes_too_late_leaves_pictures_out)
 {
   Live live ("show-stats=false"), direct ("", "framerate=5/1");
-  if (!live.h || !direct.h)
-    RANGECAST_SKIP ("no OpenGL context");
   const Roi part = {100, 80, 60, 40};
   live.push (0);
   live.next ();
   gst_harness_push (live.h, make_frame_set (live.rig, 200 * GST_MSECOND, part));
+  fail_unless_equals_uint64 (take_rendered (gst_harness_pull (live.h), 320).pts, kPeriod);
   live.sleep (5 * kPeriod);
-  const RenderedPicture picture = take_rendered (gst_harness_pull (live.h), 320);
-  fail_unless_equals_uint64 (picture.pts, 5 * kPeriod);
+  const RenderedPicture picture = live.next ();
+  fail_unless_equals_uint64 (picture.pts, 6 * kPeriod);
   fail_unless_equals_uint64 (stats_field (live.r, "dropped"), 4);
   GstBuffer *expected = gst_harness_push_and_pull (direct.h, make_frame_set (direct.rig, 0, part));
   fail_unless (picture.rgba == take_rendered (expected, 320).rgba, "it has another's strips");
-}
-GST_END_TEST;
-
-/* A sink holds the thread until a picture's time, which is the pipeline's latency after its own. */
-GST_START_TEST (test_thread_that_is_held_by_the_sink_leaves_nothing_out)
-{
-  Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
-  live.push (0);
-  live.next ();
-  gst_pad_send_event (live.src, gst_event_new_latency (5 * kPeriod));
-  live.sleep (5 * kPeriod);
-  fail_unless_equals_uint64 (take_rendered (gst_harness_pull (live.h), 320).pts, kPeriod);
-  for (guint64 i = 2; i < 6; i++)
-    fail_unless_equals_uint64 (live.next ().pts, i * kPeriod);
-  fail_unless_equals_uint64 (stats_field (live.r, "dropped"), 0);
 }
 GST_END_TEST;
 
@@ -649,8 +502,6 @@ let_time_pass (GstControlSource *source, GstClockTime, gdouble *value)
 GST_START_TEST (test_drawing_that_takes_longer_than_a_period_is_told_as_latency_once)
 {
   Live live;
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   GstBus *bus = gst_bus_new ();
   gst_element_set_bus (live.r, bus);
   GstControlSource *path = gst_interpolation_control_source_new ();
@@ -659,10 +510,9 @@ GST_START_TEST (test_drawing_that_takes_longer_than_a_period_is_told_as_latency_
   gst_object_add_control_binding (
       GST_OBJECT (live.r), gst_direct_control_binding_new (GST_OBJECT (live.r), "azimuth", path));
   live.push (0);
-  fail_unless_equals_uint64 (gst_harness_query_latency (live.h), kPeriod);
+  live.next ();
   gst_bus_set_flushing (bus, TRUE); /* the message that tells of the rate */
   gst_bus_set_flushing (bus, FALSE);
-  live.next ();
   for (int i = 0; i < 12;) { /* it waits for no time that has come already */
     if (GstBuffer *picture = gst_harness_try_pull (live.h)) {
       gst_buffer_unref (picture);
@@ -673,7 +523,6 @@ GST_START_TEST (test_drawing_that_takes_longer_than_a_period_is_told_as_latency_
       g_usleep (1000);
     }
   }
-  g_object_set (live.r, "hold-time", guint64{0}, nullptr);
   /* A picture is begun a quarter of a period after its time; with an eighth of 120 ms to spare. */
   fail_unless_equals_uint64 (gst_harness_query_latency (live.h), kPeriod / 4 + 135 * GST_MSECOND);
   GstMessage *message = gst_bus_pop_filtered (bus, GST_MESSAGE_LATENCY);
@@ -689,37 +538,65 @@ GST_END_TEST;
 GST_START_TEST (test_late_frame_sets_are_counted_where_there_is_no_rate_of_its_own)
 {
   Live live ("", "framerate=5/1");
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
   live.push (0);
+  gst_buffer_unref (gst_harness_pull (live.h));
   gst_harness_push_upstream_event (
       live.h, gst_event_new_qos (GST_QOS_TYPE_UNDERFLOW, 2, GST_SECOND / 4, GST_SECOND));
   live.push (GST_SECOND);
   live.push (3 * GST_SECOND);
-  gst_buffer_unref (gst_harness_pull (live.h));
   fail_unless (take_rendered (gst_harness_pull (live.h), 320).discont);
   fail_unless_equals_uint64 (stats_field (live.r, "dropped"), 1);
   fail_unless_equals_uint64 (stats_field (live.r, "frames"), 2);
-  g_object_set (live.r, "qos", FALSE, nullptr);
-  live.push (GST_SECOND);
-  fail_unless_equals_uint64 (stats_field (live.r, "frames"), 3);
 }
 GST_END_TEST;
 
-GST_START_TEST (test_absurd_rate_of_a_sender_is_no_rate_to_keep)
+GST_START_TEST (test_late_frame_set_that_waits_gives_way_to_the_next)
 {
-  GstElement *pipeline = gst_parse_launch (
-      "avatartestsrc is-live=true num-buffers=5 views=1 ! video/x-range,width=64,height=48,"
-      "framerate=30/1 ! capssetter caps=video/x-range,framerate=2147483647/1 ! "
-      "striprender keep-rate=true ! fakesink",
-      nullptr);
-  if (!pipeline)
-    RANGECAST_SKIP ("no capssetter");
   Live live ("", "framerate=5/1");
-  if (!live.h)
-    RANGECAST_SKIP ("no OpenGL context");
-  play_to_the_end (pipeline);
-  gst_object_unref (pipeline);
+  const gulong blocked = gst_pad_add_probe (
+      live.src, GstPadProbeType (GST_PAD_PROBE_TYPE_BLOCK | GST_PAD_PROBE_TYPE_BUFFER),
+      [] (GstPad *, GstPadProbeInfo *, gpointer) { return GST_PAD_PROBE_OK; }, nullptr, nullptr);
+  live.push (0);
+  while (!gst_pad_is_blocking (live.src))
+    g_usleep (1000);
+  live.push (GST_SECOND);
+  gst_test_clock_set_time (live.clock, 2 * GST_SECOND);
+  live.push (2 * GST_SECOND);
+  gst_pad_remove_probe (live.src, blocked);
+  gst_buffer_unref (gst_harness_pull (live.h));
+  const RenderedPicture newest = take_rendered (gst_harness_pull (live.h), 320);
+  fail_unless_equals_uint64 (newest.pts, 2 * GST_SECOND);
+  fail_unless (newest.discont);
+  fail_unless_equals_uint64 (stats_field (live.r, "dropped"), 1);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_statistics_count_pictures_and_points)
+{
+  const Rig rig = ring_rig (1, 64, 48);
+  GstHarness *h = render_harness (rig, "stats-interval=3600000");
+  GstElement *r = gst_bin_get_by_name (GST_BIN (h->element), "r");
+  GstBus *bus = gst_bus_new ();
+  gst_element_set_bus (r, bus);
+  guint64 points = 0, frames = 0, counted = 0;
+  for (GstClockTime i = 0; i < 3; i++) {
+    gst_buffer_unref (gst_harness_push_and_pull (h, make_frame_set (rig, i * GST_SECOND / 30)));
+    points += stats_field (r, "points");
+  }
+  fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
+  GstMessage *message = gst_bus_timed_pop_filtered (bus, 10 * GST_SECOND, GST_MESSAGE_ELEMENT);
+  fail_unless (message && gst_message_has_name (message, "rangecast-stats"));
+  const GstStructure *stats = gst_message_get_structure (message);
+  gst_structure_get_uint64 (stats, "frames", &frames);
+  gst_structure_get_uint64 (stats, "points", &counted);
+  fail_unless_equals_uint64 (frames, 3);
+  ck_assert_uint_gt (points, 0);
+  fail_unless_equals_uint64 (counted, points);
+  gst_message_unref (message);
+  gst_element_set_bus (r, nullptr);
+  gst_object_unref (bus);
+  gst_object_unref (r);
+  gst_harness_teardown (h);
 }
 GST_END_TEST;
 
@@ -729,40 +606,37 @@ striprenderlive_suite ()
   Suite *suite = suite_create ("striprenderlive");
   TCase *tc = tcase_create ("general");
   suite_add_tcase (suite, tc);
-  tcase_add_test (tc, test_absurd_rate_of_a_sender_is_no_rate_to_keep);
   tcase_add_test (tc, test_faster_output_shows_frame_sets_several_times);
   tcase_add_test (tc, test_slower_output_leaves_frame_sets_out);
   tcase_add_test (tc, test_uneven_times_neither_repeat_a_frame_set_nor_skip_one);
-  tcase_add_test (tc, test_pictures_are_at_multiples_of_the_period_wherever_the_stream_begins);
-  tcase_add_test (tc, test_hole_in_a_file_is_filled_as_long_as_hold_time_says);
+  tcase_add_test (tc, test_hole_in_a_file_is_filled);
   tcase_add_test (tc, test_without_a_request_every_frame_set_keeps_its_time);
   tcase_add_test (tc, test_end_of_stream_leaves_no_picture_out_that_begins_before_it);
   tcase_add_test (tc, test_times_that_go_back_or_lack_do_no_harm);
+  tcase_add_test (tc, test_frame_sets_without_times_follow_each_other);
+  tcase_add_test (tc, test_times_that_go_far_back_do_not_freeze_the_picture);
   tcase_add_test (tc, test_live_stream_that_stalls_is_drawn_on_and_turns);
   tcase_add_test (tc, test_held_frame_set_that_turns_is_uploaded_once);
   tcase_add_test (tc, test_held_picture_follows_keys_and_properties);
   tcase_add_test (tc, test_controlled_path_goes_on_over_a_held_frame_set);
   tcase_add_test (tc, test_new_frame_set_is_shown_and_times_never_go_back);
   tcase_add_test (tc, test_one_time_far_ahead_does_not_freeze_the_view);
-  tcase_add_test (tc, test_view_stays_where_a_clock_is_ahead_for_good);
   tcase_add_test (tc, test_picture_waits_for_upstreams_latency_so_that_its_frame_set_is_there);
   tcase_add_test (tc, test_latency_is_upstreams_where_the_rate_is_the_inputs);
   tcase_add_test (tc, test_keep_rate_holds_where_the_rate_is_the_inputs_and_may_change_any_time);
-  tcase_add_test (tc, test_stalled_stream_is_drawn_no_longer_than_hold_time);
   tcase_add_test (tc, test_flush_ends_holding_and_a_new_stream_begins);
   tcase_add_test (tc, test_end_of_stream_shows_the_rest_and_ends_holding);
-  tcase_add_test (tc, test_resize_while_the_stream_stalls);
   tcase_add_test (tc, test_new_rig_while_live_forgets_the_frame_sets_of_the_old_one);
-  tcase_add_test (tc, test_gap_of_a_live_stream_is_filled_not_passed_on);
   tcase_add_test (tc, test_pause_and_states_twice_while_holding);
   tcase_add_test (tc, test_flow_of_the_drawing_thread_comes_back_upstream);
-  tcase_add_test (tc, test_without_a_thread_a_live_stream_is_drawn_as_if_not_live);
   tcase_add_test (tc, test_late_pictures_of_a_held_frame_set_are_left_out_and_counted);
   tcase_add_test (tc, test_thread_that_comes_too_late_leaves_pictures_out);
-  tcase_add_test (tc, test_thread_that_is_held_by_the_sink_leaves_nothing_out);
   tcase_add_test (tc, test_drawing_that_takes_longer_than_a_period_is_told_as_latency_once);
   tcase_add_test (tc, test_late_frame_sets_are_counted_where_there_is_no_rate_of_its_own);
+  tcase_add_test (tc, test_late_frame_set_that_waits_gives_way_to_the_next);
+  tcase_add_test (tc, test_drain_gives_the_buffer_back_and_the_picture_stays);
+  tcase_add_test (tc, test_statistics_count_pictures_and_points);
   return suite;
 }
 
-GST_CHECK_MAIN (striprenderlive);
+RENDER_CHECK_MAIN (striprenderlive);

@@ -262,7 +262,6 @@ srtp_suite ()
 {
   Suite *suite = suite_create ("srtp");
   TCase *tc = tcase_create ("general");
-  tcase_set_timeout (tc, 60);
   suite_add_tcase (suite, tc);
   tcase_add_test (
       tc, test_joining_after_the_numbers_wrapped_and_at_the_change_no_frame_set_is_lost);

@@ -155,13 +155,6 @@ struct WebSink {
       GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
     fail_unless_equals_int (gst_harness_push (h, buffer), GST_FLOW_OK);
   }
-  /** The rig view units of a frame set that begins with them. */
-  std::string rig_units () const
-  {
-    std::vector<guint8> units;
-    write_rig_units ({rig, 30, 1}, units);
-    return {units.begin (), units.end ()};
-  }
   GstStructure *stats () const
   {
     GstStructure *stats = nullptr;

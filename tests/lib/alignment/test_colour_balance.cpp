@@ -154,34 +154,6 @@ TEST (ColourBalance, cameras_that_agree_are_left_alone_bit_by_bit)
     }
 }
 
-TEST (ColourBalance, highlights_of_one_camera_do_not_count)
-{
-  Frame frame = ball (kArc, kWrong);
-  for (std::size_t k = 0; k < frame.colour[1].size (); k++)
-    if (k % 10 < 3) /* three in ten: a mean would be 9 % off */
-      frame.colour[1][k] = {240, 240, 240, 0};
-  ColourBalance balance;
-  balance.set_rig (frame.rig);
-  balance.process (frame.images (), 1);
-  EXPECT_LT (worst_gain (balance, kWrong), 0.04);
-}
-
-TEST (ColourBalance, what_is_behind_another_surface_does_not_count)
-{
-  /* View 1 has something else, and very green, 5 cm before the ball. */
-  Frame frame = ball ({0, 20}, {kOne, kOne});
-  for (std::size_t k = 0; k < frame.depth[1].size (); k++)
-    if (frame.depth[1][k]) {
-      frame.depth[1][k] = static_cast<std::uint16_t> (frame.depth[1][k] - 500);
-      frame.colour[1][k] = {60, 200, 60, 0};
-    }
-  ColourBalance balance;
-  balance.set_rig (frame.rig);
-  balance.process (frame.images (), 1);
-  EXPECT_EQ (balance.gains (0)[1], 1);
-  EXPECT_EQ (balance.gains (1)[1], 1);
-}
-
 TEST (ColourBalance, views_without_overlap_keep_their_colours)
 {
   const std::vector<Rgb> wrong = {{1.2, 1.2, 1.2}, {0.8, 0.8, 0.8}};
@@ -191,30 +163,6 @@ TEST (ColourBalance, views_without_overlap_keep_their_colours)
   balance.process (frame.images (), 1);
   for (int id : {0, 1, 7, -1, 64})
     EXPECT_EQ (balance.gains (id), (ColourBalance::Gains{1, 1, 1}));
-}
-
-TEST (ColourBalance, no_gain_is_larger_than_the_bound)
-{
-  const std::vector<Rgb> wrong = {{0.46, 1, 1}, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
-  Frame frame = ball (kArc, wrong);
-  ColourBalance balance;
-  balance.set_rig (frame.rig);
-  balance.process (frame.images (), 1);
-  EXPECT_GT (balance.gains (0)[0], 1.4);
-  EXPECT_LE (balance.gains (0)[0], ColourBalance::kMaxGain);
-}
-
-TEST (ColourBalance, camera_with_another_exposure_is_lifted_and_the_others_stay)
-{
-  Frame frame = ball (kArc, {kOne, {0.6, 0.6, 0.6}, kOne, kOne});
-  ColourBalance balance;
-  balance.set_rig (frame.rig);
-  balance.process (frame.images (), 1);
-  for (std::size_t c = 0; c < 3; c++) {
-    EXPECT_NEAR (balance.gains (1)[c], 1 / 0.6, 0.02);
-    for (const int other : {0, 2, 3})
-      EXPECT_NEAR (balance.gains (other)[c], 1, 0.005);
-  }
 }
 
 TEST (ColourBalance, gains_follow_a_change_slowly_but_come_there)
@@ -239,37 +187,6 @@ TEST (ColourBalance, gains_follow_a_change_slowly_but_come_there)
   EXPECT_LT (worst_gain (balance, wrong), 0.015);
   balance.reset ();
   EXPECT_EQ (balance.gains (0), (ColourBalance::Gains{1, 1, 1}));
-}
-
-TEST (ColourBalance, view_that_is_missing_keeps_its_gains)
-{
-  Frame frame = ball (kArc, kWrong);
-  ColourBalance balance;
-  balance.set_rig (frame.rig);
-  balance.process (frame.images (), 1);
-  const ColourBalance::Gains gains = balance.gains (3);
-  frame = ball (kArc, kWrong);
-  std::vector<RangeImage> three = frame.images ();
-  three.pop_back ();
-  balance.process (three, 1);
-  EXPECT_EQ (balance.gains (3), gains);
-}
-
-TEST (ColourBalance, images_without_pixels_or_colour_are_left_out)
-{
-  Frame frame = ball (kArc, kWrong);
-  std::vector<RangeImage> images = frame.images ();
-  images[1].colour = {};
-  images[2].depth = {};
-  images[2].colour = {};
-  images[2].roi = {};
-  images[3].roi = {5, 5, 1, 1};
-  images[3].depth = images[3].depth.crop (5, 5, 1, 1);
-  images[3].colour = images[3].colour.crop (5, 5, 1, 1);
-  ColourBalance balance;
-  balance.set_rig (frame.rig);
-  balance.process (images, 1);
-  balance.process ({}, 1);
 }
 
 } // namespace

@@ -5,11 +5,8 @@
 
 #include <atomic>
 #include <chrono>
-#include <filesystem>
-#include <fstream>
 #include <rangecast/base/parallel.hpp>
 #include <stdexcept>
-#include <string>
 #include <thread>
 #include <vector>
 
@@ -23,18 +20,6 @@ bool
 all_are (const Counters &counters, int value)
 {
   return std::ranges::all_of (counters, [value] (const auto &count) { return count == value; });
-}
-
-int
-pool_threads ()
-{
-  int count = 0;
-  for (const auto &task : std::filesystem::directory_iterator ("/proc/self/task")) {
-    std::string name;
-    std::ifstream (task.path () / "comm") >> name;
-    count += name == "rangecast-pool";
-  }
-  return count;
 }
 
 TEST (Parallel, every_job_runs_once_however_many_threads)
@@ -63,19 +48,6 @@ TEST (Parallel, no_two_jobs_have_one_worker_at_a_time)
     });
     ASSERT_EQ (clashes, 0);
   }
-}
-
-TEST (Parallel, one_thread_is_the_calling_one_in_order)
-{
-  std::vector<std::size_t> order;
-  const auto self = std::this_thread::get_id ();
-  in_parallel (50, 1, [&] (std::size_t i, std::size_t worker) {
-    EXPECT_EQ (std::this_thread::get_id (), self);
-    EXPECT_EQ (worker, 0U);
-    EXPECT_EQ (i, order.size ());
-    order.push_back (i);
-  });
-  EXPECT_EQ (order.size (), 50U);
 }
 
 TEST (Parallel, jobs_run_at_the_same_time)
@@ -122,15 +94,6 @@ TEST (Parallel, many_threads_may_ask_at_once)
   EXPECT_TRUE (all_are (runs, kRounds));
 }
 
-TEST (Parallel, writes_of_jobs_are_seen_by_the_caller_and_by_the_next_loop)
-{
-  std::vector<int> values (64, 0); /* not atomic: a missing barrier is a race */
-  for (int round = 0; round < 500; round++)
-    in_parallel (values.size (), 0, [&] (std::size_t i) { values[i]++; });
-  for (int value : values)
-    EXPECT_EQ (value, 500);
-}
-
 TEST (Parallel, an_exception_of_a_job_reaches_the_caller_and_the_pool_goes_on)
 {
   for (int threads : {0, 1, 2, 8})
@@ -150,12 +113,6 @@ TEST (Parallel, an_exception_of_a_job_reaches_the_caller_and_the_pool_goes_on)
     }
 }
 
-TEST (Parallel, there_are_no_more_threads_than_cores)
-{
-  in_parallel (1000, 1000, [] (std::size_t) { std::this_thread::yield (); });
-  EXPECT_EQ (pool_threads (), core_count () - 1);
-}
-
 TEST (Parallel, child_of_a_fork_does_its_work_alone)
 {
   in_parallel (8, 0, [] (std::size_t) {}); /* so that there are threads to miss */
@@ -169,15 +126,6 @@ TEST (Parallel, child_of_a_fork_does_its_work_alone)
   ASSERT_EQ (waitpid (child, &status, 0), child);
   EXPECT_TRUE (WIFEXITED (status));
   EXPECT_EQ (WEXITSTATUS (status), 0);
-}
-
-TEST (Parallel, workers_are_no_more_than_jobs)
-{
-  EXPECT_EQ (workers_for (0, 4), 0U);
-  EXPECT_EQ (workers_for (3, 4), 3U);
-  EXPECT_EQ (workers_for (9, 4), 4U);
-  EXPECT_EQ (workers_for (100000, 0), std::size_t (core_count ()));
-  EXPECT_GE (core_count (), 1);
 }
 
 } // namespace

@@ -5,6 +5,7 @@
 
 #include <rangecast/calibration/bundle.hpp>
 #include <rangecast/calibration/rig_calibration.hpp>
+#include <rangecast/geometry/rectified_pose.hpp>
 
 using namespace rangecast;
 using namespace rangecast::testing;
@@ -145,35 +146,6 @@ TEST (Calibration, ends_soon_when_asked_to)
       adjust_bundle ({}, frames, {}, bundle, stop.get_token ()).code (), StatusCode::kInterrupted);
 }
 
-TEST (Calibration, lenses_come_back)
-{
-  const auto truth = ring (1, 0);
-  CalibrationResult result;
-  ASSERT_TRUE (calibrate_rig (cameras_of (truth), frames_for (truth, {{0}}, 30), {}, result).ok ());
-  const View &view = result.rig.views[0];
-  EXPECT_NEAR (view.intrinsics.fx, truth[0].lens[0], 2);
-  EXPECT_NEAR (view.intrinsics.fy, truth[0].lens[1], 2);
-  EXPECT_NEAR (view.intrinsics.cx, truth[0].lens[2], 1);
-  EXPECT_NEAR (view.intrinsics.cy, truth[0].lens[3], 1);
-  ASSERT_EQ (view.distortion.size (), 5U);
-  EXPECT_NEAR (view.distortion[0], truth[0].lens[4], 0.01);
-}
-
-TEST (Calibration, distortion_has_as_many_coefficients_as_asked_for)
-{
-  const auto truth = ring (1, 0);
-  const auto frames = frames_for (truth, {{0}}, 20);
-  for (const DistortionModel model : {DistortionModel::kNone, DistortionModel::kFour,
-           DistortionModel::kFive, DistortionModel::kEight}) {
-    CalibrationSettings settings;
-    settings.distortion = model;
-    CalibrationResult result;
-    const Status status = calibrate_rig (cameras_of (truth), frames, settings, result);
-    ASSERT_TRUE (status.ok ()) << status.message ();
-    EXPECT_EQ (result.rig.views[0].distortion.size (), std::size_t (model));
-  }
-}
-
 TEST (Calibration, groups_of_cameras_without_common_boards_are_named)
 {
   const auto truth = ring (4, 35);
@@ -222,39 +194,31 @@ TEST (Calibration, camera_that_is_rolled_against_its_partner_is_told)
   }
 }
 
-/* The right camera sees each board a little higher or lower than it was for the left one. */
-TEST (Calibration, rows_that_do_not_agree_are_a_warning)
+/* Instead of rows that differ, which follow from it. */
+TEST (Calibration, pair_that_converges_or_is_staggered_is_one_warning_that_says_so)
 {
-  const auto truth = stereo_pair ();
-  auto frames = frames_for (truth, {{0, 1}}, 20);
-  for (std::size_t f = 0; f < frames.size (); f++)
-    for (BoardCorner &corner : frames[f].sightings[1].corners)
-      corner.y += f % 2 ? 3 : -3;
-  CalibrationResult result;
-  const Status status = calibrate_rig (cameras_of (truth), frames, {}, result);
-  ASSERT_TRUE (status.ok ()) << status.message ();
-  EXPECT_TRUE (std::ranges::any_of (result.warnings, [] (const std::string &warning) {
-    return warning.starts_with ("view 0: rows of camera 0 and camera 1 differ by");
-  }));
-}
-
-TEST (Calibration, boards_that_were_found_but_do_not_fit_are_counted)
-{
-  const auto truth = stereo_pair ();
-  auto frames = frames_for (truth, {{0, 1}}, 10);
-  for (std::size_t f = 0; f < 3; f++)
-    for (BoardCorner &corner : frames[f].sightings[1].corners)
-      corner.x += corner.id % 2 ? 20 : -20;
-  CalibrationResult result;
-  EXPECT_ERROR (calibrate_rig (cameras_of (truth), frames, {}, result),
-      "frames that fit (3 more do not fit: do the pictures of all cameras belong together");
+  for (const auto &[degrees, ahead_m, text] :
+      {std::tuple{5., 0.01, ""}, {22., 0., "directions that differ by 22.0 degrees"},
+          {0., 0.04, "stands 0.040 m ahead of the left one, at a distance of 0.108 m"}}) {
+    auto truth = stereo_pair ();
+    truth[1].world_from_camera.translation.z -= ahead_m;
+    for (int i : {0, 1})
+      truth[i].world_from_camera =
+          truth[i].world_from_camera * rotation_about ({0, 1, 0}, (0.5 - i) * degrees * kDegree);
+    CalibrationResult result;
+    ASSERT_TRUE (
+        calibrate_rig (cameras_of (truth), frames_for (truth, {{0, 1}}, 15), {}, result).ok ());
+    ASSERT_EQ (result.warnings.size (), std::size_t (*text ? 1 : 0));
+    EXPECT_NE ((*text ? result.warnings[0] : "").find (text), std::string::npos);
+    EXPECT_EQ (describe_misalignment (result.rig.views[0]), *text ? result.warnings[0] : "");
+  }
 }
 
 /* Its columns are numbered from the other end, as BoardDetector does. */
 TEST (Calibration, pictures_of_one_camera_that_are_mirrored_get_a_hint)
 {
   const auto truth = stereo_pair ();
-  auto frames = frames_for (truth, {{0, 1}}, 15);
+  auto frames = frames_for (truth, {{0, 1}}, 9);
   const int columns = BoardSpec{}.columns;
   for (CalibrationFrame &frame : frames)
     for (BoardCorner &corner : frame.sightings[1].corners) {
@@ -263,21 +227,11 @@ TEST (Calibration, pictures_of_one_camera_that_are_mirrored_get_a_hint)
     }
   CalibrationResult result;
   EXPECT_ERROR (calibrate_rig (cameras_of (truth), frames, {}, result),
-      "Each camera alone fits: were their pictures taken at the same moments, and are those of "
+      "Each camera alone fits: were their images captured at the same time, and are those of "
       "one of them mirrored?");
 }
 
-TEST (Calibration, board_that_was_never_found_is_described)
-{
-  const auto truth = stereo_pair ();
-  CalibrationSettings settings;
-  settings.board.kind = BoardKind::kCharuco;
-  CalibrationResult result;
-  EXPECT_ERROR (calibrate_rig (cameras_of (truth), {}, settings, result),
-      "no board was found; expected 9x6 inner corners, with markers of the dictionary 4x4-50");
-}
-
-TEST (Calibration, board_that_moved_between_two_cameras_is_left_out_and_said)
+TEST (Calibration, board_that_moved_between_two_cameras_is_skipped_and_reported)
 {
   const auto truth = stereo_pair ();
   auto frames = frames_for (truth, {{0, 1}}, 20);
@@ -294,32 +248,15 @@ TEST (Calibration, board_that_moved_between_two_cameras_is_left_out_and_said)
   EXPECT_LT (result.rms_px, 0.1);
 }
 
-TEST (Calibration, world_that_cannot_begin_at_the_first_board_is_said)
-{
-  const auto truth = stereo_pair ();
-  CalibrationSettings settings;
-  settings.world = WorldFrame::kBoard;
-  auto frames = frames_for (truth, {{0, 1}}, 20);
-  CalibrationResult result;
-  ASSERT_TRUE (calibrate_rig (cameras_of (truth), frames, settings, result).ok ());
-  EXPECT_TRUE (result.warnings.empty ());
-  for (Sighting &sighting : frames[0].sightings)
-    for (BoardCorner &corner : sighting.corners)
-      corner.x += corner.id % 2 ? 12 : -12;
-  ASSERT_TRUE (calibrate_rig (cameras_of (truth), frames, settings, result).ok ());
-  ASSERT_EQ (result.warnings.size (), 1U);
-  EXPECT_NE (result.warnings[0].find ("first frame's board"), std::string::npos);
-}
-
 TEST (Calibration, too_few_frames_name_the_camera_and_the_number)
 {
   const auto truth = ring (2, 20);
   CalibrationResult result;
   EXPECT_ERROR (
       calibrate_rig (cameras_of (truth), frames_for (truth, {{0, 1}, {0}}, 5), {}, result),
-      "camera 1 (view 1, left): the board was found in 5 frames; expected at least 8");
+      "camera 1 (view 1, left): the board was found in 5 frames; show it in at least 8");
   EXPECT_ERROR (calibrate_rig (cameras_of (truth), frames_for (truth, {{0}}, 10), {}, result),
-      "camera 1 (view 1, left): no board was found; expected 9x6 inner corners");
+      "camera 1 (view 1, left): no board was found; show one with 9x6 inner corners");
   EXPECT_ERROR (calibrate_rig ({}, {}, {}, result), "no cameras");
 }
 
@@ -328,8 +265,7 @@ TEST (Calibration, cameras_that_make_up_no_view_are_refused)
   auto cameras = cameras_of (stereo_pair ());
   EXPECT_TRUE (check_cameras (cameras, {}).ok ());
   cameras[1].height = 360;
-  EXPECT_ERROR (
-      check_cameras (cameras, {}), "camera 1 (view 0, right) is 640x360; expected the size");
+  EXPECT_ERROR (check_cameras (cameras, {}), "camera 1 (view 0, right) is 640x360; use the size");
   cameras[1].role = CameraRole::kLeft;
   EXPECT_ERROR (
       check_cameras (cameras, {}), "camera 0 and camera 1 are both the left camera of view 0");
@@ -338,7 +274,7 @@ TEST (Calibration, cameras_that_make_up_no_view_are_refused)
   cameras[1].role = CameraRole::kThird;
   EXPECT_ERROR (check_cameras (cameras, {}), "its view has no left camera");
   cameras[1].view_id = 64;
-  EXPECT_ERROR (check_cameras (cameras, {}), "expected a view from 0 to 63");
+  EXPECT_ERROR (check_cameras (cameras, {}), "use a view from 0 to 63");
 }
 
 TEST (Calibration, board_that_looks_the_same_upside_down_is_for_one_camera)
@@ -352,21 +288,13 @@ TEST (Calibration, board_that_looks_the_same_upside_down_is_for_one_camera)
   EXPECT_TRUE (check_cameras (cameras, board).ok ());
 }
 
-TEST (Calibration, corners_that_fit_no_camera_are_an_error)
+TEST (Calibration, cameras_of_different_sizes_need_videoscale)
 {
-  const auto truth = ring (1, 0);
-  auto frames = frames_for (truth, {{0}}, 10);
-  std::mt19937 random (3);
-  std::uniform_real_distribution<double> x (0, 640), y (0, 480);
-  for (CalibrationFrame &frame : frames)
-    for (BoardCorner &corner : frame.sightings[0].corners)
-      corner = {corner.id, x (random), y (random)};
-  CalibrationResult result;
-  EXPECT_FALSE (calibrate_rig (cameras_of (truth), frames, {}, result).ok ());
-  for (CalibrationFrame &frame : frames) /* all in one point */
-    for (BoardCorner &corner : frame.sightings[0].corners)
-      corner = {corner.id, 100, 100};
-  EXPECT_FALSE (calibrate_rig (cameras_of (truth), frames, {}, result).ok ());
+  auto cameras = cameras_of (stereo_pair ());
+  cameras[1].width = 1280;
+  EXPECT_ERROR (check_cameras (cameras, {}),
+      "camera 1 (view 0, right) is 1280x480; use the size of camera 0 (view 0, left), 640x480: add "
+      "videoscale before the pad");
 }
 
 /* ---- the world ---- */
@@ -382,19 +310,6 @@ TEST (CalibrationWorld, lies_where_the_cameras_look_with_y_up_and_the_first_view
     EXPECT_LT (angle_between (truth[i].world_from_camera, found), 0.2);
     EXPECT_LT (norm (truth[i].world_from_camera.translation - found.translation), 0.005);
   }
-}
-
-TEST (CalibrationWorld, first_view_looks_along_minus_z_from_the_origin)
-{
-  const auto truth = ring (2, 30);
-  CalibrationSettings settings;
-  settings.world = WorldFrame::kFirstView;
-  CalibrationResult result;
-  ASSERT_TRUE (
-      calibrate_rig (cameras_of (truth), frames_for (truth, {{0, 1}}, 15), settings, result).ok ());
-  const Pose &first = result.rig.views[0].world_from_view;
-  EXPECT_LT (norm (first.translation), 1e-9);
-  EXPECT_LT (angle_between (first, {{1, 0, 0, 0, -1, 0, 0, 0, -1}, {}}), 1e-6);
 }
 
 TEST (CalibrationWorld, board_on_the_floor_is_the_xz_plane_below_the_cameras)

@@ -79,53 +79,6 @@ enum { L, UL, U, UR, F, I };
 
 } // namespace
 
-TEST (NeighbourCode, threshold_0_is_lossless)
-{
-  const Rig rig = ring_rig (2);
-  std::vector<Picture> pictures;
-  pictures.emplace_back (0, Roi{10, 20, 151, 133}, 1, 20);
-  pictures.emplace_back (1, Roi{0, 0, 320, 240}, 2, 1);
-  AccessUnitDecoder decoder;
-  ASSERT_TRUE (decoder.set_rig (rig).ok ());
-  Decoded decoded = decode (decoder, encode (rig, pictures, lossless ()));
-  ASSERT_EQ (decoded.pictures.size (), 2u);
-  EXPECT_TRUE (same (pictures[0], decoded.pictures[0]));
-  EXPECT_TRUE (same (pictures[1], decoded.pictures[1]));
-  EXPECT_EQ (decoded.result.bad_slices, 0u);
-  EXPECT_EQ (decoded.result.missing_pixels, 0u);
-}
-
-TEST (NeighbourCode, differences_stay_within_thresholds_and_quantisation)
-{
-  const Rig rig = ring_rig (1);
-  const EncoderSettings settings = {10, 6, 3, 2, 1200, Profile::kPlain};
-  std::vector<Picture> pictures;
-  pictures.emplace_back (0, Roi{0, 0, 320, 240}, 3, 8);
-  AccessUnitDecoder decoder;
-  ASSERT_TRUE (decoder.set_rig (rig).ok ());
-  Decoded decoded = decode (decoder, encode (rig, pictures, settings));
-  DepthQuantiser depth;
-  ASSERT_TRUE (depth.set (rig.views[0], 10).ok ());
-  const double most_depth = (settings.depth_threshold + 0.5) * depth.step () + 1;
-  const double most_colour = (settings.colour_threshold + 0.5) * 255 / 63 + 1;
-  int replaced = 0;
-  for (int y = 0; y < 240; y++)
-    for (int x = 0; x < 320; x++) {
-      const int a = pictures[0].depth.view ().at (x, y),
-                b = decoded.pictures[0].depth.view ().at (x, y);
-      ASSERT_EQ (a == 0, b == 0);
-      ASSERT_LE (std::abs (a - b), most_depth);
-      if (a == 0)
-        continue;
-      const Rgbx p = pictures[0].colour.view ().at (x, y),
-                 q = decoded.pictures[0].colour.view ().at (x, y);
-      ASSERT_LE (std::abs (p.r - q.r), most_colour);
-      ASSERT_LE (std::abs (p.b - q.b), most_colour);
-      replaced += std::abs (a - b) > depth.step ();
-    }
-  EXPECT_GT (replaced, 1000);
-}
-
 TEST (NeighbourCode, decoded_frame_set_codes_to_itself_again)
 {
   const Rig rig = ring_rig (1);
@@ -192,65 +145,6 @@ TEST (NeighbourCode, depth_beyond_near_and_far_is_invalid)
       (std::vector<int>{I, F, F, I}));
 }
 
-TEST (NeighbourCode, no_slice_exceeds_its_maximum)
-{
-  const Rig rig = ring_rig (1);
-  for (int limit : {256, 300, 1200, 65535}) {
-    EncoderSettings settings = lossless ();
-    settings.max_slice_size = limit;
-    std::vector<Picture> pictures;
-    pictures.emplace_back (0, Roi{3, 5, 317, 200}, 4, 50);
-    const auto bytes = encode (rig, pictures, settings);
-    for (const auto &unit : units_of (bytes))
-      EXPECT_LE (unit.size (), static_cast<std::size_t> (limit));
-    AccessUnitDecoder decoder;
-    ASSERT_TRUE (decoder.set_rig (rig).ok ());
-    Decoded decoded = decode (decoder, bytes);
-    EXPECT_TRUE (same (pictures[0], decoded.pictures[0])) << limit;
-  }
-}
-
-TEST (NeighbourCode, slice_survives_loss_of_all_others)
-{
-  const Rig rig = ring_rig (1);
-  std::vector<Picture> pictures;
-  pictures.emplace_back (0, Roi{0, 0, 320, 240}, 4, 5);
-  const auto units = units_of (encode (rig, pictures, lossless ()));
-  ASSERT_GT (units.size (), 10u);
-  AccessUnitDecoder decoder;
-  ASSERT_TRUE (decoder.set_rig (rig).ok ());
-  for (const auto &unit : units) {
-    SliceHeader header;
-    ASSERT_TRUE (read_slice_header (unit, header).ok ());
-    Decoded decoded = decode (decoder, unit);
-    ASSERT_EQ (decoded.result.slices, 1u);
-    const int pixels = header.rows * header.columns;
-    EXPECT_EQ (decoded.result.missing_pixels, static_cast<std::uint64_t> (320 * 240 - pixels));
-    for (int y = 0; y < 240; y++)
-      for (int x = 0; x < 320; x++) {
-        const bool inside = y >= header.first_row && y < header.first_row + header.rows &&
-                            x >= header.first_column && x < header.first_column + header.columns;
-        ASSERT_EQ (decoded.pictures[0].depth.view ().at (x, y),
-            inside ? pictures[0].depth.view ().at (x, y) : 0);
-      }
-  }
-}
-
-TEST (NeighbourCode, empty_roi_is_one_small_slice)
-{
-  const Rig rig = ring_rig (1);
-  std::vector<Picture> pictures;
-  pictures.emplace_back (0, Roi{});
-  const auto bytes = encode (rig, pictures, {});
-  EXPECT_EQ (bytes.size (), kSliceHeaderSize);
-  AccessUnitDecoder decoder;
-  ASSERT_TRUE (decoder.set_rig (rig).ok ());
-  const Decoded decoded = decode (decoder, bytes);
-  ASSERT_EQ (decoded.pictures.size (), 1u);
-  EXPECT_TRUE (decoded.pictures[0].roi.empty ());
-  EXPECT_EQ (decoded.result.slices, 1u);
-}
-
 TEST (NeighbourCode, header_carries_frame_number_capture_time_and_roi)
 {
   const Rig rig = ring_rig (3);
@@ -264,22 +158,6 @@ TEST (NeighbourCode, header_carries_frame_number_capture_time_and_roi)
   EXPECT_EQ (header.capture_time_ns, 77u);
   EXPECT_EQ (header.roi, (Roi{11, 22, 33, 44}));
   EXPECT_TRUE (header.key);
-}
-
-TEST (NeighbourCode, encoder_and_decoder_count_the_same)
-{
-  const Rig rig = ring_rig (1);
-  std::vector<Picture> pictures;
-  pictures.emplace_back (0, Roi{0, 0, 200, 150});
-  EncoderResult coded;
-  const auto bytes = encode (rig, pictures, {}, &coded);
-  AccessUnitDecoder decoder;
-  ASSERT_TRUE (decoder.set_rig (rig).ok ());
-  const Decoded decoded = decode (decoder, bytes);
-  EXPECT_EQ (decoded.result.points, coded.points);
-  EXPECT_EQ (decoded.result.slices, coded.slices);
-  EXPECT_EQ (decoded.result.raw_bits, coded.raw_bits);
-  EXPECT_LT (bytes.size () * 8, coded.raw_bits);
 }
 
 TEST (NeighbourCode, bad_settings_and_rois_are_refused)

@@ -96,30 +96,6 @@ TEST (Axis, follows_a_tilted_body_and_points_up)
   EXPECT_NEAR (axis.position.x, 0.02, 0.01);
 }
 
-TEST (Axis, is_vertical_for_round_bodies_and_where_a_camera_would_look_along_it)
-{
-  const Rig rig = ring_rig (4);
-  for (const Vec3 radii : {Vec3{0.1, 0.1, 0.1}, Vec3{0.2, 0.09, 0.08}}) {
-    Frame frame (rig, ellipsoid ({0, 0, 0}, radii));
-    EXPECT_EQ (filter_once (frame, rig).axis.direction.y, 1);
-  }
-}
-
-TEST (Axis, follows_motion_within_three_frames_and_hardly_noise)
-{
-  AxisTracker tracker;
-  tracker.follow ({{0, 0, 0}, {0, 1, 0}});
-  const double little = 0.1 * M_PI / 180, far = 20 * M_PI / 180;
-  const Axis &axis = tracker.follow ({{0.0002, 0, 0}, {std::sin (little), std::cos (little), 0}});
-  EXPECT_LT (axis.position.x, 0.00006);
-  EXPECT_LT (axis.direction.x, little / 10);
-  const Axis there{{0.1, 0, 0}, {std::sin (far), std::cos (far), 0}};
-  for (int frame = 0; frame < 3; frame++)
-    tracker.follow (there);
-  EXPECT_LT (norm (axis.position - there.position), 0.01);
-  EXPECT_GT (dot (axis.direction, there.direction), std::cos (2.5 * M_PI / 180));
-}
-
 TEST (Decision, the_camera_that_looks_squarely_at_a_patch_keeps_it)
 {
   const Rig rig = rig_of ({ring_view (3, 50), ring_view (8, 0), ring_view (9, -50)});
@@ -130,46 +106,6 @@ TEST (Decision, the_camera_that_looks_squarely_at_a_patch_keeps_it)
   EXPECT_EQ (frame.points (1), squarely);
   /* At the patch's very edge another view's points may lie in a cell that it has to itself. */
   EXPECT_LT (frame.points (0) + frame.points (2), squarely / 10);
-}
-
-TEST (Decision, holds_across_the_seam_at_phi_0)
-{
-  /* phi = 0 lies on +x: the camera at 90 degrees looks at it squarely. */
-  const Rig rig = rig_of ({ring_view (0, 40), ring_view (1, 90)});
-  Frame frame (rig, patch (90, {0.1, 0, 0}));
-  const std::size_t squarely = frame.points (1);
-  filter_once (frame, rig, about_world_axis ());
-  EXPECT_EQ (frame.points (1), squarely);
-  EXPECT_LT (frame.points (0), squarely / 20);
-}
-
-TEST (Decision, of_two_equal_views_the_first_keeps_all_and_the_second_its_outline)
-{
-  const Rig rig = rig_of ({ring_view (5, 0), ring_view (2, 0)});
-  Frame frame (rig, kBust);
-  const std::size_t first = frame.points (0);
-  const CylinderResult result = filter_once (frame, rig);
-  EXPECT_EQ (frame.points (0), first);
-  EXPECT_LT (frame.points (1), first / 10);
-  EXPECT_EQ (result.points_in, 2 * first);
-  EXPECT_EQ (result.cells.cells, result.cells.shared);
-}
-
-TEST (Decision, a_view_with_one_point_in_a_cell_competes)
-{
-  const Rig rig = rig_of ({ring_view (0, 0), ring_view (1, 60)});
-  Frame frame (rig, patch (0));
-  const std::size_t squarely = frame.points (0);
-  auto depth = frame.depth[1].view ();
-  int left = 0;
-  for (int v = 0; v < depth.height; v++)
-    for (int u = 0; u < depth.width; u++)
-      if (depth.at (u, v) && !(v == 120 && left++ == 5))
-        depth.at (u, v) = 0;
-  ASSERT_EQ (frame.points (1), 1u);
-  filter_once (frame, rig, about_world_axis ());
-  EXPECT_EQ (frame.points (1), 0u);
-  EXPECT_EQ (frame.points (0), squarely);
 }
 
 TEST (Decision, a_camera_from_above_does_not_win_a_wall)
@@ -239,31 +175,6 @@ TEST (Coverage, what_lies_a_little_behind_the_winners_surface_is_another_surface
   }
 }
 
-/* A ribbon that one camera sees from the front at a slant and the other from behind. */
-TEST (Coverage, the_other_side_of_a_thin_thing_is_another_surface)
-{
-  const Rig rig = rig_of ({ring_view (0, 0), ring_view (1, 60)});
-  Frame frame (rig, patch (110, {0, 0, 0.05}));
-  ASSERT_GT (frame.points (0), 100u);
-  const CylinderResult result = filter_once (frame, rig, about_world_axis ());
-  EXPECT_EQ (result.points_out, result.points_in);
-}
-
-TEST (Coverage, a_wider_overlap_keeps_more)
-{
-  const Rig rig = ring_rig (4);
-  std::size_t before = 0;
-  for (const double overlap : {0.0, 1.0, 3.0, 6.0}) {
-    Frame frame (rig, kBust);
-    CylinderSettings settings;
-    settings.overlap = overlap;
-    const CylinderResult result = filter_once (frame, rig, settings);
-    EXPECT_GT (result.points_out, before) << overlap;
-    EXPECT_LT (result.points_out, result.points_in) << overlap;
-    before = result.points_out;
-  }
-}
-
 TEST (Filter, what_is_left_of_each_view_is_its_own_quarter)
 {
   const Rig rig = ring_rig (4);
@@ -319,7 +230,6 @@ TEST (Filter, one_thread_and_many_give_the_same_over_several_frames)
     settings.threads = 5;
     const CylinderResult b = run (many, second, settings);
     EXPECT_TRUE (first == second);
-    EXPECT_EQ (a.clusters, 2);
     EXPECT_EQ (a.cells.changed, b.cells.changed);
   }
 }
@@ -389,84 +299,6 @@ TEST (Steady, fewer_than_one_cell_in_a_hundred_changes_and_the_axis_stands_while
     before = now.axis;
   }
   EXPECT_LT (changed, 0.01);
-}
-
-TEST (Steady, a_surface_that_turns_changes_its_view_within_three_frames)
-{
-  const Rig rig = rig_of ({ring_view (0, 0), ring_view (1, 50)});
-  CylinderFilter filter;
-  ASSERT_TRUE (filter.set_rig (rig).ok ());
-  for (int i = 0; i < 8; i++) {
-    Frame frame (rig, patch (i < 5 ? 0 : 50));
-    run (filter, frame, about_world_axis ());
-    if (i < 5) {
-      EXPECT_LT (frame.points (1), frame.points (0) / 20);
-    } else if (i == 7) {
-      EXPECT_LT (frame.points (0), frame.points (1) / 3); /* the patch's rim */
-    }
-  }
-}
-
-TEST (Steady, the_last_winner_has_a_bonus_until_it_is_forgotten)
-{
-  const Rig rig = rig_of ({ring_view (0, 0), ring_view (1, 50)});
-  const CylinderSettings same = about_world_axis ();
-  CylinderSettings higher = same, more = same, vertical = same;
-  higher.slice_height_m = 0.005;
-  more.columns = 400;
-  vertical.axis = AxisMode::kVertical;
-  const CylinderSettings then[] = {same, higher, more, vertical, same, same};
-  for (int i = 0; i < 6; i++) {
-    CylinderFilter filter;
-    ASSERT_TRUE (filter.set_rig (rig).ok ());
-    Frame first (rig, patch (0)), second (rig, patch (30));
-    run (filter, first, same);
-    if (i == 4)
-      filter.reset ();
-    if (i == 5) {
-      ASSERT_TRUE (filter.set_rig (rig).ok ());
-    }
-    const CylinderResult result = run (filter, second, then[i]);
-    /* cos 30 = 0.87 against cos 20 = 0.94. */
-    EXPECT_EQ (second.points (0) > second.points (1), i == 0) << i;
-    EXPECT_EQ (result.cells.held > 0, i == 0) << i;
-  }
-}
-
-TEST (Clusters, those_that_stand_apart_get_a_cylinder_each_and_stray_points_none)
-{
-  const Rig rig = ring_rig (4);
-  for (const int clusters : {1, 4}) {
-    CylinderSettings settings;
-    settings.max_clusters = clusters;
-    Frame frame (rig, kTwo);
-    const CylinderResult result = filter_once (frame, rig, settings);
-    EXPECT_EQ (result.clusters, clusters == 1 ? 1 : 2);
-    EXPECT_EQ (std::abs (result.axis.position.x) > 0.1, clusters > 1);
-  }
-  Frame frame (rig, kBust);
-  std::mt19937 random (1);
-  for (auto &image : frame.depth)
-    for (int i = 0; i < 100; i++)
-      image.view ().at (int (random () % kWidth), int (random () % kHeight)) =
-          static_cast<std::uint16_t> (3000 + random () % 12000);
-  EXPECT_EQ (filter_once (frame, rig).clusters, 1);
-}
-
-TEST (Clusters, winners_do_not_change_when_another_one_comes_and_goes)
-{
-  const Rig rig = ring_rig (4);
-  CylinderFilter filter;
-  ASSERT_TRUE (filter.set_rig (rig).ok ());
-  for (int i = 0; i < 6; i++) {
-    Frame frame (rig, i == 2 || i == 3 ? kTwo : ellipsoid ({-0.15, 0, 0}, {0.07, 0.2, 0.08}));
-    const CylinderResult result = run (filter, frame);
-    EXPECT_EQ (result.clusters, i == 2 || i == 3 ? 2 : 1);
-    if (i > 0) { /* not more than what one hides of the other */
-      EXPECT_GT (result.cells.held, i == 2 ? 9000u : 17000u) << i;
-      EXPECT_LT (result.cells.changed, result.cells.cells / 8) << i;
-    }
-  }
 }
 
 /* ---- degenerate and hostile input: nothing is NaN or out of bounds, points only disappear ---- */
@@ -557,7 +389,6 @@ TEST (Degenerate, settings_at_their_ends_and_random_depths_of_64_views)
       CylinderSettings settings;
       settings.columns = columns;
       settings.slice_height_m = height_m;
-      settings.max_clusters = kMaxClusters;
       settings.overlap = kMaxOverlap;
       expect_sane (
           small_rig (64, 20, 15), [] (int i, int u, int v) { return u * 40503 + v * 30011 + i; },
@@ -606,27 +437,6 @@ TEST (Degenerate, as_many_layers_as_points_in_cells_that_all_views_share)
   const CylinderResult result = filter_once (frame, rig, settings);
   EXPECT_EQ (result.points_in, 16u * 640 * 480);
   EXPECT_LE (result.points_out, result.points_in);
-}
-
-TEST (Degenerate, the_rig_and_all_settings_may_change_between_frames)
-{
-  CylinderFilter filter;
-  for (const int views : {4, 1, 33, 2, 64, 3}) {
-    Rig rig;
-    for (int i = 0; i < views; i++)
-      rig.views.push_back (ring_view (i, 360.0 * i / views, 0.8, 40 + views, 30));
-    ASSERT_TRUE (filter.set_rig (rig).ok ());
-    for (const int columns : {360, 90, 721}) {
-      Frame frame (rig, ellipsoid ({0, 0, 0}, {0.09, 0.2, 0.11}));
-      CylinderSettings settings;
-      settings.columns = columns;
-      settings.slice_height_m = 1.0 / columns;
-      settings.max_clusters = 1 + views % 8;
-      const CylinderResult result = run (filter, frame, settings);
-      const bool some_went = result.points_out < result.points_in;
-      EXPECT_TRUE (some_went || views < 30); /* few that coarse see no place twice */
-    }
-  }
 }
 
 /* Wherever memory ends, that is a status; and the next frame finds nothing half done. */

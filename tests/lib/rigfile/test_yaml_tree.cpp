@@ -96,24 +96,6 @@ TEST (YamlTree, json_has_tabs_escapes_and_no_spaces)
   EXPECT_EQ (root["g"].type, YamlNode::Type::kList);
 }
 
-TEST (YamlTree, words_that_read_like_numbers_are_texts)
-{
-  const YamlNode root = tree (
-      kHead + "a: [ inf, nan, 0x10, 1_000, 1e, -, +-1, 1.2.3, ., .Inf, -.Inf, .NaN, 12:30 ]\n");
-  for (const YamlNode &item : root["a"].items)
-    EXPECT_EQ (item.type, YamlNode::Type::kText) << item.text;
-  EXPECT_TRUE (std::isinf (*tree (kHead + "a: 1e999\n")["a"].number ()));
-  EXPECT_FALSE (tree (kHead + "a: 99999999999\n")["a"].integer ());
-}
-
-TEST (YamlTree, byte_order_mark_windows_lines_comments_and_an_end_pass)
-{
-  const YamlNode root = tree ("\xef\xbb\xbf%YAML:1.0\r\n# of ours\r\n\r\n--- # begins\r\n\r\n"
-                              "a: 1\r\nb:\r\n   - 2\r\n...\r\n# that was it\r\n");
-  EXPECT_EQ (root["b"].items.at (0).integer (), 2);
-  EXPECT_EQ (tree ("%YAML 1.1\n---\na: 1\n")["a"].integer (), 1);
-}
-
 TEST (YamlTree, other_formats_are_refused)
 {
   for (const char *text :

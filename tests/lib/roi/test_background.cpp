@@ -22,10 +22,10 @@ struct Frame {
   Image<std::uint16_t> depth{kWidth, kHeight};
   Image<Rgbx> colour{kWidth, kHeight};
 
-  explicit Frame (unsigned seed, double brightness = 1)
+  explicit Frame (unsigned seed, double brightness = 1, double depth_noise = 40)
   {
     std::mt19937 random (seed);
-    std::normal_distribution<double> grey (0, 2), range (0, 40);
+    std::normal_distribution<double> grey (0, 2), range (0, depth_noise);
     for (int y = 0; y < kHeight; y++)
       for (int x = 0; x < kWidth; x++) {
         depth.view ().at (x, y) = static_cast<std::uint16_t> (20000 + range (random));
@@ -56,12 +56,12 @@ struct Frame {
 };
 
 BackgroundModel
-learnt_wall ()
+learnt_wall (double depth_noise = 40)
 {
   BackgroundModel model;
   model.reset (kWidth, kHeight);
   for (unsigned i = 0; i < 20; i++)
-    EXPECT_TRUE (model.learn (Frame (i).image ()).ok ());
+    EXPECT_TRUE (model.learn (Frame (i, 1, depth_noise).image ()).ok ());
   model.finish ();
   return model;
 }
@@ -97,13 +97,6 @@ TEST (Background, mean_and_spread_are_those_of_the_samples)
   EXPECT_FLOAT_EQ (pixel.depth_share, 0.75);
 }
 
-TEST (Background, empty_scene_leaves_nothing)
-{
-  Frame frame (99);
-  segment (frame);
-  EXPECT_EQ (frame.valid (), 0);
-}
-
 TEST (Background, nearer_thing_of_the_same_colour_stays)
 {
   Frame frame (99);
@@ -113,17 +106,90 @@ TEST (Background, nearer_thing_of_the_same_colour_stays)
   EXPECT_EQ (frame.valid (), 400);
 }
 
-TEST (Background, other_colour_at_the_same_depth_stays_and_depth_alone_loses_it)
+TEST (Background, other_colour_at_the_walls_depth_stays_beside_what_is_nearer_and_alone_is_the_wall)
 {
-  Frame frame (99), depth_only (99);
-  for (Frame *f : {&frame, &depth_only})
-    f->put (20, 10, 20, 20, 20000, {190, 90, 80, 0});
-  segment (frame);
-  EXPECT_EQ (frame.valid (20, 10, 20, 20), 400);
-  SegmentationSettings settings;
-  settings.cue = Cue::kDepth;
-  segment (depth_only, settings);
-  EXPECT_EQ (depth_only.valid (), 0);
+  for (const int fringe : {9, 0}) {
+    Frame frame (99);
+    frame.put (0, 0, 10, 48, 19740, {190, 90, 80, 0});
+    frame.put (10, 10, 6, 20, 20000, {190, 90, 80, 0});  /* a foot */
+    frame.put (40, 10, 20, 20, 20000, {190, 90, 80, 0}); /* a screen */
+    SegmentationSettings settings;
+    settings.fringe = fringe;
+    segment (frame, settings);
+    EXPECT_EQ (frame.valid (0, 0, 16, 48), 10 * 48 + 6 * 20) << fringe;
+    EXPECT_EQ (frame.valid (40, 0, 24, 48), 0) << fringe;
+  }
+}
+
+TEST (Background, colour_decides_where_noise_is_larger_than_the_distance_from_the_wall)
+{
+  for (const std::uint16_t z : {std::uint16_t{17000}, std::uint16_t{20000}}) {
+    Frame frame (99, 1, 1200);
+    std::mt19937 random (7);
+    std::normal_distribution<double> noise (z, 1200);
+    for (int y = 10; y < 40; y++)
+      for (int x = 15; x < 50; x++)
+        frame.put (x, y, 1, 1, std::uint16_t (noise (random)), {190, 90, 80, 0});
+    Segmenter segmenter;
+    SegmentationSettings settings;
+    settings.min_area = settings.fill = 0; /* islands in space: that noise is larger than 30 mm */
+    ASSERT_TRUE (segmenter.decide (frame.image (), learnt_wall (1200), 1e-4, settings).ok ());
+    const int found = cv::countNonZero (segmenter.mask () (cv::Rect (15, 10, 35, 30)));
+    if (z == 17000)
+      EXPECT_GT (found, 1000);
+    else
+      EXPECT_LT (found, 20);
+  }
+}
+
+namespace {
+
+/* The wall goes, for so long; another one is behind it. */
+BackgroundModel
+model_after_another_wall (double seconds, const SegmentationSettings &settings)
+{
+  BackgroundModel model = learnt_wall ();
+  Segmenter segmenter;
+  std::mt19937 random (5);
+  const auto show = [&] (double time_s, bool behind) {
+    Frame frame (unsigned (100 + 10 * time_s));
+    if (behind)
+      frame.put (0, 0, kWidth, kHeight, 26000, {60, 80, 150, 0});
+    for (int i = 0; i < kWidth * kHeight / 3; i++) /* as stereo has it */
+      frame.depth.view ().at (int (random () % kWidth), int (random () % kHeight)) = kInvalidDepth;
+    RangeImage image = frame.image ();
+    image.capture_time_ns = std::uint64_t (1e9 + 1e9 * time_s);
+    EXPECT_TRUE (segmenter.decide (image, model, 1e-4, settings).ok ());
+    EXPECT_EQ (cv::countNonZero (segmenter.mask ()), 0) << time_s;
+    const cv::Mat &quiet = segmenter.quiet ();
+    model.adapt (image, {quiet.data, quiet.cols, quiet.rows, std::ptrdiff_t (quiet.step)},
+        segmenter.light (), 30);
+  };
+  for (double t = 0; t < seconds; t += 0.2)
+    show (t, true);
+  if (seconds < 3)
+    show (seconds, false);
+  return model;
+}
+
+} // namespace
+
+TEST (Background, what_is_behind_the_wall_is_background_and_learnt_after_three_seconds)
+{
+  for (const Cue cue : {Cue::kBoth, Cue::kDepth}) {
+    SegmentationSettings settings;
+    settings.cue = cue;
+    settings.follow_light = false;
+    const BackgroundModel early = model_after_another_wall (2.5, settings),
+                          late = model_after_another_wall (3.5, settings);
+    const BackgroundPixel &before = early.row (20)[30], &after = late.row (20)[30];
+    EXPECT_NEAR (before.depth, 20000, 60);
+    EXPECT_NEAR (before.mean[2], 110, 3);
+    EXPECT_NEAR (after.depth, 26000, 1);
+    EXPECT_NEAR (after.nearest, 26000, 1);
+    EXPECT_NEAR (after.mean[2], 150, 1);
+    EXPECT_LT (after.spread, 1);
+  }
 }
 
 TEST (Background, shadow_and_light_on_the_wall_are_background)
@@ -147,28 +213,6 @@ TEST (Background, much_darker_thing_is_no_shadow_unless_depth_says_all_around_th
   }
 }
 
-TEST (Background, dark_thing_beside_something_nearer_is_no_shadow)
-{
-  Frame frame (99);
-  frame.put (20, 10, 20, 20, 12000, {200, 60, 60, 0});
-  frame.put (40, 10, 8, 20, 20000, {20, 21, 18, 0}); /* stereo gives a rim the wall's depth */
-  segment (frame);
-  EXPECT_EQ (frame.valid (20, 10, 20, 20), 400);
-  EXPECT_EQ (frame.valid (40, 10, 8, 20), 160);
-}
-
-TEST (Background, what_a_nearer_surface_surrounds_belongs_to_it_and_gets_its_depth)
-{
-  Frame frame (99);
-  frame.put (10, 8, 40, 34, 12000, {200, 60, 60, 0});
-  frame.put (20, 15, 14, 14, kInvalidDepth, {70, 70, 65, 0}); /* dark cloth or deep shadow */
-  segment (frame);
-  EXPECT_EQ (frame.valid (), 40 * 34);
-  for (int y = 15; y < 29; y++)
-    for (int x = 20; x < 34; x++)
-      ASSERT_NEAR (frame.depth.view ().at (x, y), 12000, 240) << x << ", " << y;
-}
-
 TEST (Background, shadow_without_depth_beside_a_person_is_open_and_no_part_of_it)
 {
   Frame frame (99);
@@ -178,74 +222,6 @@ TEST (Background, shadow_without_depth_beside_a_person_is_open_and_no_part_of_it
   segment (frame);
   EXPECT_EQ (frame.valid (36, 0, 28, 48), 0);
   EXPECT_EQ (frame.valid (0, 0, 30, 48), 30 * 48);
-}
-
-/* Of 18 columns without depth beside a person. */
-TEST (Background, depth_goes_on_farther_where_the_hue_differs)
-{
-  for (const bool hue : {true, false}) {
-    Frame frame (99);
-    const Rgbx colour = hue ? Rgbx{200, 60, 60, 0} : Rgbx{220, 229, 201, 0};
-    frame.put (0, 0, 30, 48, 12000, colour);
-    frame.put (30, 10, 18, 28, kInvalidDepth, colour);
-    segment (frame);
-    EXPECT_EQ (frame.valid (30, 12, 3, 24), 3 * 24) << hue;
-    EXPECT_EQ (frame.valid (38, 12, 9, 24), hue ? 9 * 24 : 0) << hue;
-  }
-}
-
-TEST (Surroundings, equal_a_walk_from_each_block_in_eight_directions)
-{
-  constexpr int kReach = 24; /* pixels: 12 blocks */
-  cv::RNG random (4);
-  for (const cv::Size size : {cv::Size (1, 1), {6, 3}, {97, 61}, {160, 120}}) {
-    cv::Mat sides (size, CV_8U), inside;
-    for (int y = 0; y < size.height; y++)
-      for (int x = 0; x < size.width; x++)
-        sides.at<std::uint8_t> (y, x) = std::uint8_t (random.uniform (0, 30) > 1 ? 0
-                                                      : random.uniform (0, 4)    ? 2
-                                                                                 : 1);
-    const cv::Size blocks ((size.width + 1) / 2, (size.height + 1) / 2);
-    const auto block = [&] (int bx, int by) {
-      int sum = 0;
-      for (int i = 0; i < 4; i++) {
-        const int x = std::min (2 * bx + i % 2, size.width - 1),
-                  y = std::min (2 * by + i / 2, size.height - 1),
-                  side = sides.at<std::uint8_t> (y, x);
-        sum += (side == 2) - (side == 1);
-      }
-      return sum;
-    };
-    const auto is_inside = [&] (int bx, int by) {
-      int foreground = 0, background = 0;
-      for (int i = 0; i < 9; i++) {
-        const int dx = i % 3 - 1, dy = i / 3 - 1;
-        if (dx == 0 && dy == 0)
-          continue;
-        bool found = false;
-        for (int t = 1; t < kReach / 2 && !found; t++) {
-          const int x = bx + t * dx, y = by + t * dy;
-          const bool outside = x < 0 || y < 0 || x >= blocks.width || y >= blocks.height;
-          const int sum = outside ? 0 : block (x, y);
-          foreground += sum > 0;
-          background += sum < 0;
-          found = outside || sum != 0;
-        }
-        background += !found;
-      }
-      return foreground >= 4 && foreground >= 3 * background;
-    };
-    for (CpuLevel level : kCpuLevels) {
-      limit_cpu (level);
-      Surroundings surroundings;
-      surroundings.find_inside (sides, kReach, inside);
-      for (int y = 0; y < size.height; y++)
-        for (int x = 0; x < size.width; x++)
-          ASSERT_EQ (inside.at<std::uint8_t> (y, x) != 0,
-              sides.at<std::uint8_t> (y, x) == 0 && is_inside (x / 2, y / 2))
-              << size << " at " << x << ", " << y;
-    }
-  }
 }
 
 TEST (Surroundings, hole_in_a_thing_is_inside_and_a_corner_beside_it_is_not)
@@ -271,41 +247,6 @@ TEST (Surroundings, hole_in_a_thing_is_inside_and_a_corner_beside_it_is_not)
   EXPECT_EQ (inside.at<std::uint8_t> (36, 34), 0) << "a corner";
 }
 
-TEST (Surroundings, reach_and_picture_edge_end_what_is_seen)
-{
-  for (const auto [reach, in] : {std::pair{40, 255}, std::pair{8, 0}}) {
-    cv::Mat sides (40, 40, CV_8U, cv::Scalar (int (Side::kForeground))), inside;
-    sides (cv::Rect (6, 6, 28, 28)) = int (Side::kUnknown);
-    Surroundings ().find_inside (sides, reach, inside);
-    EXPECT_EQ (inside.at<std::uint8_t> (20, 20), in) << reach;
-  }
-  for (const cv::Size size : {cv::Size (1, 1), cv::Size (1, 7), cv::Size (7, 1)})
-    for (const Side side : {Side::kUnknown, Side::kForeground}) {
-      cv::Mat sides (size, CV_8U, cv::Scalar (int (side))), inside;
-      Surroundings ().find_inside (sides, 255, inside);
-      EXPECT_EQ (cv::countNonZero (inside), 0);
-    }
-}
-
-TEST (Background, depth_of_a_burnt_out_wall_is_that_of_the_wall_around_it)
-{
-  BackgroundModel model;
-  model.reset (kWidth, kHeight);
-  for (unsigned i = 0; i < 20; i++) {
-    Frame frame (i);
-    frame.put (20, 10, 20, 20, kInvalidDepth, {255, 255, 255, 0});
-    EXPECT_TRUE (model.learn (frame.image ()).ok ());
-  }
-  model.finish ();
-  EXPECT_NEAR (model.inferred_depth (20)[30], 20000, 100);
-  EXPECT_EQ (model.inferred_depth (5)[5], 0); /* it has depth of its own */
-  Frame shaded (99);
-  shaded.put (20, 10, 20, 20, 20000, {60, 60, 60, 0}); /* a shadow falls there: stereo finds it */
-  Segmenter segmenter;
-  ASSERT_TRUE (segmenter.clear_background (shaded.image (), model, 1e-4, {}).ok ());
-  EXPECT_EQ (shaded.valid (), 0);
-}
-
 TEST (Background, small_island_goes_and_small_hole_closes)
 {
   Frame frame (99);
@@ -329,16 +270,6 @@ TEST (Background, small_island_in_space_goes_although_it_touches_the_person_in_t
   EXPECT_EQ (frame.valid (40, 10, 5, 5), 0);
   EXPECT_EQ (frame.valid (40, 20, 5, 5), 25);
   EXPECT_EQ (frame.valid (20, 10, 20, 20), 400);
-}
-
-TEST (Background, closing_a_hole_makes_no_depth)
-{
-  Frame frame (99);
-  frame.put (20, 10, 30, 30, 12000, {200, 60, 60, 0});
-  frame.put (30, 20, 4, 4, kInvalidDepth, {120, 125, 110, 0});
-  segment (frame);
-  EXPECT_EQ (frame.valid (30, 20, 4, 4), 0);
-  EXPECT_EQ (frame.valid (), 900 - 16);
 }
 
 TEST (Background, roi_is_compared_with_its_own_part_of_the_background)
@@ -434,26 +365,6 @@ TEST (Background, image_that_is_damaged_or_cut_is_refused)
     EXPECT_TRUE (status.message ().starts_with (files.image)) << status.message ();
     EXPECT_TRUE (files.loaded.empty ());
   }
-}
-
-TEST (Background, wall_that_wavers_between_two_depths_does_not_hide_what_is_before_both)
-{
-  BackgroundModel model;
-  model.reset (kWidth, kHeight);
-  for (unsigned i = 0; i < 20; i++) {
-    Frame frame (i);
-    if (i % 2) /* as stereo does at the edge of a cupboard */
-      for (int y = 5; y < 35; y++)
-        for (int x = 15; x < 45; x++)
-          frame.depth.view ().at (x, y) = 12000;
-    ASSERT_TRUE (model.learn (frame.image ()).ok ());
-  }
-  model.finish ();
-  Frame frame (99);
-  frame.put (20, 10, 20, 20, 8000, {120, 125, 110, 0});
-  Segmenter segmenter;
-  ASSERT_TRUE (segmenter.clear_background (frame.image (), model, 1e-4, {}).ok ());
-  EXPECT_EQ (frame.valid (), 400);
 }
 
 TEST (Background, only_as_many_of_the_largest_islands_stay_as_asked_for)

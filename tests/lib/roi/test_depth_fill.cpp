@@ -60,15 +60,6 @@ TEST (DepthFill, slanted_surface_goes_on_as_it_slopes)
       EXPECT_NEAR (frame.at (x, y), Frame::plane (x, y, 20, -10), 16) << x << " " << y;
 }
 
-TEST (DepthFill, reaches_no_farther_than_asked_and_0_does_nothing)
-{
-  Frame frame;
-  frame.clear (30, 0, kWidth, kHeight);
-  EXPECT_EQ (frame.fill (0), 0);
-  EXPECT_EQ (frame.fill (3), 3 * kHeight);
-  EXPECT_EQ (frame.at (33, 20), kInvalidDepth);
-}
-
 TEST (DepthFill, what_is_not_allowed_stays_without_depth)
 {
   Frame frame;
@@ -111,21 +102,4 @@ TEST (DepthFill, no_depth_between_two_surfaces_comes_up)
   frame.fill (9);
   for (int x = 20; x < 28; x++)
     EXPECT_TRUE (frame.at (x, 20) == 8000 || frame.at (x, 20) == 10000) << frame.at (x, 20);
-}
-
-TEST (DepthFill, small_hole_closes_on_its_surface_and_known_depth_stays)
-{
-  Frame frame (10, 15);
-  frame.clear (20, 20, 25, 24);
-  EXPECT_EQ (frame.fill (4), 20);
-  for (int y = 0; y < kHeight; y++)
-    for (int x = 0; x < kWidth; x++)
-      EXPECT_NEAR (frame.at (x, y), Frame::plane (x, y, 10, 15), 8);
-}
-
-TEST (DepthFill, picture_without_any_depth_stays_empty)
-{
-  Frame frame;
-  frame.clear (0, 0, kWidth, kHeight);
-  EXPECT_EQ (frame.fill (1000), 0);
 }

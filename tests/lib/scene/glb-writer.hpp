@@ -145,8 +145,6 @@ public:
     return file;
   }
 
-  [[nodiscard]] const std::string &binary () const { return binary_; }
-
 private:
   static void append (std::string &list, const std::string &item)
   {

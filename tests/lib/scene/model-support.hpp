@@ -18,8 +18,8 @@ namespace rangecast::testing {
 class Folder {
 public:
   Folder ()
-      : path_ (
-            std::filesystem::path (::testing::TempDir ()) / ("model-" + std::to_string (getpid ())))
+      : path_ (std::filesystem::path (::testing::TempDir ()) /
+               ("model-" + std::to_string (getpid ()) + "-" + std::to_string (count_++)))
   {
     std::filesystem::create_directories (path_);
   }
@@ -36,6 +36,7 @@ public:
   }
 
 private:
+  static inline int count_ = 0;
   std::filesystem::path path_;
 };
 

@@ -76,15 +76,6 @@ TEST (Matching, depth_is_focal_length_times_baseline_over_disparity)
   EXPECT_EQ (stereo.match (output.image ()).code (), StatusCode::kBadSize);
 }
 
-TEST (Rectification, ideal_pair_stays_as_it_is)
-{
-  Rectifier rectifier;
-  ASSERT_TRUE (rectifier.set (ideal_pair ()).ok ());
-  EXPECT_TRUE (rectifier.is_identity ());
-  EXPECT_DOUBLE_EQ (rectifier.baseline_m (), 0.1);
-  EXPECT_TRUE (rectifier.range_view ().is_range_view ());
-}
-
 TEST (Rectification, turned_pair_gets_rows_that_agree_and_a_pose_that_fits)
 {
   View view = ideal_pair ();

@@ -4,8 +4,8 @@
 
 #include <cmath>
 #include <rangecast/surface/orbit.hpp>
-#include <rangecast/surface/scene_fit.hpp>
 #include <rangecast/surface/scene_hull.hpp>
+#include <rangecast/surface/view_fit.hpp>
 #include <rangecast/surface/view_tint.hpp>
 
 using namespace rangecast;
@@ -62,16 +62,6 @@ TEST (Eyes, disparity_is_that_of_two_parallel_cameras_less_that_of_the_convergen
     }
 }
 
-TEST (Eyes, both_eyes_see_a_point_at_one_height)
-{
-  const SceneFrame scene = scene_frame (one_camera ());
-  const Clip left =
-      clip (orbit_matrices (scene, {}, 1, true, {-0.1, 0}).clip_from_world, {0.1, 0.2, 0.5});
-  const Clip right =
-      clip (orbit_matrices (scene, {}, 1, true, {0.1, 0}).clip_from_world, {0.1, 0.2, 0.5});
-  EXPECT_NEAR (left.y / left.w, right.y / right.w, 1e-6);
-}
-
 TEST (Planes, all_of_the_hull_is_between_them_and_they_are_close_round_it)
 {
   const SceneFrame scene = scene_frame (one_camera ());
@@ -100,46 +90,6 @@ TEST (Planes, near_one_stays_before_the_eye_when_points_are_behind_it)
   const Vec3 all_behind[] = {{0, 0, -1}};
   const Mat4 fallback = orbit_matrices (scene, {}, 1, true, {}, all_behind).clip_from_world;
   EXPECT_EQ (fallback, orbit_matrices (scene, {}, 1, true).clip_from_world);
-}
-
-TEST (Planes, hull_holds_every_valid_point_of_the_roi)
-{
-  const Rig rig = one_camera ();
-  std::vector<std::uint16_t> depth (20 * 10, 0);
-  std::vector<Rgbx> colour (20 * 10);
-  depth[0] = 0xffff;
-  depth[57] = 4321;
-  depth[199] = 1;
-  const ConstRangeImage image{
-      0, {100, 50, 20, 10}, {depth.data (), 20, 10, 40}, {colour.data (), 20, 10, 80}, 0};
-  const DepthSpan span = depth_span (image.depth);
-  EXPECT_EQ (span.nearest, 1);
-  EXPECT_EQ (span.farthest, 0xffff);
-  std::vector<Vec3> hull;
-  append_hull (image, rig.views[0], hull);
-  ASSERT_EQ (hull.size (), 8u);
-  double least = 1e9, most = 0;
-  for (const Vec3 &p : hull) {
-    least = std::min (least, p.z);
-    most = std::max (most, p.z);
-  }
-  EXPECT_NEAR (least, 1e-4, 1e-9);
-  EXPECT_NEAR (most, 6.5535, 1e-6);
-  std::fill (depth.begin (), depth.end (), 0);
-  hull.clear ();
-  append_hull (image, rig.views[0], hull);
-  EXPECT_TRUE (hull.empty ());
-}
-
-TEST (PicturePart, whole_picture_goes_into_its_part)
-{
-  const Mat4 m = orbit_matrices (scene_frame (one_camera ()), {}, 1, true).clip_from_world;
-  const Mat4 right_half = in_part (m, {0.5, 1, 0.5, 0});
-  const Vec3 p{0.1, -0.2, 0.9};
-  const Clip whole = clip (m, p), part = clip (right_half, p);
-  EXPECT_NEAR (part.x / part.w, 0.5 + 0.5 * whole.x / whole.w, 1e-6);
-  EXPECT_NEAR (part.y / part.w, whole.y / whole.w, 1e-6);
-  EXPECT_EQ (part.z, whole.z);
 }
 
 TEST (ViewTint, hue_is_the_colours_and_brightness_follows_the_picture)
@@ -210,12 +160,6 @@ TEST (Fit, points_touch_the_margins_from_any_side)
         }
 }
 
-TEST (Fit, target_is_in_the_middle_of_the_depth)
-{
-  const SceneFrame fitted = fitted_frame (scene_frame (one_camera ()), {}, 1, slab ());
-  EXPECT_NEAR (fitted.target.z, 0.7 + (0.008 * 39 + 0.002 * 39) / 2, 0.005);
-}
-
 TEST (Fit, one_in_a_thousand_is_noise)
 {
   const SceneFrame scene = scene_frame (one_camera ());
@@ -235,19 +179,4 @@ TEST (Fit, nothing_and_a_single_point_leave_a_view)
   const SceneFrame fitted = fitted_frame (scene, {}, 1, one);
   EXPECT_NEAR (norm (fitted.target - one[0]), 0, 1e-6);
   EXPECT_GT (fitted.distance_m, 0);
-}
-
-TEST (Fit, a_tenth_is_about_the_same)
-{
-  SceneFrame a, b;
-  a.distance_m = 1;
-  b.distance_m = 1.09;
-  EXPECT_TRUE (is_similar (a, b, 45));
-  b.distance_m = 1.11;
-  EXPECT_FALSE (is_similar (a, b, 45));
-  b = a;
-  b.target.x = 0.07; /* the picture is 0.83 m high there */
-  EXPECT_TRUE (is_similar (a, b, 45));
-  b.target.x = 0.1;
-  EXPECT_FALSE (is_similar (a, b, 45));
 }

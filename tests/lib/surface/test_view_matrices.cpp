@@ -8,7 +8,7 @@
 #include <rangecast/surface/reduced_view.hpp>
 #include <rangecast/surface/scene_hull.hpp>
 #include <rangecast/surface/strips.hpp>
-#include <rangecast/surface/view_matrices.hpp>
+#include <rangecast/surface/orbit.hpp>
 #include <set>
 #include <vector>
 
@@ -88,16 +88,6 @@ TEST (ViewMatrices, pixel_goes_where_its_point_goes)
   EXPECT_NEAR (found.y, expected.y, 1e-4);
   EXPECT_NEAR (found.z, expected.z, 1e-4);
   EXPECT_NEAR (found.w, expected.w, 1e-4);
-}
-
-TEST (ViewMatrices, viewer_stands_where_all_rays_meet)
-{
-  const Mat4 m = picture_of (camera ()).clip_from_world;
-  const Vec3 eye = viewer_position (m);
-  const Clip at = clip (m, eye.x, eye.y, eye.z, 1);
-  EXPECT_NEAR (at.x, 0, 1e-5);
-  EXPECT_NEAR (at.y, 0, 1e-5);
-  EXPECT_NEAR (at.w, 0, 1e-5);
 }
 
 TEST (ViewMatrices, shifted_depth_is_that_of_a_point_so_much_farther)
@@ -192,20 +182,6 @@ TEST (ReducedView, every_second_pixel_stays_where_it_was)
                  b = view.intrinsics.unproject (30 + 2 * x, 20 + 2 * y, depth);
       ASSERT_NEAR (norm (a - b), 0, 1e-9);
     }
-}
-
-TEST (ReducedView, odd_sizes_keep_their_last_row_and_column)
-{
-  const View view = camera ();
-  const Patch patch;
-  ConstRangeImage image = patch.image ();
-  image.roi.width = image.depth.width = image.colour.width = 19;
-  image.roi.height = image.depth.height = image.colour.height = 1;
-  ReducedView memory;
-  const SurfaceView reduced = memory.reduce ({image, &view});
-  EXPECT_EQ (reduced.image.depth.width, 10);
-  EXPECT_EQ (reduced.image.depth.height, 1);
-  EXPECT_EQ (reduced.image.depth.at (9, 0), image.depth.at (18, 0));
 }
 
 TEST (BlendVertices, carry_their_pixel_and_reach_no_farther_than_asked)

@@ -2,8 +2,6 @@
 #include "byte_stream.hpp"
 
 #include <algorithm>
-#include <cstring>
-#include <utility>
 
 namespace rangecast {
 namespace {
@@ -14,17 +12,22 @@ using Bytes = std::span<const std::uint8_t>;
 constexpr std::size_t kBlock = 65536;
 /* Bisection ends and linear search begins when so few bytes are left. */
 constexpr std::uint64_t kWalkBytes = 4 * kBlock;
-/* Rigs come once a second: linear search begins so much earlier that it finds one. */
-constexpr std::uint64_t kRigWindow_ns = 2'000'000'000;
+/* Linear search begins so much earlier, where a key access unit should be. */
+constexpr std::uint64_t kKeyWindow_ns = 2'000'000'000;
+
+/* Of an access-unit unit: version and type. */
+constexpr auto kFirstByte =
+    std::uint8_t (kBitstreamVersion << 4 | static_cast<int> (UnitType::kAccessUnit));
 
 /* Longer files than kWalkFile are sampled for takes at so many places. */
 constexpr std::uint64_t kTakeSamples = 64;
 
 enum class End { kSound, kDamaged, kOpen };
 
-/* How far the sizes of units lead through an access unit whose declared end is `declared`. */
+/* How far the sizes of units lead through an access unit whose declared end is `declared`. Another
+ * access unit does not belong to it. */
 struct Extent {
-  std::size_t end = kStreamPrefixSize;
+  std::size_t end = kAccessUnitHeaderSize;
   End state = End::kSound;
 };
 
@@ -36,8 +39,11 @@ follow_units (Bytes bytes, std::size_t declared)
     const std::size_t left = bytes.size () - std::min (bytes.size (), extent.end);
     const std::size_t rest = declared - extent.end;
     UnitHeader unit;
+    AccessUnitHeader next;
     if (left < kUnitHeaderSize && rest >= kUnitHeaderSize)
       return {extent.end, End::kOpen};
+    if (begins_access_unit (bytes.subspan (extent.end), next))
+      return {extent.end, End::kDamaged};
     const Status status =
         read_unit_header (bytes.subspan (extent.end, std::min (left, rest)), unit);
     const bool truncated = status.code () == StatusCode::kTruncated;
@@ -55,19 +61,28 @@ follow_units (Bytes bytes, std::size_t declared)
 std::size_t
 find_access_unit (Bytes bytes, std::size_t from, std::size_t limit, bool or_candidate)
 {
-  const auto first = bytes.begin ();
-  auto at = first + std::ptrdiff_t (std::min (from, bytes.size ()));
-  while (true) {
-    at = std::search (at, bytes.end (), kStartCode.begin (), kStartCode.end ());
-    const auto position = std::size_t (at - first);
-    if (at == bytes.end () || position >= limit)
-      return limit;
+  const Bytes searched = bytes.first (std::min (limit, bytes.size ()));
+  for (std::size_t at = from; at < searched.size (); at++) {
+    const Bytes rest = searched.subspan (at);
+    at += std::size_t (std::ranges::find (rest, kFirstByte) - rest.begin ());
+    const std::size_t left = bytes.size () - at;
     AccessUnitHeader header;
-    const Bytes rest = bytes.subspan (position);
-    if (begins_access_unit (rest, header) || (or_candidate && rest.size () < kStreamPrefixSize))
-      return position;
-    ++at;
+    if (at < searched.size () && ((or_candidate && left < kAccessUnitHeaderSize) ||
+                                     begins_access_unit (bytes.subspan (at), header)))
+      return at;
   }
+  return limit;
+}
+
+/* Whether less than an access-unit unit is left, which can be told from its size and magic. */
+bool
+is_truncated_header (Bytes bytes)
+{
+  std::uint8_t sample[kAccessUnitHeaderSize];
+  write_access_unit_header ({}, sample);
+  constexpr std::size_t begin = 2, end = 8; /* size and magic */
+  return bytes.size () >= end && bytes.size () < sizeof sample && bytes[0] == sample[0] &&
+         std::equal (sample + begin, sample + end, bytes.begin () + begin);
 }
 
 } // namespace
@@ -75,10 +90,7 @@ find_access_unit (Bytes bytes, std::size_t from, std::size_t limit, bool or_cand
 bool
 begins_access_unit (Bytes bytes, AccessUnitHeader &header)
 {
-  return bytes.size () >= kStreamPrefixSize &&
-         std::memcmp (bytes.data (), kStartCode.data (), kStartCode.size ()) == 0 &&
-         read_access_unit_header (bytes.subspan (kStartCode.size (), kAccessUnitHeaderSize), header)
-             .ok ();
+  return !bytes.empty () && bytes[0] == kFirstByte && read_access_unit_header (bytes, header).ok ();
 }
 
 StreamPart
@@ -86,24 +98,20 @@ next_part (Bytes bytes, bool at_end)
 {
   StreamPart part;
   AccessUnitHeader header, next;
-  if (bytes.size () < kStreamPrefixSize && !at_end) {
-    part.wanted = kStreamPrefixSize;
+  if (bytes.size () < kAccessUnitHeaderSize && !at_end) {
+    part.wanted = kAccessUnitHeaderSize;
     return part;
   }
   if (bytes.empty ())
     return part;
   if (!begins_access_unit (bytes, header)) {
-    part.rubbish = find_access_unit (bytes, 1, bytes.size (), !at_end);
-    if (at_end && part.rubbish == bytes.size () && bytes.size () < kStreamPrefixSize &&
-        bytes.size () >= kStartCode.size () &&
-        std::equal (kStartCode.begin (), kStartCode.end (), bytes.begin ()))
-      part.expected = kStreamPrefixSize;
-    if (part.rubbish == bytes.size () && !at_end) /* they may end with a part of a start code */
-      part.rubbish -= std::min (bytes.size () - 1, kStartCode.size () - 1);
+    part.garbage = find_access_unit (bytes, 1, bytes.size (), !at_end);
+    if (at_end && part.garbage == bytes.size () && is_truncated_header (bytes))
+      part.expected = kAccessUnitHeaderSize;
     return part;
   }
   part.header = header;
-  const std::size_t declared = kStreamPrefixSize + header.size;
+  const std::size_t declared = kAccessUnitHeaderSize + header.size;
   const Extent extent = follow_units (bytes, declared);
   if (extent.state == End::kOpen && !at_end) {
     part.wanted = std::min (declared, std::max (2 * bytes.size (), kBlock));
@@ -111,13 +119,13 @@ next_part (Bytes bytes, bool at_end)
   }
   const std::size_t limit =
       extent.state == End::kOpen ? std::min (bytes.size (), declared) : extent.end;
-  const std::size_t inner = find_access_unit (bytes, kStreamPrefixSize, limit, false);
-  /* A start code inside, though all sizes agree: bytes before it were lost, or it is chance. The
-   * bytes after the declared end decide. */
+  const std::size_t inner = find_access_unit (bytes, kAccessUnitHeaderSize, limit, false);
+  /* One begins inside a unit, though all sizes agree: bytes before it were lost, or it is chance.
+   * The bytes after the declared end decide. */
   if (extent.state != End::kSound || inner == limit)
     part.length = inner;
-  else if (bytes.size () < declared + kStreamPrefixSize && !at_end)
-    part.wanted = declared + kStreamPrefixSize;
+  else if (bytes.size () < declared + kAccessUnitHeaderSize && !at_end)
+    part.wanted = declared + kAccessUnitHeaderSize;
   else if (begins_access_unit (bytes.subspan (declared), next) || bytes.size () == declared)
     part.length = declared;
   else
@@ -141,21 +149,12 @@ TakeList::time_of (std::uint64_t offset, std::uint64_t pts_ns) const
   return take.time_ns + (pts_ns - std::min (pts_ns, take.pts_ns));
 }
 
-/* Also compared with the one before the last, because the time of the last may be damaged. Rigs
- * begin takes: with one, the same time is early enough, as that of a take after two access units.
- */
+/* Also compared with the one before the last, because the time of the last may be damaged. */
 bool
 TakeList::goes_back (const AccessUnitPlace &unit) const
 {
   const std::uint64_t pts = unit.header.pts_ns;
-  return (pts < last_ && pts < before_) || (unit.has_rig && pts <= last_ && pts <= before_);
-}
-
-void
-TakeList::shift_from (std::size_t index, std::uint64_t by_ns)
-{
-  for (; index < takes_.size (); index++)
-    takes_[index].time_ns += by_ns; /* modulo 2^64: may be negative */
+  return unit.has_rig && pts <= last_ && pts <= before_;
 }
 
 void
@@ -163,28 +162,15 @@ TakeList::insert (const AccessUnitPlace &unit, std::uint64_t frame_ns)
 {
   const Take &old = takes_[current_];
   const Take take = {unit.offset, unit.header.pts_ns, last_time_ns_ + frame_ns};
-  shift_ns_ = take.time_ns - (old.time_ns + (take.pts_ns - old.pts_ns));
-  previous_ = current_;
-  replaced_.reset ();
+  const std::uint64_t shift_ns = take.time_ns - (old.time_ns + (take.pts_ns - old.pts_ns));
   if (takes_.size () < kMaxTakes) {
     takes_.insert (takes_.begin () + std::ptrdiff_t (++current_), take);
   } else {
     current_ = std::max<std::size_t> (current_, 1);
-    replaced_ = std::exchange (takes_[current_], take);
+    takes_[current_] = take;
   }
-  shift_from (current_ + 1, shift_ns_);
-}
-
-void
-TakeList::remove_damaged ()
-{
-  shift_from (current_ + 1, 0 - shift_ns_);
-  if (replaced_)
-    takes_[current_] = *replaced_;
-  else
-    takes_.erase (takes_.begin () + std::ptrdiff_t (current_));
-  current_ = previous_;
-  last_ = before_;
+  for (std::size_t later = current_ + 1; later < takes_.size (); later++)
+    takes_[later].time_ns += shift_ns; /* modulo 2^64: may be negative */
 }
 
 void
@@ -201,11 +187,6 @@ TakeList::add (const AccessUnitPlace &unit, std::uint64_t frame_ns)
   const std::uint64_t pts = unit.header.pts_ns;
   if (takes_.empty ())
     takes_.push_back ({unit.offset, pts, resumes_ ? last_time_ns_ + frame_ns : 0});
-  /* Two frames after the one before the damaged one; the second one of a take after two access
-   * units may be a little later than that one, too. */
-  const bool continues_old = pts > before_ && pts - before_ > frame_ns;
-  if (std::exchange (is_new_, false) && current_ != kNone && continues_old)
-    remove_damaged ();
   bool begins_take = false;
   const std::size_t known = index_at (unit.offset);
   if (known != current_) {
@@ -215,7 +196,6 @@ TakeList::add (const AccessUnitPlace &unit, std::uint64_t frame_ns)
     before_ = is_first ? UINT64_MAX : 0; /* all times are earlier, or none */
   } else {
     begins_take = goes_back (unit);
-    is_new_ = begins_take && pts < last_;
     if (begins_take)
       insert (unit, frame_ns);
     before_ = last_;
@@ -229,12 +209,12 @@ std::optional<AccessUnitPlace>
 StreamFile::at (std::uint64_t offset)
 {
   AccessUnitPlace place{offset, {}, false};
-  read_ (offset, kStreamPrefixSize + kUnitHeaderSize, block_);
+  read_ (offset, kAccessUnitHeaderSize + kUnitHeaderSize, block_);
   if (!begins_access_unit (block_, place.header))
     return {};
   UnitHeader unit;
   (void)read_unit_header (
-      Bytes (block_).subspan (kStreamPrefixSize), unit); /* kTruncated, but the type is read */
+      Bytes (block_).subspan (kAccessUnitHeaderSize), unit); /* kTruncated, but the type is read */
   place.has_rig = unit.type == static_cast<std::uint8_t> (UnitType::kRigView);
   return place;
 }
@@ -246,7 +226,7 @@ StreamFile::next (std::uint64_t from, std::uint64_t limit)
   if (const auto place = at (from); place && from < limit)
     return place;
   for (; from < limit; from += kBlock) {
-    read_ (from, kBlock + kStreamPrefixSize - 1, block_);
+    read_ (from, kBlock + kAccessUnitHeaderSize - 1, block_);
     const std::size_t position = find_access_unit (block_, 0, kBlock, false);
     if (position < kBlock && from + position < limit)
       return at (from + position);
@@ -257,22 +237,22 @@ StreamFile::next (std::uint64_t from, std::uint64_t limit)
 std::optional<AccessUnitPlace>
 StreamFile::following (const AccessUnitPlace &place)
 {
-  const std::uint64_t end = place.offset + kStreamPrefixSize + place.header.size;
+  const std::uint64_t end = place.offset + kAccessUnitHeaderSize + place.header.size;
   if (end == size_)
     return {};
   if (const auto next_place = at (end))
     return next_place;
   return next (
-      place.offset + kStreamPrefixSize, size_); /* its size was damaged, or rubbish comes */
+      place.offset + kAccessUnitHeaderSize, size_); /* its size was damaged, or garbage comes */
 }
 
 std::optional<AccessUnitPlace>
 StreamFile::last ()
 {
-  const std::uint64_t furthest = kMaxAccessUnitSize + 2 * kStreamPrefixSize;
+  const std::uint64_t furthest = kMaxAccessUnitSize + 2 * kAccessUnitHeaderSize;
   for (std::uint64_t end = size_; end > 0 && size_ - end < furthest;) {
     const std::uint64_t begin = end - std::min<std::uint64_t> (end, kBlock);
-    read_ (begin, kBlock + kStreamPrefixSize - 1, block_);
+    read_ (begin, kBlock + kAccessUnitHeaderSize - 1, block_);
     const std::size_t none = block_.size ();
     std::size_t found = none;
     for (std::size_t p = 0; (p = find_access_unit (block_, p, none, false)) < none; p++)
@@ -304,13 +284,10 @@ StreamFile::Target
 StreamFile::walk (std::uint64_t from, std::uint64_t pts_ns)
 {
   Target target;
-  std::optional<AccessUnitPlace> rig;
   for (auto place = next (from, size_); place; place = following (*place)) {
     const AccessUnitHeader &header = place->header;
     if (header.pts_ns == kNoTime)
       return target;
-    if (place->has_rig && header.pts_ns <= pts_ns)
-      rig = place;
     if (!header.key)
       continue;
     if (header.pts_ns >= pts_ns)
@@ -318,7 +295,6 @@ StreamFile::walk (std::uint64_t from, std::uint64_t pts_ns)
     if (header.pts_ns > pts_ns)
       break;
     target.before = place;
-    target.rig = rig;
     if (header.pts_ns == pts_ns)
       break;
   }
@@ -329,7 +305,7 @@ StreamFile::Target
 StreamFile::locate (std::uint64_t pts_ns)
 {
   constexpr std::uint64_t all = UINT64_MAX;
-  for (std::uint64_t window_ns = kRigWindow_ns;; window_ns = std::min (window_ns, all / 4) * 4) {
+  for (std::uint64_t window_ns = kKeyWindow_ns;; window_ns = std::min (window_ns, all / 4) * 4) {
     const std::uint64_t from = bisect (pts_ns - std::min (pts_ns, window_ns));
     const Target target = walk (from, pts_ns);
     if (target.before || from == 0 || window_ns > all / 4)
@@ -355,18 +331,16 @@ StreamFile::last_not_before (const AccessUnitPlace &from, const AccessUnitPlace 
   return low;
 }
 
-/* Adds access units from `place` to the first one at `to` or later, and the one after that, which
- * shows whether its time is damaged. */
+/* Adds access units from `place` to the first one at `to` or later. */
 void
 StreamFile::walk_takes (
     AccessUnitPlace place, std::uint64_t to, std::uint64_t frame_ns, TakeList &list)
 {
-  for (int beyond = 0; beyond < 2;) {
+  while (true) {
     if (place.header.pts_ns != kNoTime)
       list.add (place, frame_ns);
-    beyond += place.offset >= to;
     const auto following_place = following (place);
-    if (!following_place)
+    if (place.offset >= to || !following_place)
       return;
     place = *following_place;
   }

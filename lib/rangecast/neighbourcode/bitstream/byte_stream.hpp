@@ -12,8 +12,6 @@
 
 namespace rangecast {
 
-/** Bytes before the units of an access unit: its start code and its access-unit unit. */
-inline constexpr std::size_t kStreamPrefixSize = kStartCode.size () + kAccessUnitHeaderSize;
 /** Presentation time of an access unit that has none. */
 inline constexpr std::uint64_t kNoTime = UINT64_MAX;
 /** Takes that a list holds. */
@@ -21,13 +19,13 @@ inline constexpr std::size_t kMaxTakes = 4096;
 /** Files up to this size, bytes, are searched for takes access unit by access unit. */
 inline constexpr std::uint64_t kWalkFile = 8 << 20;
 
-/** Whether `bytes` begins with a start code and a sound access-unit unit. */
+/** Whether `bytes` begins with a sound access-unit unit. */
 bool begins_access_unit (std::span<const std::uint8_t> bytes, AccessUnitHeader &header);
 
 /** The beginning of some bytes of the stream: one of the three sizes is not 0. */
 struct StreamPart {
-  std::size_t rubbish = 0; ///< bytes before the place where an access unit may begin next
-  std::size_t length = 0;  ///< bytes of the access unit, prefix included
+  std::size_t garbage = 0; ///< bytes before the place where an access unit may begin next
+  std::size_t length = 0;  ///< bytes of the access unit, access-unit unit included
   std::size_t wanted = 0;  ///< bytes needed, from the same beginning, to call next_part() again
   AccessUnitHeader header; ///< of the access unit
   /** Bytes that the last part should have from the same beginning, if the stream ends within an
@@ -35,17 +33,17 @@ struct StreamPart {
   std::size_t expected = 0;
 };
 
-/** Separates access units from rubbish. An access unit has the size that its header declares if the
- *  sizes of its units agree with that; start codes inside it are ignored then. Otherwise it ends at
- *  the next start code or, if there is none, after the last readable unit, so that a damaged size
- *  does not make the reader wait for megabytes. `wanted` doubles, which keeps the work for an
- * access unit that arrives in small parts linear.
+/** Separates access units from garbage. An access unit has the size that its header declares if the
+ *  sizes of its units agree with that; what looks like another one inside a unit is ignored then.
+ *  Otherwise it ends at the next one or, if there is none, after the last readable unit, so that a
+ *  damaged size does not make the reader wait for megabytes. `wanted` doubles, which keeps the work
+ *  for an access unit that arrives in small parts linear.
  *  @param at_end  no more bytes will follow; `wanted` is then always 0 */
 StreamPart next_part (std::span<const std::uint8_t> bytes, bool at_end);
 
 /** An access unit in a file. */
 struct AccessUnitPlace {
-  std::uint64_t offset = 0; ///< bytes, of its start code
+  std::uint64_t offset = 0; ///< bytes, of its access-unit unit
   AccessUnitHeader header;
   bool has_rig = false; ///< rig views precede its slices
 };
@@ -57,10 +55,9 @@ struct Take {
   std::uint64_t time_ns = 0; ///< of that one, on the time line of the whole stream
 };
 
-/** The time line of a byte stream, on which each take follows the one before it. Where times go
- *  back, or one is repeated with a rig, a take begins. One damaged time begins none: the access
- * unit after it continues the old take. Of more than kMaxTakes takes, a new one replaces the one
- * before: that one's times are then unknown, but not those of the first takes. */
+/** The time line of a byte stream, on which each take follows the one before it. A take begins at a
+ *  rig whose time is not later than the two before it. Of more than kMaxTakes takes, a new one
+ *  replaces the one before: that one's times are then unknown, but not those of the first takes. */
 class TakeList {
 public:
   struct Time {
@@ -87,18 +84,12 @@ private:
 
   [[nodiscard]] bool goes_back (const AccessUnitPlace &unit) const;
   void insert (const AccessUnitPlace &unit, std::uint64_t frame_ns);
-  void remove_damaged ();
-  void shift_from (std::size_t index, std::uint64_t by_ns);
 
   std::vector<Take> takes_;        /* by offset */
   std::size_t current_ = kNone;    /* take of the last access unit */
   std::uint64_t last_ = 0;         /* presentation times of the last access unit */
   std::uint64_t before_ = 0;       /* and of the one before it */
   std::uint64_t last_time_ns_ = 0; /* of the last access unit */
-  bool is_new_ = false;            /* the last access unit has gone back, maybe by damage */
-  std::uint64_t shift_ns_ = 0;     /* of the later takes, by that one */
-  std::size_t previous_ = 0;       /* take before that one */
-  std::optional<Take> replaced_;   /* by that one */
   bool resumes_ = false;           /* another byte stream came before */
 };
 
@@ -123,7 +114,6 @@ public:
   struct Target {
     std::optional<AccessUnitPlace> before; ///< the last key one not later than the time
     std::optional<AccessUnitPlace> after;  ///< the first key one not earlier than the time
-    std::optional<AccessUnitPlace> rig;    ///< the last one with a rig up to `before`
   };
   /** Key access units around a presentation time, by bisection; nothing if they have no times. */
   Target locate (std::uint64_t pts_ns);

@@ -12,9 +12,6 @@ typedef std::int32_t Components __attribute__ ((vector_size (16)));
 typedef float FloatComponents __attribute__ ((vector_size (16)));
 inline constexpr int kComponents = 4;
 
-/** The depth of an invalid pixel: farther than any threshold from every valid one. */
-inline constexpr std::int32_t kNoDepthCode = -(1 << 24);
-
 inline bool
 is_zero (Components c)
 {

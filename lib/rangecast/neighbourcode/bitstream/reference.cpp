@@ -23,28 +23,12 @@ ReferencePlane::begin (const SliceHeader &header)
   written_.assign (held_ ? height : 0, 0);
 }
 
-/* All profiles but plain use the same codes. */
-bool
-ReferencePlane::has_same_codes (const SliceHeader &header) const
-{
-  return header.depth_bits == header_.depth_bits && header.inverse_depth == header_.inverse_depth &&
-         header.colour_bits == header_.colour_bits &&
-         (header.profile == Profile::kPlain) == (header_.profile == Profile::kPlain);
-}
-
 bool
 ReferencePlane::serves (const SliceHeader &header) const
 {
   return held_ && !header.key &&
          header.frame_number - header.reference_distance == header_.frame_number &&
-         has_same_codes (header);
-}
-
-bool
-ReferencePlane::is_of (const SliceHeader &header) const
-{
-  return held_ && header.frame_number == header_.frame_number && header.roi == header_.roi &&
-         has_same_codes (header);
+         header.depth_bits == header_.depth_bits && header.colour_bits == header_.colour_bits;
 }
 
 void
@@ -95,15 +79,13 @@ ReferencePlane::clear (const SliceHeader &slice)
 void
 ReferencePair::begin (const SliceHeader &header)
 {
-  /* Later frame sets do not refer to one that arrives late. When an encoder restarts, its numbers
-   * jump by more than that. */
+  /* Later frame sets do not refer to one that arrives late or again. When an encoder restarts, its
+   * numbers jump by more than that. */
   constexpr std::uint32_t kOld = 255;
-  const std::uint32_t age = now ().held () ? now ().frame_number () - header.frame_number : 0;
-  keeps_ = age == 0 || age > kOld;
-  if (!keeps_ || now ().is_of (header))
+  keeps_ = !now ().held () || now ().frame_number () - header.frame_number > kOld;
+  if (!keeps_)
     return;
-  if (age != 0 || !now ().held ())
-    now_ = 1 - now_;
+  now_ = 1 - now_;
   planes_[now_].begin (header);
 }
 

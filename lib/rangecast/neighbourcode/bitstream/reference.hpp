@@ -28,8 +28,6 @@ public:
   [[nodiscard]] std::uint32_t frame_number () const { return header_.frame_number; }
   /** It holds the frame set that such a slice refers to, with the same meaning of pixels. */
   [[nodiscard]] bool serves (const SliceHeader &header) const;
-  /** It holds the frame set of such a slice. */
-  [[nodiscard]] bool is_of (const SliceHeader &header) const;
 
   /** Stores pixels of a row from column x on. Threads may write different pixels concurrently. */
   void keep (int x, int y, std::span<const std::uint64_t> pixels);
@@ -68,7 +66,6 @@ private:
     return pixels_.get () +
            static_cast<std::size_t> (line) * static_cast<std::size_t> (header_.roi.width);
   }
-  [[nodiscard]] bool has_same_codes (const SliceHeader &header) const;
 
   bool held_ = false;
   SliceHeader header_;
@@ -81,7 +78,7 @@ private:
 /** The last frame set of a view and the one that is being coded or decoded. */
 class ReferencePair {
 public:
-  /** Begins a frame set, or continues it if the number is the same. An older one is not kept. */
+  /** Begins a frame set. One that is not newer than the latest is not kept. */
   void begin (const SliceHeader &header);
   void reset ();
 

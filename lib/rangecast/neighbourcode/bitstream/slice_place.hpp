@@ -9,13 +9,6 @@
 
 namespace rangecast {
 
-inline bool
-same_place (const SliceHeader &a, const SliceHeader &b)
-{
-  return a.first_row == b.first_row && a.rows == b.rows && a.first_column == b.first_column &&
-         a.columns == b.columns;
-}
-
 inline Roi
 place_of (const SliceHeader &h)
 {

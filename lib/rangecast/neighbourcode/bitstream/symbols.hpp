@@ -11,7 +11,7 @@
 
 namespace rangecast {
 
-/** One symbol a pixel; 3 bits in profile plain. 7 is reserved. */
+/** One symbol a pixel; 3 bits in profile plain. 6 and 7 are reserved. */
 enum Symbol : std::uint8_t {
   kLeft = 0, ///< equals the pixel to the left
   kUpperLeft = 1,
@@ -19,7 +19,6 @@ enum Symbol : std::uint8_t {
   kUpperRight = 3,
   kFull = 4,    ///< written in full
   kInvalid = 5, ///< has no depth
-  kEarlier = 6, ///< equals the same pixel of an earlier frame set
 };
 inline constexpr int kSymbolBits = 3;
 
@@ -103,36 +102,6 @@ public:
 
 private:
   std::span<const std::uint8_t> bytes_;
-};
-
-/** Reads numbers of up to 40 bits; beyond the end it returns zeros and sets exhausted(). */
-class BitReader {
-public:
-  BitReader (const std::uint8_t *from, std::size_t bytes) : from_ (from), end_ (from + bytes) {}
-  std::uint64_t get (int bits)
-  {
-    while (count_ < bits) {
-      if (from_ == end_) {
-        exhausted_ = true;
-        return 0;
-      }
-      held_ |= static_cast<std::uint64_t> (*from_++) << count_;
-      count_ += 8;
-    }
-    const std::uint64_t value = held_ & ((std::uint64_t{1} << bits) - 1);
-    held_ >>= bits;
-    count_ -= bits;
-    return value;
-  }
-  [[nodiscard]] bool exhausted () const { return exhausted_; }
-  /** All is read up to the zero bits that fill the last byte. */
-  [[nodiscard]] bool at_clean_end () const { return from_ == end_ && count_ < 8 && held_ == 0; }
-
-private:
-  const std::uint8_t *from_, *end_;
-  std::uint64_t held_ = 0;
-  int count_ = 0;
-  bool exhausted_ = false;
 };
 
 } // namespace rangecast

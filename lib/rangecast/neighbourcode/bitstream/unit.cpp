@@ -6,8 +6,10 @@
 namespace rangecast {
 namespace {
 
-constexpr std::uint8_t kKeyFlag = 1, kInverseDepthFlag = 2, kReferenceFlag = 4;
+constexpr std::uint8_t kKeyFlag = 1, kReferenceFlag = 4;
 constexpr std::size_t kRigViewHeaderSize = kUnitHeaderSize + 10;
+/* Follows the unit header of access-unit units, so that readers find them in damaged streams. */
+constexpr std::array<std::uint8_t, 4> kMagic = {0x00, 0x52, 0x43, 0x55};
 
 template <typename T>
 T
@@ -74,8 +76,9 @@ read_unit_header (std::span<const std::uint8_t> bytes, UnitHeader &header)
   header.flags = bytes[1];
   header.size = get<std::uint16_t> (&bytes[2]);
   if (header.version != kBitstreamVersion)
-    return {StatusCode::kUnsupported, "unit: version " + std::to_string (header.version) +
-                                          ", expected " + std::to_string (kBitstreamVersion)};
+    return {StatusCode::kUnsupported, "bitstream version " + std::to_string (header.version) +
+                                          " is not supported, only version " +
+                                          std::to_string (kBitstreamVersion)};
   if (header.size < kUnitHeaderSize)
     return {StatusCode::kBadData, "unit: its size is less than its header"};
   if (header.size > bytes.size ())
@@ -86,14 +89,13 @@ read_unit_header (std::span<const std::uint8_t> bytes, UnitHeader &header)
 Status
 read_slice_header (std::span<const std::uint8_t> unit, SliceHeader &h)
 {
-  if (Status s = expect_type (unit, UnitType::kSlice, kSliceHeaderSize, "slice",
-          kKeyFlag | kInverseDepthFlag | kReferenceFlag);
+  if (Status s = expect_type (
+          unit, UnitType::kSlice, kSliceHeaderSize, "slice", kKeyFlag | kReferenceFlag);
       !s.ok ())
     return s;
   const std::uint8_t *p = unit.data ();
   h.key = p[1] & kKeyFlag;
   h.reference = p[1] & kReferenceFlag;
-  h.inverse_depth = p[1] & kInverseDepthFlag;
   h.view_id = p[4];
   h.profile = Profile{p[5]};
   h.depth_bits = p[6];
@@ -111,6 +113,8 @@ read_slice_header (std::span<const std::uint8_t> unit, SliceHeader &h)
   if (h.view_id >= kMaxViews || h.depth_bits < 6 || h.depth_bits > 16 || h.colour_bits < 4 ||
       h.colour_bits > 8)
     return {StatusCode::kBadData, "slice: view-id, depth bits or colour bits out of range"};
+  if (h.profile == Profile::kPlain && (!h.key || h.reference))
+    return {StatusCode::kBadData, "slice: profile plain has no references"};
   h.reference_distance = 0;
   if (!h.key) {
     if (get<std::uint16_t> (p + 2) <= kSliceHeaderSize || p[kSliceHeaderSize] == 0)
@@ -125,8 +129,7 @@ read_slice_header (std::span<const std::uint8_t> unit, SliceHeader &h)
 void
 write_slice_header (const SliceHeader &h, std::size_t unit_size, std::uint8_t *to)
 {
-  const int flags = (h.key ? kKeyFlag : 0) | (h.inverse_depth ? kInverseDepthFlag : 0) |
-                    (h.reference ? kReferenceFlag : 0);
+  const int flags = (h.key ? kKeyFlag : 0) | (h.reference ? kReferenceFlag : 0);
   put_unit_header (to, UnitType::kSlice, static_cast<std::uint8_t> (flags), unit_size);
   to[4] = h.view_id;
   to[5] = static_cast<std::uint8_t> (h.profile);
@@ -183,6 +186,8 @@ RigCollector::add (std::span<const std::uint8_t> unit)
   if (total < 1 || total > kMaxViews || index >= total || fps_n > INT32_MAX || fps_d < 1 ||
       fps_d > INT32_MAX)
     return {StatusCode::kBadData, "rig view: number, total or frame rate out of range"};
+  if (views_[index] && std::ranges::equal (unit, units_[index]))
+    return {};
   UnitHeader header;
   Rig one;
   if (Status s = read_unit_header (unit, header); !s.ok ())
@@ -200,6 +205,7 @@ RigCollector::add (std::span<const std::uint8_t> unit)
     fps_d_ = static_cast<int> (fps_d);
   }
   views_[index] = std::move (one.views[0]);
+  units_[index].assign (unit.begin (), unit.end ());
   return update_if_complete ();
 }
 
@@ -231,13 +237,18 @@ RigCollector::update_if_complete ()
 Status
 read_access_unit_header (std::span<const std::uint8_t> unit, AccessUnitHeader &h)
 {
+  if (unit.size () < kAccessUnitHeaderSize ||
+      !std::ranges::equal (unit.subspan (kUnitHeaderSize, kMagic.size ()), kMagic))
+    return {StatusCode::kBadData, "access unit: shorter than 28 bytes, or without its magic"};
   if (Status s = expect_type (unit, UnitType::kAccessUnit, kAccessUnitHeaderSize, "access unit");
       !s.ok ())
     return s;
+  if (get<std::uint16_t> (&unit[2]) != kAccessUnitHeaderSize)
+    return {StatusCode::kBadData, "access unit: not of 28 bytes"};
   h.key = unit[1] & kKeyFlag;
-  h.size = get<std::uint32_t> (&unit[4]);
-  h.pts_ns = get<std::uint64_t> (&unit[8]);
-  h.capture_time_ns = get<std::uint64_t> (&unit[16]);
+  h.size = get<std::uint32_t> (&unit[8]);
+  h.pts_ns = get<std::uint64_t> (&unit[12]);
+  h.capture_time_ns = get<std::uint64_t> (&unit[20]);
   if (h.size > kMaxAccessUnitSize)
     return {StatusCode::kBadData, "access unit: longer than 32 MiB"};
   return {};
@@ -247,9 +258,10 @@ void
 write_access_unit_header (const AccessUnitHeader &h, std::uint8_t *to)
 {
   put_unit_header (to, UnitType::kAccessUnit, h.key ? kKeyFlag : 0, kAccessUnitHeaderSize);
-  put (to + 4, h.size);
-  put (to + 8, h.pts_ns);
-  put (to + 16, h.capture_time_ns);
+  std::ranges::copy (kMagic, to + kUnitHeaderSize);
+  put (to + 8, h.size);
+  put (to + 12, h.pts_ns);
+  put (to + 20, h.capture_time_ns);
 }
 
 } // namespace rangecast

@@ -14,7 +14,7 @@
 
 namespace rangecast {
 
-inline constexpr int kBitstreamVersion = 3;
+inline constexpr int kBitstreamVersion = 4;
 inline constexpr std::size_t kUnitHeaderSize = 4;
 inline constexpr std::size_t kSliceHeaderSize = 36; ///< of key slices, with the unit header
 inline constexpr std::size_t kMaxUnitSize = 65535;
@@ -22,7 +22,7 @@ inline constexpr std::size_t kMaxUnitSize = 65535;
 enum class UnitType : std::uint8_t {
   kSlice = 1,      ///< some rows of one view's ROI
   kRigView = 2,    ///< one view of the rig
-  kAccessUnit = 3, ///< what follows is one access unit; only in byte streams
+  kAccessUnit = 3, ///< begins an access unit
 };
 
 /** The first bytes of every unit. Readers skip units of unknown types by their size. */
@@ -41,9 +41,8 @@ enum class Profile : std::uint8_t {
 
 /** The header of a slice. */
 struct SliceHeader {
-  bool key = true;            ///< decodes without any earlier frame set
-  bool inverse_depth = false; ///< depth codes are linear in 1 / depth
-  bool reference = false;     ///< later frame sets may refer to the pixels of this one
+  bool key = true;        ///< decodes without any earlier frame set
+  bool reference = false; ///< later frame sets may refer to the pixels of this one
   std::uint8_t view_id = 0;
   Profile profile = Profile::kPlain;
   std::uint8_t depth_bits = 0;    ///< 6 to 16
@@ -113,27 +112,27 @@ private:
   Status update_if_complete ();
 
   std::array<std::optional<View>, kMaxViews> views_;
+  std::array<std::vector<std::uint8_t>, kMaxViews> units_; /* of views_: they often come again */
   int total_ = 0, fps_n_ = 0, fps_d_ = 1;
   unsigned generation_ = 0;
   StreamInfo info_;
 };
 
-/** The access-unit unit of a byte stream. */
+/** The access-unit unit. */
 struct AccessUnitHeader {
   std::uint32_t size = 0;   ///< bytes of the units that follow it in the same access unit
   std::uint64_t pts_ns = 0; ///< presentation time; UINT64_MAX = none
   std::uint64_t capture_time_ns = 0;
   bool key = true;
 };
-inline constexpr std::size_t kAccessUnitHeaderSize = 24;
+inline constexpr std::size_t kAccessUnitHeaderSize = 28;
 /** Greatest size of an access unit, bytes. */
 inline constexpr std::uint32_t kMaxAccessUnitSize = 32u << 20;
 /** Greatest number of slices of an access unit. Readers ignore those beyond, because short slices
  * take several times their size in memory. */
 inline constexpr std::size_t kMaxSlices = std::size_t{1} << 17;
-/** Comes before each access-unit unit of a byte stream. */
-inline constexpr std::array<std::uint8_t, 4> kStartCode = {0x00, 0x52, 0x43, 0x55};
 
+/** @return kUnsupported only for the access-unit unit of another version, or with unknown flags */
 Status read_access_unit_header (std::span<const std::uint8_t> unit, AccessUnitHeader &header);
 void write_access_unit_header (const AccessUnitHeader &header, std::uint8_t *to);
 

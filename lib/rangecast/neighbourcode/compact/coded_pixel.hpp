@@ -252,9 +252,6 @@ correct (Components predicted, Components residual, Components steps, const Pixe
   return clamped (predicted + bounded * steps, limits.min, limits.max);
 }
 
-/** Larger residuals are damage: no pixel needs one. */
-inline constexpr std::uint32_t kMaxResidual = 1u << 18;
-
 inline Activity
 activity_of (Components residual)
 {

@@ -108,7 +108,7 @@ CompactDecoder::decode_full (
     return true;
   }
   Components residual;
-  if (!code.residual (n.any (), residual))
+  if (!code.residual (residual))
     return false;
   const Components made = correct (expected, residual, steps_, limits_);
   pixel = {known ? pack_components (made) : kNoPixel, state_of (Origin::kCorrected)};

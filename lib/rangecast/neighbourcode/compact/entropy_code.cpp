@@ -34,11 +34,17 @@ read_model (const char *from, SymbolModel<kSymbols> &model)
 }
 
 EntropyModel
-read_model (const char *choices, const char *numbers)
+read_model (const char *choices, const char *numbers, bool key)
 {
   EntropyModel model;
-  for (ChoiceModel &choice : model.choices)
-    choices = read_model (choices, choice);
+  for (std::size_t i = 0; i < kChoiceContexts; i++) {
+    model.choices[i] = model.choices[0];
+    const std::size_t left = i % kPixelClasses, upper = i / kPixelClasses;
+    const bool occurs = left < kEarlierClass && upper % kUpperGroups < kEarlierGroup &&
+                        upper / kUpperGroups < kEarlierGroup;
+    if (occurs || !key)
+      choices = read_model (choices, model.choices[i]);
+  }
   for (auto &of_number : model.residuals)
     for (NumberModel &residual : of_number)
       numbers = read_model (numbers, residual);
@@ -58,20 +64,16 @@ read_model (const char *choices, const char *numbers)
 const auto kInitialModels = [] {
   std::array<EntropyModel, kEntropyTables> models;
   for (std::size_t i = 0; i < models.size (); i++)
-    models[i] = read_model (kInitialChoices[i], kInitialNumbers[i]);
+    models[i] = read_model (kInitialChoices[i], kInitialNumbers[i], i + 1 < kEntropyTables);
   return models;
 }();
-
-/* Exact, fine, coarse, and without key. */
-constexpr std::int32_t kMaxFineStep = 5;
 
 } // namespace
 
 const EntropyModel &
 initial_model (bool key, Components steps)
 {
-  const std::size_t with_key = is_zero (steps - 1) ? 0 : steps[1] <= kMaxFineStep ? 1 : 2;
-  return kInitialModels[key ? with_key : kEntropyTables - 1];
+  return kInitialModels[!key ? 2 : is_zero (steps - 1) ? 0 : 1];
 }
 
 } // namespace rangecast

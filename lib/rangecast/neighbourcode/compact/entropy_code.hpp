@@ -21,8 +21,9 @@ using ChoiceModel = SymbolModel<7>;
  * or more numbers, which raw bits tell apart. */
 using NumberModel = SymbolModel<15>;
 
-/** Groups of classes that the upper and upper-right pixel count as. */
-inline constexpr std::size_t kUpperGroups = 5;
+/** Groups of classes that the upper and upper-right pixel count as; the last is of earlier pixels.
+ */
+inline constexpr std::size_t kUpperGroups = 5, kEarlierGroup = 4;
 inline constexpr std::size_t kChoiceContexts = kPixelClasses * kUpperGroups * kUpperGroups;
 /** Contexts of each of a residual's numbers, see kResidualContexts. */
 inline constexpr std::size_t kResidualClasses = 10;
@@ -336,12 +337,12 @@ private:
         if (size[i] > kMaxOwnSymbol)
           symbols[i] = static_cast<std::int32_t> (EscapedNumber (r[i]).symbol ());
     for (unsigned i = 0; i < kComponents; i++)
-      coder.code (i, model.residuals[i][kResidualContexts[context >> 8 * i & 0xff]],
+      coder.code (i % kRansStates, model.residuals[i][kResidualContexts[context >> 8 * i & 0xff]],
           static_cast<std::size_t> (symbols[i]));
     if (escapes) [[unlikely]]
       for (unsigned i = 0; i < kComponents; i++)
         if (size[i] > kMaxOwnSymbol)
-          escape (coder, i, r[i]);
+          escape (coder, i % kRansStates, r[i]);
   }
   static void escape (RansEncoder &coder, unsigned state, std::int32_t number)
   {
@@ -447,8 +448,10 @@ private:
         row.activities[x - 1], row.upper_activities[x], row.upper_activities[x + 1]);
     std::size_t symbols[kComponents], largest = 0;
     for (unsigned i = 0; i < kComponents; i++) {
-      symbols[i] =
-          coder.code (i, model.residuals[i][kResidualContexts[context >> 8 * i & 0xff]]) / 2 - 1;
+      symbols[i] = coder.code (i % kRansStates,
+                       model.residuals[i][kResidualContexts[context >> 8 * i & 0xff]]) /
+                       2 -
+                   1;
       largest = std::max (largest, symbols[i]);
     }
     Components made = {kSmallNumbers[symbols[0]], kSmallNumbers[symbols[1]],
@@ -458,7 +461,7 @@ private:
       for (unsigned i = 0; i < kComponents; i++)
         if (symbols[i] >= kFirstEscape) {
           std::int32_t number = 0;
-          good &= escape (coder, i, symbols[i], number);
+          good &= escape (coder, i % kRansStates, symbols[i], number);
           made[i] = number;
         }
     r = made;

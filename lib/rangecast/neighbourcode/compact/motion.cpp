@@ -12,6 +12,7 @@ namespace {
 
 /* Two pixels side by side. */
 typedef std::int16_t PixelHalves __attribute__ ((vector_size (16)));
+typedef std::uint16_t PixelCodes __attribute__ ((vector_size (16)));
 
 PixelHalves
 load_two (const PixelCode *from)
@@ -41,12 +42,12 @@ struct Taps {
 };
 
 /* Mixes the four pixels if all are valid and their depths are close to the first one's, and else
- * takes the nearest. Differences are 16 bits: those of colours are, and those of depths if they
- * count. */
+ * takes the nearest. */
 [[gnu::always_inline]] inline void
 mix (const Taps &taps, std::int16_t max_gap, std::span<PixelCode> to)
 {
-  const PixelHalves none = PixelHalves{} - 1, gap = PixelHalves{} + max_gap;
+  const PixelHalves none = PixelHalves{} - 1;
+  const PixelCodes gap = PixelCodes{} + static_cast<std::uint16_t> (max_gap);
   for (std::size_t i = 0; i < to.size (); i += 2) {
     const PixelHalves first = load_two (taps.pixels[0] + i);
     PixelHalves sum = PixelHalves{} + 8, far = {}, negative = first, unknown = {};
@@ -54,7 +55,8 @@ mix (const Taps &taps, std::int16_t max_gap, std::span<PixelCode> to)
     for (int t = 1; t < 4; t++) {
       const PixelHalves other = load_two (taps.pixels[t] + i), difference = other - first;
       sum += difference * taps.weights[t];
-      far |= (difference > gap) | (difference < -gap);
+      const auto a = reinterpret_cast<PixelCodes> (first), b = reinterpret_cast<PixelCodes> (other);
+      far |= (a > b ? a - b : b - a) > gap; /* only that of depth counts */
       negative |= other;
       unknown |= spread<1> (other) == none;
     }
@@ -112,8 +114,7 @@ fetch_displaced (const ReferencePlane &plane, int x, int y, std::span<const Bloc
       std::ranges::fill (part, kNoPixel);
     else
       for_this_cpu ([&] { fetch_part (plane, x, y, m, scale, part); });
-    /* A mixture may exceed the greatest depth because differences are modulo 2^16. */
-    if (m != BlockMotion{m.dx & ~3, m.dy & ~3})
+    if (m != BlockMotion{m.dx, m.dy})
       for (int i = 0; i < next - x; i++) {
         PixelCode &code = part[static_cast<std::size_t> (i)];
         const auto depth = static_cast<std::int32_t> (code & 0xffff) +

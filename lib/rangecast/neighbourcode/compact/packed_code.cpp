@@ -98,9 +98,8 @@ const std::array<std::array<std::uint8_t, kChoices>, kPackedContexts> kChoiceLen
     {0, 4, 2, 3, 4, 1}, {2, 4, 2, 4, 3, 2}, {3, 4, 3, 4, 3, 1}, {3, 4, 3, 4, 3, 1},
 }};
 const std::array<std::array<std::uint8_t, 16>, kPatternCodes> kPatternLengths = {{
-    {0, 3, 2, 2, 5, 4, 4, 4, 6, 6, 6, 6, 6, 6, 5, 5},
-    {8, 5, 6, 1, 8, 6, 6, 3, 9, 7, 9, 7, 9, 6, 9, 2},
-    {0, 6, 6, 6, 6, 5, 4, 3, 6, 6, 5, 5, 4, 4, 2, 2},
+    {7, 3, 2, 2, 5, 4, 4, 4, 7, 6, 6, 6, 6, 6, 5, 5},
+    {7, 6, 6, 6, 6, 5, 4, 3, 7, 6, 5, 5, 4, 4, 2, 2},
 }};
 /* clang-format on */
 

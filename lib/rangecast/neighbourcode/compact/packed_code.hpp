@@ -11,26 +11,18 @@ namespace rangecast {
 
 inline constexpr int kPackedContexts = 64;
 inline constexpr int kMaxChoiceBits = 5;
-inline constexpr int kMaxPatternBits = 10;
-/** Longest prefix of an exponential Golomb code; a longer one means damaged data. */
-inline constexpr int kMaxGolombPrefix = 18;
-/** Bits of the greatest number that such a code holds. */
-inline constexpr int kMaxGolombBits = 20;
+inline constexpr int kMaxPatternBits = 7;
+/** Bits of the greatest number that an exponential Golomb code holds; a greater one is damage. */
+inline constexpr int kMaxGolombBits = 18;
 /** Golomb orders of run ends and of depth motion. */
 inline constexpr int kRunOrder = 1, kMotionOrder = 1;
 
 /** Lengths of the codes in bits, 0 = no code. Part of the format. */
 extern const std::array<std::array<std::uint8_t, kChoices>, kPackedContexts> kChoiceLengths;
-/** Codes of the pattern of non-zero components of a residual: for pixels with a neighbour, for the
- *  others, and for pixels with a neighbour where all steps are 1, so that few components are 0. */
-inline constexpr std::size_t kPatternCodes = 3;
+/** Codes of the pattern of non-zero components of a residual: the second is for slices whose steps
+ * are all 1, where few components are 0. */
+inline constexpr std::size_t kPatternCodes = 2;
 extern const std::array<std::array<std::uint8_t, 16>, kPatternCodes> kPatternLengths;
-
-constexpr std::size_t
-pattern_code (bool has_neighbour, bool exact)
-{
-  return !has_neighbour ? 1 : exact ? 2 : 0;
-}
 
 /** The residual codes of a packed slice. */
 struct ResidualCodes {
@@ -147,9 +139,9 @@ public:
       const PrefixCode choice = tables_->choice[n.kinds ()][pattern == 0 ? kPredict : kCorrect];
       add (choice.bits, choice.length);
     }
-    const PrefixCode code =
-        tables_->pattern[pattern_code (has_neighbour, exact_)][pattern]; /* none for 0 */
-    add (code.bits, code.length);
+    const PrefixCode code = tables_->pattern[exact_][pattern];
+    if (pattern != 0 || !has_neighbour)
+      add (code.bits, code.length);
     if (!is_zero (sizes > kMaxQuickSize)) [[unlikely]] {
       put (bits, length);
       long_residual (r, static_cast<unsigned> (pattern));
@@ -186,11 +178,11 @@ public:
           bits[i] = float (length);
     return bits;
   }
-  [[nodiscard]] float residual_bits (const Neighbours &, bool has_neighbour, Components r) const
+  [[nodiscard]] float residual_bits (const Neighbours &, bool, Components r) const
   {
     const auto pattern = static_cast<std::size_t> (
         (r[0] != 0) | (r[1] != 0) << 1 | (r[2] != 0) << 2 | (r[3] != 0) << 3);
-    int bits = tables_->pattern[pattern_code (has_neighbour, exact_)][pattern].length;
+    int bits = tables_->pattern[exact_][pattern].length;
     for (int i = 0; i < kComponents; i++)
       if (r[i] != 0) {
         const int order = orders_[static_cast<std::size_t> (i)];
@@ -284,10 +276,9 @@ public:
   {
     return get (tables_->choice_of[n.kinds ()], kMaxChoiceBits);
   }
-  [[gnu::always_inline]] bool residual (bool has_neighbour, Components &r)
+  [[gnu::always_inline]] bool residual (Components &r)
   {
-    const int pattern =
-        get (tables_->pattern_of[pattern_code (has_neighbour, exact_)], kMaxPatternBits);
+    const int pattern = get (tables_->pattern_of[exact_], kMaxPatternBits);
     bool good = pattern != kNoSymbol;
     const auto number = [&] (int i) {
       const int order = orders_[static_cast<std::size_t> (i)];
@@ -333,7 +324,7 @@ private:
     const bool negative = held_ & 1;
     consume (1);
     std::uint32_t size = 0;
-    good &= golomb (order, size) && size < kMaxResidual;
+    good &= golomb (order, size);
     refill ();
     const auto r = static_cast<std::int32_t> (size) + 1;
     return negative ? -r : r;
@@ -342,7 +333,7 @@ private:
   {
     refill ();
     const int width = std::countr_zero (held_);
-    if (width > kMaxGolombPrefix)
+    if (width > kMaxGolombBits)
       return false;
     consume (width + 1);
     const std::uint32_t upper = (1u << width) + take (width) - 1;

@@ -11,7 +11,7 @@
 
 namespace rangecast {
 
-inline constexpr int kRansStates = 4;
+inline constexpr int kRansStates = 2;
 /** States are at least this and below 2^16 times this. */
 inline constexpr std::uint64_t kMinRansState = 1u << 20;
 /** Bytes of the states at the beginning. */

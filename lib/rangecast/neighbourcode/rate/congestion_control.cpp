@@ -180,8 +180,9 @@ CongestionControl::packets (std::span<const PacketReport> packets, std::uint64_t
 {
   if (packets.empty ())
     return;
-  const double elapsed =
-      !has_feedback_ ? 0 : std::min (seconds (now_ns - report_ns_), 0.5); /* a gap in reports is not calm */
+  const double elapsed = !has_feedback_ ? 0
+                                        : std::min (seconds (now_ns - report_ns_),
+                                              0.5); /* a gap in reports is not calm */
   record_report (now_ns);
   if (static_cast<std::int64_t> (packets.front ().sent_ns - last_sent_ns_) < -1'000'000'000)
     valid_sent_ns_ = 0, counted_ = counted_lost_ = 0; /* the sender's clock was reset */

@@ -45,8 +45,6 @@ public:
 
   /** The rate to send at; 0: no limit. */
   [[nodiscard]] double bits_per_s () const;
-  /** Reports have arrived, the last one not too long ago. */
-  [[nodiscard]] bool has_reports () const { return has_feedback_ && halvings_ == 0; }
   /** Share of packets lost in the latest half second, 0 to 1. */
   [[nodiscard]] double lost () const { return loss_.share (); }
   /** Queueing delay, seconds. */

@@ -109,7 +109,7 @@ def map_views(frame_set, caps=None):
 def new_camera(view_id, width, height, intrinsics, pose=None, **fields):
     """A GstRange.RangeCamera of width x height pixels. intrinsics: 3x3 matrix, or the focal length in pixels with the principal
     point at the centre of the image; pose: world_from_view, 3x4 or 4x4, metres, by default at the origin of the world
-    with y up, looking along -z; other fields by name: depth_unit, near, far (metres)."""
+    with y up, looking along -z; other fields by name: depth_unit, min_depth, max_depth (metres)."""
     camera = GstRange.RangeCamera()
     focal = float(intrinsics) if np.ndim(intrinsics) == 0 else 1.0
     camera.init(view_id, width, height, focal)
@@ -118,8 +118,8 @@ def new_camera(view_id, width, height, intrinsics, pose=None, **fields):
     if pose is not None:
         camera.pose = pose
     for name, value in fields.items():
-        if name not in ("depth_unit", "near", "far"):
-            raise TypeError(f"new_camera: unexpected {name}; expected depth_unit, near or far")
+        if name not in ("depth_unit", "min_depth", "max_depth"):
+            raise TypeError(f"new_camera: unexpected {name}; use depth_unit, min_depth or max_depth")
         setattr(camera, name, value)
     return camera
 
