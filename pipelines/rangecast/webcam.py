@@ -34,7 +34,7 @@ def build_webcam(args):
     source = args.source
     if not source:
         fail_unless(args.print or os.path.exists(args.device),
-                    f"--device: no camera '{args.device}'; gst-device-monitor-1.0 Source/Video/Stereo lists those with two lenses")  # fmt: skip
+                    f"--device: no camera '{args.device}'; gst-device-monitor-1.0 Video/Source lists the cameras")  # fmt: skip
         pixels = f"width={args.size[0]},height={args.size[1]},framerate={args.fps}/1"  # larger sizes are often JPEG only
         source = ["v4l2src", f"device={args.device}", "!", f"image/jpeg,{pixels};video/x-raw,{pixels}", "!", "decodebin", "!", "videoconvert"]
     if not args.print and not os.path.exists(args.rig):

@@ -67,7 +67,6 @@ rangedepth stereodepth roiextract rangecombine
 rangemux rangemux rangedemux capturesync
 rangerender striprender rangerender
 rangetestsrc avatartestsrc
-rangewebcam stereowebcamprovider
 rtpneighbourcode rtpneighbourcodepay rtpneighbourcodedepay rtpneighbourcodeguard
 END
 }
