@@ -166,17 +166,19 @@ check_control (const std::string &name, ArvDevice *device)
     return {};
   guint32 privilege = 0;
   GError *error = nullptr;
-  arv_device_read_register (device, kControlRegister, &privilege, &error);
+  if (arv_device_read_register (device, kControlRegister, &privilege, &error) && privilege == 0)
+    arv_gv_device_take_control (ARV_GV_DEVICE (device), &error); /* it was let go just now */
   if (error) {
     CameraStatus status = open_failed (name, error);
     g_error_free (error);
     return status;
   }
+  if (privilege == 0)
+    return {};
   return {CameraFault::kBusy,
-      "camera '" + name + "': " +
-          (privilege ? "another program has control of it"
-                     : "the camera refuses control although no other program has it") +
-          " (GigE Vision gives it to one at a time; it is free again 3 s after that one is gone)"};
+      "camera '" + name +
+          "': another program has control of it (GigE Vision gives it to one at a time; it is free "
+          "again 3 s after that one is gone)"};
 }
 
 CameraStatus
