@@ -165,3 +165,10 @@ test_examples_of_launch_strings_run () {
   gst-launch-1.0 -q avatartestsrc num-buffers=1 rig-export=webcam.yaml ! video/x-range,width=640,height=480 ! fakesink
   sh webcam.sh >webcam.log 2>&1 && grep -q 'Got EOS' webcam.log || fail "$(tail -n 5 webcam.log)"
 }
+
+# The sample of README: a change of the bitstream must make it anew (docs/make-sample.sh).
+test_the_sample_recording_plays () {
+  count-points "$pipelines/examples/head.rcnc" >points.txt
+  [ "$(grep -c '^frame set' points.txt)" = 50 ] || fail "$(cat points.txt)"
+  [ "$(grep -cE '^  view [0-3]: [0-9]{5,} points, centre' points.txt)" = 200 ] || fail "$(cat points.txt)"
+}
