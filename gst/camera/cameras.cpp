@@ -73,8 +73,7 @@ CameraGroup::negotiate ()
     labels.push_back (camera->label ());
   for (GstPad *pad : pads_)
     gst_pad_check_reconfigure (pad);
-  GstCaps *offered =
-      camera_source_caps (abilities_, labels, settings_.format, settings_.single_shot, why);
+  GstCaps *offered = camera_source_caps (abilities_, labels, settings_.format, why);
   GST_DEBUG_OBJECT (element_, "the cameras offer %" GST_PTR_FORMAT, offered);
   if (why.empty ())
     choose_camera_format (offered, pads_, abilities_, format_, why);
@@ -106,8 +105,7 @@ CameraGroup::configure ()
     settings.width = format_.width;
     settings.height = format_.height;
     settings.action_key = action_key;
-    if (format_.fps_n > 0)
-      settings.frame_rate = double (format_.fps_n) / format_.fps_d;
+    settings.frame_rate = double (format_.fps_n) / format_.fps_d;
     if (CameraStatus status = cameras_[i]->configure (settings); !status.ok ())
       return status;
     ImagingParameters imaging;

@@ -85,7 +85,7 @@ list_of (std::span<const CameraAbilities> cameras, std::span<const std::string> 
 
 GstCaps *
 camera_source_caps (std::span<const CameraAbilities> cameras, std::span<const std::string> labels,
-    const std::string &pixel_format, bool single_shot, std::string &why)
+    const std::string &pixel_format, std::string &why)
 {
   const SizeRange widths = common_range (cameras, true), heights = common_range (cameras, false);
   GstCaps *caps = gst_caps_new_empty ();
@@ -104,8 +104,7 @@ camera_source_caps (std::span<const CameraAbilities> cameras, std::span<const st
     GstStructure *structure = gst_caps_get_structure (caps, i);
     set_range (structure, "width", widths);
     set_range (structure, "height", heights);
-    gst_structure_set (structure, "framerate", GST_TYPE_FRACTION_RANGE, single_shot ? 0 : 1,
-        single_shot ? 1 : 1000, 1000, 1, nullptr);
+    gst_structure_set (structure, "framerate", GST_TYPE_FRACTION_RANGE, 1, 1000, 1000, 1, nullptr);
   }
   return caps;
 }

@@ -38,9 +38,6 @@
 #include "common/elementproperties.hpp"
 #include "session.hpp"
 
-enum { SIGNAL_CAPTURE, N_SIGNALS };
-static guint signals[N_SIGNALS];
-
 /* How long READY to NULL waits for cameras to be closed. */
 static constexpr std::chrono::milliseconds kMaxClose{2000};
 
@@ -70,9 +67,9 @@ struct _GstStereoCamSrc {
 
 #define CAMERA_CAPS                                                                                \
   "video/x-raw, format = (string) { GRAY8, RGB, BGR }, width = (int) [ 1, max ], height = (int) "  \
-  "[ 1, max ], framerate = (fraction) [ 0/1, 1000/1 ]; "                                           \
+  "[ 1, max ], framerate = (fraction) [ 1/1000, 1000/1 ]; "                                        \
   "video/x-bayer, format = (string) { rggb, bggr, gbrg, grbg }, width = (int) [ 1, max ], height " \
-  "= (int) [ 1, max ], framerate = (fraction) [ 0/1, 1000/1 ]"
+  "= (int) [ 1, max ], framerate = (fraction) [ 1/1000, 1000/1 ]"
 
 static GstStaticPadTemplate left_template =
     GST_STATIC_PAD_TEMPLATE ("left", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (CAMERA_CAPS));
@@ -196,10 +193,7 @@ check_settings (GstStereoCamSrc *self, StereoCamSettings &settings, CameraNames 
     std::lock_guard guard (self->priv->lock);
     settings = self->priv->settings;
   }
-  rangecast::Status status = settings.check ();
-  if (status.ok ())
-    status = settings.find_names (names);
-  return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
+  return gst_range_flow_return (GST_ELEMENT (self), settings.find_names (names)) == GST_FLOW_OK;
 }
 
 /* NULL to READY: checks settings and provides the clock; no network. */
@@ -307,13 +301,6 @@ gst_stereo_cam_src_provide_clock (GstElement *element)
   return clock ? GST_CLOCK (gst_object_ref (clock)) : nullptr;
 }
 
-static gboolean
-gst_stereo_cam_src_capture (GstStereoCamSrc *self, guint64 time)
-{
-  const auto session = self->priv->current ();
-  return session && session->capture (time);
-}
-
 static GstStructure *
 make_stats (const GstStereoCamSrcPrivate *priv)
 {
@@ -340,19 +327,6 @@ gst_stereo_cam_src_class_init (GstStereoCamSrcClass *klass)
   object_class->finalize = delete_private<GstStereoCamSrc>;
   install_properties<GstStereoCamSrc, stereo_cam_properties, make_stats> (
       object_class, "Counters since the element was started");
-  /**
-   * GstStereoCamSrc::capture:
-   * @time: time on the pipeline clock; now if it is GST_CLOCK_TIME_NONE or has passed
-   *
-   * Captures one image with all cameras: single-shot=true, trigger=software or action. Its PTS and
-   * capture time are those of that moment.
-   *
-   * Returns: %FALSE if the element does not play, or 64 requests are pending
-   */
-  signals[SIGNAL_CAPTURE] = g_signal_new_class_handler ("capture", G_TYPE_FROM_CLASS (klass),
-      GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION), G_CALLBACK (gst_stereo_cam_src_capture),
-      nullptr, nullptr, nullptr, G_TYPE_BOOLEAN, 1, G_TYPE_UINT64);
-
   for (GstStaticPadTemplate *pad_template : {&left_template, &right_template, &third_template})
     gst_element_class_add_static_pad_template (element_class, pad_template);
   gst_element_class_set_static_metadata (element_class, "Stereo camera source",

@@ -36,7 +36,7 @@ SetOutput::send (ImageSet &set)
     GstBuffer *buffer = set.images[i].release ();
     GST_BUFFER_PTS (buffer) = pts;
     GST_BUFFER_DTS (buffer) = GST_CLOCK_TIME_NONE;
-    GST_BUFFER_DURATION (buffer) = period_ > 0 ? period_ : GST_CLOCK_TIME_NONE;
+    GST_BUFFER_DURATION (buffer) = period_;
     GST_BUFFER_OFFSET (buffer) = sent_;
     GST_BUFFER_OFFSET_END (buffer) = sent_ + 1;
     gst_range_buffer_set_capture_time (buffer, capture);
@@ -60,7 +60,7 @@ SetOutput::capture_time (const ImageSet &set) const
   const auto now_ns = static_cast<std::int64_t> (gst_clock_get_time (clock));
   gst_object_unref (clock);
   std::int64_t time_ns = std::max<std::int64_t> (now_ns - age_ns, 0);
-  if (settings_.trigger == TriggerMode::kAction && rate_.valid ())
+  if (settings_.trigger == TriggerMode::kAction)
     time_ns = rate_.time_of (
         rate_.at_or_after (std::max<std::int64_t> (time_ns - rate_.period_ns () / 2, 0)));
   return static_cast<GstClockTime> (time_ns);

@@ -36,7 +36,7 @@ FramePairing::configure (
   cameras_ = cameras;
   max_waiting_ = std::clamp (max_waiting, 1, kMaxWaiting);
   by_ = by;
-  period_ns_ = static_cast<std::int64_t> (period_ns > 0 ? period_ns : GST_SECOND);
+  period_ns_ = static_cast<std::int64_t> (period_ns);
   exposure_ns_ = static_cast<std::int64_t> (exposure_ns);
 }
 
@@ -108,7 +108,7 @@ FramePairing::answer_timeout () const
 }
 
 bool
-FramePairing::may_trigger (bool single_shot, std::int64_t now_ns)
+FramePairing::may_trigger (std::int64_t now_ns)
 {
   std::lock_guard guard (lock_);
   const auto matchers = std::span (matchers_).first (static_cast<std::size_t> (cameras_));
@@ -118,7 +118,7 @@ FramePairing::may_trigger (bool single_shot, std::int64_t now_ns)
       matcher.start (period_ns_);
       learning_triggers_ = 0;
     }
-  if (!single_shot && std::ranges::all_of (matchers, [] (const auto &m) { return m.settled (); }))
+  if (std::ranges::all_of (matchers, [] (const auto &m) { return m.settled (); }))
     return true;
   if (learning_triggers_ > kMaxLearningTriggers) {
     for (auto &matcher : matchers)
@@ -131,8 +131,7 @@ FramePairing::may_trigger (bool single_shot, std::int64_t now_ns)
    * each of these times is longer than all before it, two such mistakes do not agree. */
   if (answers_owed_ && since_ns < std::min (2 * spacing_ns_ + period_ns_, kMaxAnswer_ns))
     return false;
-  return n_triggers_ == 0 || all_answered () ||
-         since_ns > (single_shot ? kMaxAnswer_ns + 2 * exposure_ns_ : answer_timeout ());
+  return n_triggers_ == 0 || all_answered () || since_ns > answer_timeout ();
 }
 
 void

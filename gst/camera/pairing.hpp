@@ -49,8 +49,7 @@ public:
     kCamera,   ///< each camera by itself
   };
 
-  /** @param period_ns    frame period; 0 for single shots
-   *  @param exposure_ns  as far as it is known
+  /** @param exposure_ns  as far as it is known
    *  @param max_waiting  images of one camera that may wait for partners, 1 to kMaxWaiting */
   void configure (int cameras, TriggeredBy by, GstClockTime period_ns, GstClockTime exposure_ns,
       int max_waiting);
@@ -66,9 +65,8 @@ public:
 
   /** Whether a trigger may be sent now. While a camera's delay is unknown, a trigger must have been
    *  answered before the next one.
-   *  @param single_shot  never two triggers in progress: an exposing camera ignores the second
-   *  @param now_ns       g_get_monotonic_time */
-  bool may_trigger (bool single_shot, std::int64_t now_ns);
+   *  @param now_ns  g_get_monotonic_time */
+  bool may_trigger (std::int64_t now_ns);
   /** A trigger is about to be sent; answers count from now on.
    *  @param time     on the pipeline clock
    *  @param sent_ns  when cameras receive it, g_get_monotonic_time */

@@ -14,12 +14,11 @@ constexpr Milliseconds kRetry{1000}, kGapInterval{100};
 constexpr GstClockTime kMaxClockWait = 10 * GST_SECOND;
 
 /* Exposure and transfer; a transfer takes no longer than a frame period, else images would pile
- * up. @param period  0: single shots */
+ * up. */
 GstClockTime
 expected_latency (GstClockTime exposure, GstClockTime period)
 {
-  const GstClockTime longest = period > 0 ? period : 100 * GST_MSECOND;
-  return MIN (exposure, longest) + longest;
+  return MIN (exposure, period) + period;
 }
 
 /* Before the cameras have answered: the last session's, or that of the rate which is chosen where
@@ -29,8 +28,8 @@ first_latency (const CameraSession::Setup &setup)
 {
   if (setup.previous && setup.previous->latency () > 0)
     return setup.previous->latency ();
-  return expected_latency (static_cast<GstClockTime> (setup.settings.exposure_us * 1000),
-      setup.settings.single_shot ? 0 : GST_SECOND / 30);
+  return expected_latency (
+      static_cast<GstClockTime> (setup.settings.exposure_us * 1000), GST_SECOND / 30);
 }
 
 std::vector<GstPad *>

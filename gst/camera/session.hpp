@@ -56,7 +56,6 @@ public:
   bool wait_until_ended (std::chrono::milliseconds limit);
   /** Ends all pads. */
   void send_eos (guint32 seqnum);
-  bool capture (GstClockTime time) { return trigger_.request (time); }
   /** Pushing on a pad gives a new flow. */
   void handle_flow (const CameraPad &pad, GstFlowReturn flow);
 

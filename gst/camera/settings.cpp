@@ -97,8 +97,6 @@ stereo_cam_properties ()
           kMutableReady),
       P::boolean<&S::packet_resend> ("packet-resend", "Packet resend",
           "Request retransmission of missing GigE Vision packets", kMutableReady),
-      P::boolean<&S::single_shot> ("single-shot", "Single shot",
-          "Capture only when the capture signal is emitted", kMutableReady),
       P::boolean<&S::reconnect> ("reconnect", "Reconnect",
           "Reconnect to a lost camera and post a warning instead of an error", kMutableReady),
       P::enumeration<&S::trigger> ("trigger", "Trigger", "What triggers the cameras",
@@ -172,16 +170,6 @@ StereoCamSettings::find_names (CameraNames &found) const
     for (int j = 0; j < i; j++)
       if (found[i] == found[j])
         return {StatusCode::kBadValue, "camera " + found[i] + " is named twice"};
-  return {};
-}
-
-Status
-StereoCamSettings::check () const
-{
-  if (single_shot && !triggers_cameras ())
-    return {
-        StatusCode::kBadValue, std::string ("single-shot needs trigger=software or action, got ") +
-                                   (trigger == TriggerMode::kFreeRun ? "free-run" : "hardware")};
   return {};
 }
 

@@ -28,15 +28,13 @@ struct StereoCamSettings {
   gint64 packet_delay_ns = -1;
   bool packet_resend = true;
   std::string trigger_line = "Line1", output_line; ///< output line empty: external signal
-  bool single_shot = false, reconnect = false;
+  bool reconnect = false;
   int num_buffers = -1;
   std::string clock_server;
 
   /** The names, from the rig file if left and right are empty.
    *  @return kNotFound, kBadValue: the text says which property, or the file */
   rangecast::Status find_names (CameraNames &found) const;
-  /** @return kBadValue: properties contradict each other; the text says which */
-  [[nodiscard]] rangecast::Status check () const;
   /** Settings of one camera, without size and frame rate. @param camera  0 is the left one */
   [[nodiscard]] CameraSettings for_camera (int camera) const;
   /** Whether this element triggers the cameras. */

@@ -107,7 +107,7 @@ CameraSession::run_periodic_checks ()
 CameraStatus
 CameraSession::check_silence (std::int64_t now_ns)
 {
-  const bool ticks = settings_.triggers_cameras () && !settings_.single_shot;
+  const bool ticks = settings_.triggers_cameras ();
   const bool should_send =
       ticks || settings_.trigger == TriggerMode::kFreeRun ||
       (settings_.trigger == TriggerMode::kHardware && !settings_.output_line.empty ());

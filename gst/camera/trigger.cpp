@@ -1,18 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "trigger.hpp"
 
-#include <algorithm>
-
 #include "camera/aravis/debug.hpp"
 #include "clock.hpp"
 #include "common/realtimepriority.hpp"
-
-namespace {
-
-/* A requested trigger keeps its time if it is not later than this: the host is busy. */
-constexpr GstClockTime kMaxLateness = 20 * GST_MSECOND;
-
-} // namespace
 
 CameraStatus
 CameraTrigger::start (Cameras cameras, std::uint32_t action_key, rangecast::TickRate rate)
@@ -33,11 +24,8 @@ CameraTrigger::start (Cameras cameras, std::uint32_t action_key, rangecast::Tick
   action_key_ = action_key;
   rate_ = rate;
   last_tick_ = -1;
-  last_requested_ = 0;
-  on_request_ = settings_.single_shot || !rate.valid ();
   std::lock_guard guard (lock_);
   running_ = paused_since_tick_ = true;
-  requests_.clear ();
   const auto body = [] (gpointer self) -> gpointer {
     static_cast<CameraTrigger *> (self)->run ();
     return nullptr;
@@ -76,18 +64,6 @@ CameraTrigger::set_playing (bool playing)
     clock_wait_.interrupt ();
 }
 
-bool
-CameraTrigger::request (GstClockTime time)
-{
-  std::lock_guard guard (lock_);
-  if (!running_ || !playing_ || !on_request_ || requests_.size () >= kMaxRequests)
-    return false;
-  requests_.push_back (time);
-  changed_.notify_all ();
-  clock_wait_.interrupt (); /* it may be due before the one that is waited for */
-  return true;
-}
-
 /* ---- the thread ---- */
 
 bool
@@ -118,36 +94,22 @@ CameraTrigger::run ()
   const ScopedRealtimePriority priority;
   std::unique_lock guard (lock_);
   while (running_) {
-    if (!playing_ || (on_request_ && requests_.empty ())) {
+    if (!playing_) {
       changed_.wait (guard);
       continue;
     }
     GstClock *clock = clock_of_element (element_);
-    const GstClockTime base = gst_element_get_base_time (element_);
-    GstClockTime now = gst_clock_get_time (clock);
-    const GstClockTime time = on_request_ ? next_request (now) : next_tick (now, base);
+    const GstClockTime time =
+        next_tick (gst_clock_get_time (clock), gst_element_get_base_time (element_));
     const bool due = clock_wait_.wait_until (guard, clock, time);
-    now = gst_clock_get_time (clock);
+    const GstClockTime now = gst_clock_get_time (clock);
     gst_object_unref (clock);
     if (!due)
       continue;
     guard.unlock ();
-    if (on_request_)
-      handle_request (time, MAX (now, base));
-    else
-      handle_tick (time, now);
+    handle_tick (time, now);
     guard.lock ();
   }
-}
-
-/* With the lock. */
-GstClockTime
-CameraTrigger::next_request (GstClockTime now)
-{
-  for (GstClockTime &time : requests_)
-    if (!GST_CLOCK_TIME_IS_VALID (time))
-      time = now;
-  return *std::ranges::min_element (requests_);
 }
 
 /* With the lock. */
@@ -160,28 +122,11 @@ CameraTrigger::next_tick (GstClockTime now, GstClockTime base) const
   return static_cast<GstClockTime> (rate_.time_of (tick));
 }
 
-/* A trigger that is late has the time when it happens. */
-void
-CameraTrigger::handle_request (GstClockTime time, GstClockTime now)
-{
-  if (!pairing_.may_trigger (settings_.single_shot, monotonic_ns ())) {
-    g_usleep (1000); /* until the cameras have answered the previous trigger */
-    return;
-  }
-  {
-    std::lock_guard guard (lock_);
-    if (const auto it = std::ranges::find (requests_, time); it != requests_.end ())
-      requests_.erase (it);
-  }
-  last_requested_ = MAX (now <= time + kMaxLateness ? time : now, last_requested_ + 1);
-  trigger (last_requested_);
-}
-
 /* A tick is triggered until half a period after it; after that it is missed. */
 void
 CameraTrigger::handle_tick (GstClockTime time, GstClockTime now)
 {
-  const bool ready = pairing_.may_trigger (settings_.single_shot, monotonic_ns ());
+  const bool ready = pairing_.may_trigger (monotonic_ns ());
   const std::int64_t tick = rate_.at_or_after (static_cast<std::int64_t> (time));
   const bool late = now > time + static_cast<GstClockTime> (rate_.period_ns ()) / 2;
   {

@@ -6,7 +6,6 @@
 #include "camera/aravis/action_command.hpp"
 #include <atomic>
 #include <condition_variable>
-#include <deque>
 #include <mutex>
 #include <rangecast/sync/ticks.hpp>
 
@@ -17,8 +16,8 @@
 #include "settings.hpp"
 
 /** The thread that triggers the cameras at the multiples of the frame period on the pipeline clock,
- *  or at requested times, by software triggers or action commands. All hosts that share the clock
- *  trigger at the same moments. Does nothing where cameras run freely or others trigger them.
+ *  by software triggers or action commands. All hosts that share the clock trigger at the same
+ *  moments. Does nothing where cameras run freely or others trigger them.
  *
  *  A thread of its own instead of a GstTask, because it has real-time priority, and GstTask borrows
  *  threads from a pool of the process. */
@@ -34,8 +33,7 @@ public:
   CameraTrigger (const CameraTrigger &) = delete;
   CameraTrigger &operator= (const CameraTrigger &) = delete;
 
-  /** @param rate  not valid: only requested triggers
-   *  @param action_key  ActionDeviceKey of the cameras
+  /** @param action_key  ActionDeviceKey of the cameras
    *  @return kFailed: no socket for action commands, no thread */
   CameraStatus start (Cameras cameras, std::uint32_t action_key, rangecast::TickRate rate);
   /** Returns when no trigger is in progress. */
@@ -44,9 +42,6 @@ public:
   /* Any thread. */
 
   void set_playing (bool playing);
-  /** Requests a trigger at that time on the pipeline clock; one that is NONE or has passed is now.
-   *  @return false: not playing, not waiting for requests, or too many are pending */
-  bool request (GstClockTime time);
   /** Time of the last trigger by g_get_monotonic_time, ns; 0: none yet. */
   [[nodiscard]] std::int64_t last_trigger_ns () const { return last_trigger_ns_; }
   /** Whether a trigger is in progress. */
@@ -55,13 +50,9 @@ public:
   [[nodiscard]] guint64 missed () const { return missed_; }
 
 private:
-  static constexpr std::size_t kMaxRequests = 64;
-
   bool start_callers (std::size_t count);
   void run ();
-  GstClockTime next_request (GstClockTime now);
   [[nodiscard]] GstClockTime next_tick (GstClockTime now, GstClockTime base) const;
-  void handle_request (GstClockTime time, GstClockTime now);
   void handle_tick (GstClockTime time, GstClockTime now);
   void trigger (GstClockTime time);
   void trigger_software ();
@@ -75,7 +66,6 @@ private:
   std::atomic<bool> busy_ = false;
 
   /* Constant while the thread runs. */
-  bool on_request_ = false; ///< single shots
   Cameras cameras_;
   rangecast::TickRate rate_;
   ActionSender action_;
@@ -83,14 +73,12 @@ private:
 
   /* The thread's. */
   std::int64_t last_tick_ = -1;
-  GstClockTime last_requested_ = 0;
   GThreadPool *pool_ = nullptr; ///< a thread for each camera: a trigger waits for its camera
 
   std::mutex lock_; /* guards what follows; taken before the element's and the clock's */
   std::condition_variable changed_;
   ClockWait clock_wait_;
   bool running_ = false, playing_ = false, paused_since_tick_ = true;
-  std::deque<GstClockTime> requests_;
   std::size_t calls_pending_ = 0;
   GThread *thread_ = nullptr;
 };

@@ -32,7 +32,7 @@ run_triggers (FramePairing &pairing, int ticks, Lost lost)
   std::uint64_t numbers[2] = {};
   for (int tick = 1; tick <= ticks; tick++) {
     const std::int64_t now = 1000 * kMs + tick * kPeriod;
-    if (!pairing.may_trigger (false, now)) {
+    if (!pairing.may_trigger (now)) {
       missed++;
       continue;
     }
@@ -93,7 +93,7 @@ GST_START_TEST (test_camera_that_is_late_from_the_start_is_never_given_another_t
         for (int camera = 0; camera < 2; camera++)
           fail_unless_equals_uint64 (
               GST_BUFFER_OFFSET (set.images[camera].get ()), set.trigger_time);
-      if (!pairing.may_trigger (false, now))
+      if (!pairing.may_trigger (now))
         continue;
       pairing.add_trigger (static_cast<GstClockTime> (now), now);
       CameraFrame left = picture (number, now + kMs), right = picture (number, now + kMs);
@@ -109,27 +109,6 @@ GST_START_TEST (test_camera_that_is_late_from_the_start_is_never_given_another_t
 }
 GST_END_TEST;
 
-/* Captures on request, one after the other: much closer than the period of single shots, and the
- * cameras expose the first ones later than those that follow, as where the host is busy. */
-GST_START_TEST (test_quick_single_shots_keep_their_images_whatever_the_delay)
-{
-  FramePairing pairing;
-  pairing.configure (2, By::kElement, 0, 0, 3);
-  pairing.reset ();
-  std::int64_t now = 1000 * kMs;
-  for (std::uint64_t shot = 0; shot < 100; shot++, now += 5 * kMs) {
-    fail_unless (pairing.may_trigger (true, now));
-    pairing.add_trigger (static_cast<GstClockTime> (now), now);
-    const auto delay = std::int64_t (shot < 2 ? 4 : shot * 7 % 5) * kMs;
-    for (int camera = 0; camera < 2; camera++)
-      pairing.add_frame (camera, picture (shot, now + delay, 0));
-    ImageSet set;
-    fail_unless (pairing.next_set (set), "image %d was lost", int (shot));
-    fail_unless_equals_uint64 (set.trigger_time, static_cast<GstClockTime> (now));
-  }
-}
-GST_END_TEST;
-
 static Suite *
 stereocampairing_suite ()
 {
@@ -139,7 +118,6 @@ stereocampairing_suite ()
   tcase_add_test (tc, test_answers_that_get_lost_while_delays_are_learnt_cost_few_ticks);
   tcase_add_test (tc, test_camera_that_is_late_from_the_start_is_never_given_another_trigger);
   tcase_add_test (tc, test_camera_that_never_answers_is_waited_for_longer_and_longer);
-  tcase_add_test (tc, test_quick_single_shots_keep_their_images_whatever_the_delay);
   return suite;
 }
 

@@ -192,7 +192,6 @@ GST_START_TEST (test_cameras_are_named_by_properties_or_a_rig_file)
       {"left=a", "property right"},
       {"left=a right=a", "named twice"},
       {"left=a rig=" + path, "set property right; rig is ignored where one of left and right"},
-      {"left=a right=b single-shot=true", "single-shot needs trigger=software or action"},
       {"rig=/nowhere.yaml", "/nowhere.yaml: no such rig file"},
       {"rig=" + path, "does not name its left camera"},
       {"view-id=7 rig=" + path, "view-id 7"},

@@ -118,56 +118,6 @@ GST_START_TEST (test_action_commands_trigger_all_cameras_of_an_element_on_ticks)
 }
 GST_END_TEST;
 
-/* ---- single shots ---- */
-
-static bool
-capture (CameraPipeline &p, GstClockTime time)
-{
-  gboolean taken = FALSE;
-  g_signal_emit_by_name (p.source (), "capture", guint64 (time), &taken);
-  return taken;
-}
-
-/* Waits for the cameras: before they stream a shot is refused. */
-static void
-capture_when_ready (CameraPipeline &p, GstClockTime time)
-{
-  for (int i = 0; i < 1000; i++, g_usleep (10000))
-    if (capture (p, time))
-      return;
-  fail ("capture was refused all the time");
-}
-
-/* A request for a time that has passed, and one without a time, are for now. They come one after
- * the other, and before one that waits for its time. */
-GST_START_TEST (test_each_capture_is_one_image_with_the_time_when_it_was_taken)
-{
-  TestCameras cameras;
-  CameraPipeline p (
-      "trigger=software single-shot=true", 2, "video/x-raw,format=GRAY8,framerate=0/1");
-  fail_if (capture (p, GST_CLOCK_TIME_NONE), "it does not play");
-  p.play ();
-  capture_when_ready (p, GST_CLOCK_TIME_NONE);
-  fail_unless (p.wait_for_pictures (1, 1));
-  GstClock *clock = gst_element_get_clock (p.source ());
-  const GstClockTime later = gst_clock_get_time (clock) + GST_SECOND + 12345;
-  gst_object_unref (clock);
-  fail_unless (capture (p, later));
-  fail_unless (capture (p, gst_element_get_base_time (p.source ()) + 1)); /* long ago */
-  fail_unless (capture (p, GST_CLOCK_TIME_NONE));
-  fail_unless (p.wait_for_pictures (0, 4) && p.wait_for_pictures (1, 4));
-  expect_pairs (p, 2, 20 * GST_MSECOND);
-  const auto pictures = p.seen (0);
-  fail_unless_equals_int (int (pictures.size ()), 4);
-  for (const SeenPicture &picture : pictures) {
-    const auto off = picture.mark.taken_ns - static_cast<std::int64_t> (picture.capture);
-    fail_unless (
-        off >= 0 && off < 200 * std::int64_t (GST_MSECOND), "off by %d us", int (off / 1000));
-  }
-  fail_unless_equals_uint64 (pictures[3].capture, later);
-}
-GST_END_TEST;
-
 /* ---- clocks ---- */
 
 GST_START_TEST (test_clock_of_a_server_is_provided_and_ticks_are_its_multiples)
@@ -221,7 +171,6 @@ stereocamsrctriggers_suite ()
   tcase_add_test (tc, test_right_and_third_follow_what_the_left_regulates);
   tcase_add_test (tc, test_left_camera_triggers_the_others_by_its_line);
   tcase_add_test (tc, test_action_commands_trigger_all_cameras_of_an_element_on_ticks);
-  tcase_add_test (tc, test_each_capture_is_one_image_with_the_time_when_it_was_taken);
   tcase_add_test (tc, test_clock_of_a_server_is_provided_and_ticks_are_its_multiples);
   tcase_add_test (tc, test_clock_server_that_never_answers_is_one_error);
   return suite;
