@@ -43,7 +43,7 @@ packages=(
 )
 [ "${targets[0]}" = demo ] || packages+=(
   # calibration with its example images, cameras
-  libopencv-contrib-dev opencv-doc libceres-dev libaravis-dev aravis-tools aravis-tools-cli
+  libopencv-contrib-dev opencv-doc libceres-dev libaravis-dev libusb-1.0-0-dev aravis-tools aravis-tools-cli
 )
 [ "${targets[0]}" != all ] || packages+=(
   # RTSP server

@@ -42,11 +42,11 @@ stereo_cam_properties ()
   using P = PropertyTable<S>;
   static P table = {
       P::text<kLeft> ("left", "Left camera",
-          "Left camera: serial number, IP or MAC address, or Aravis id", kMutableReady),
+          "Left camera: name, serial number, IP or MAC address, or Aravis id", kMutableReady),
       P::text<kRight> ("right", "Right camera",
-          "Right camera: serial number, IP or MAC address, or Aravis id", kMutableReady),
+          "Right camera: name, serial number, IP or MAC address, or Aravis id", kMutableReady),
       P::text<kThird> ("third", "Third camera",
-          "Third camera: serial number, IP or MAC address, or Aravis id", kMutableReady),
+          "Third camera: name, serial number, IP or MAC address, or Aravis id", kMutableReady),
       P::text<&S::rig> ("rig", "Rig",
           "Rig file that names the cameras of the view, used if left and right are unset",
           kMutableReady),
@@ -129,8 +129,7 @@ names_from_rig (const StereoCamSettings &settings, CameraNames &found)
   if (!view)
     return {StatusCode::kNotFound,
         settings.rig + ": has no view with view-id " + std::to_string (settings.view_id)};
-  found = {
-      view->camera, view->right ? view->right->camera : "", view->third ? view->third->camera : ""};
+  found = camera_names (*view);
   for (int i = 0; i < 2; i++)
     if (found[i].empty ())
       return {StatusCode::kNotFound,

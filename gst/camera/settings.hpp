@@ -6,11 +6,19 @@
 #include "camera/aravis/types.hpp"
 #include <array>
 #include <rangecast/base/status.hpp>
+#include <rangecast/geometry/rig.hpp>
 #include <string>
 
 #include "common/properties.hpp"
 
 using CameraNames = std::array<std::string, kMaxCameras>; ///< left, right, third
+
+/** The cameras of a rig's view; empty where it names none. */
+inline CameraNames
+camera_names (const rangecast::View &view)
+{
+  return {view.camera, view.right ? view.right->camera : "", view.third ? view.third->camera : ""};
+}
 
 /** Property values of stereocamsrc, which may change in NULL and READY. */
 struct StereoCamSettings {

@@ -73,7 +73,7 @@ public:
 
   /** Finds, opens and takes control of a camera.
    *  @param name  its serial number, Aravis id (as "Aravis-Fake-GV01"), MAC address, IP address,
-   *  or host name with a dot in it.
+   *  user-defined name (GigE), or host name with a dot in it.
    *  @param[out] camera  set if ok
    *  @return kNotFound (the text says which cameras answered), kBusy (another program has control),
    *  kNoPermission (USB, the text says which udev rule), kTimedOut, kFailed. Any thread; calls wait

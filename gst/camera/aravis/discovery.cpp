@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "control.hpp"
+#include "user_name.hpp"
 
 namespace {
 
@@ -39,6 +40,8 @@ discover (bool afresh)
     info.address = valid_utf8 (arv_get_device_address (i));
     info.physical_id = valid_utf8 (arv_get_device_physical_id (i));
     info.protocol = valid_utf8 (arv_get_device_protocol (i));
+    if (info.is_gige ())
+      info.user_name = valid_utf8 (read_user_name (info.address));
     if (info.protocol != "Fake") /* Aravis' own, which only sends test patterns */
       list.push_back (std::move (info));
   }

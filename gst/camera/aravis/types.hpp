@@ -78,7 +78,10 @@ struct CameraInfo {
   std::string address;      ///< GigE: IP address; USB: device node, or as Aravis says
   std::string physical_id;  ///< GigE: MAC address; USB: GUID
   std::string protocol;     ///< "GigEVision", "USB3Vision"
+  std::string user_name;    ///< GigE: user-defined name
   std::string problem = {}; ///< why it cannot be opened and what to do; empty if it can
+
+  bool operator== (const CameraInfo &) const = default;
 
   [[nodiscard]] bool is_gige () const { return protocol == "GigEVision"; }
   /** Whether both are one camera, whatever names they were found by. */
@@ -93,8 +96,8 @@ struct CameraInfo {
   /** Whether this camera is meant by a name as in the properties of stereocamsrc and rig files. */
   [[nodiscard]] bool is_called (const std::string &name) const
   {
-    return !name.empty () &&
-           (name == id || name == serial || name == physical_id || (is_gige () && name == address));
+    return !name.empty () && (name == id || name == serial || name == physical_id ||
+                                 name == user_name || (is_gige () && name == address));
   }
 };
 

@@ -15,12 +15,14 @@ GST_START_TEST (test_camera_is_found_by_each_of_its_names)
 {
   SKIP_WITHOUT_NETWORK ();
   FakeCamera left ("127.0.0.2", "GV02"), right ("127.0.0.3", "GV03");
+  static const char name[16] = "right eye";
+  fail_unless (arv_fake_camera_write_memory (right.registers (), 0xe8, sizeof name, name));
   arv_fake_camera_write_register (right.registers (), 0x0c, 3); /* MAC address */
-  std::vector<std::string> names = {"127.0.0.3", "GV03", "Aravis-Fake-GV03"};
+  std::vector<std::string> names = {"127.0.0.3", "GV03", "Aravis-Fake-GV03", "right eye"};
   for (const CameraInfo &info : list_cameras ())
     if (info.serial == "GV03")
       names.push_back (info.physical_id);
-  assert_equals_int (names.size (), 4);
+  assert_equals_int (names.size (), 5);
   for (const std::string &called : names) {
     const auto camera = open_camera (called);
     assert_equals_string (camera->info ().serial.c_str (), "GV03");

@@ -4,6 +4,7 @@
 #include "camera/aravis/action_command.hpp"
 #include "camera/aravis/discovery.hpp"
 #include "camera/aravis/stream.hpp"
+#include "camera/aravis/user_name.hpp"
 #include <filesystem>
 #include <fstream>
 
@@ -84,6 +85,37 @@ GST_START_TEST (test_frame_numbers_grow_whatever_the_camera_says)
 }
 GST_END_TEST;
 
+/* User-defined names */
+
+GST_START_TEST (test_user_name_is_asked_for_with_the_bytes_of_the_standard)
+{
+  static const guint8 expected[] = {
+      0x42, 0x01, 0x00, 0x84, 0x00, 0x08, 0x12, 0x34, 0, 0, 0, 0xe8, 0, 0, 0, 16};
+  const auto request = user_name_request (0x1234);
+  assert_equals_int (request.size (), sizeof expected);
+  ck_assert_int_eq (memcmp (request.data (), expected, sizeof expected), 0);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_user_name_is_taken_from_answers_of_the_standard_alone)
+{
+  const std::vector<guint8> answer = {0x00, 0x00, 0x00, 0x85, 0x00, 0x14, 0x12, 0x34, 0, 0, 0, 0xe8,
+      'l', 'e', 'f', 't', 0, 'x', 'x', 'x', 'x', 'x', 'x', 'x', 'x', 'x', 'x', 'x'};
+  fail_unless_cmp (user_name_in (answer, 0x1234), ==, "left");
+  fail_unless (!user_name_in (answer, 0x1235));
+  for (std::size_t size = 0; size < answer.size (); size++)
+    fail_unless (
+        !user_name_in (std::vector<guint8> (answer.begin (), answer.begin () + size), 0x1234));
+  std::vector<guint8> refused = answer, longer = answer, full = answer;
+  refused[0] = 0x80;
+  fail_unless (!user_name_in (refused, 0x1234));
+  longer.push_back (0);
+  fail_unless (!user_name_in (longer, 0x1234));
+  full[16] = '-';
+  fail_unless_cmp (user_name_in (full, 0x1234), ==, "left-xxxxxxxxxxx");
+}
+GST_END_TEST;
+
 /* USB permissions, on a made-up list of devices */
 
 namespace fs = std::filesystem;
@@ -142,6 +174,8 @@ cameraparts_suite ()
   tcase_add_test (tc, test_frame_numbers_count_on_over_16_bits);
   tcase_add_test (tc, test_64_bit_frame_ids_need_no_rounds);
   tcase_add_test (tc, test_frame_numbers_grow_whatever_the_camera_says);
+  tcase_add_test (tc, test_user_name_is_asked_for_with_the_bytes_of_the_standard);
+  tcase_add_test (tc, test_user_name_is_taken_from_answers_of_the_standard_alone);
   tcase_add_test (tc, test_usb_camera_without_permission_is_found_once);
   return suite;
 }

@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "cameradevices.hpp"
+
+#include "camera/aravis/camera.hpp"
+
+#define GST_TYPE_CAMERA_DEVICE (gst_camera_device_get_type ())
+G_DECLARE_FINAL_TYPE (GstCameraDevice, gst_camera_device, GST, CAMERA_DEVICE, GstDevice)
+
+/* What the device monitor lists: one camera, or a stereo pair of a known rig. */
+struct _GstCameraDevice {
+  GstDevice parent;
+  gchar *factory;         // name of the element that opens it
+  GstStructure *settings; // the properties that element gets
+};
+
+G_DEFINE_TYPE (GstCameraDevice, gst_camera_device, GST_TYPE_DEVICE)
+
+namespace {
+
+/** "stereocamsrc left=1 right=2", as a launch string has it. */
+std::string
+launch_string (const std::string &factory, const GstStructure *settings)
+{
+  auto line = factory;
+  for (gint i = 0; i < gst_structure_n_fields (settings); ++i) {
+    const gchar *name = gst_structure_nth_field_name (settings, guint (i));
+    gchar *value = gst_value_serialize (gst_structure_get_value (settings, name));
+    line += std::string (" ") + name + "=" + value;
+    g_free (value);
+  }
+  return line;
+}
+
+GstDevice *
+new_device (const std::string &name, const gchar *klass, GstStructure *properties,
+    const gchar *factory, GstStructure *settings)
+{
+  const auto line = launch_string (factory, settings);
+  gst_structure_set (properties, "launch", G_TYPE_STRING, line.c_str (), nullptr);
+  GstCaps *caps = camera_caps (); // the camera's own are known only to who opens it
+  auto self = GST_CAMERA_DEVICE (g_object_new (GST_TYPE_CAMERA_DEVICE, "display-name",
+      name.c_str (), "device-class", klass, "caps", caps, "properties", properties, nullptr));
+  gst_caps_unref (caps);
+  gst_structure_free (properties);
+  self->factory = g_strdup (factory);
+  self->settings = settings;
+  return GST_DEVICE (self);
+}
+
+} // namespace
+
+GstDevice *
+new_camera_device (const CameraInfo &camera)
+{
+  auto properties = gst_structure_new ("camera-properties", "device.api", G_TYPE_STRING, "aravis",
+      "device.bus", G_TYPE_STRING, camera.is_gige () ? "ethernet" : "usb", "camera.protocol",
+      G_TYPE_STRING, camera.protocol.c_str (), "camera.id", G_TYPE_STRING, camera.id.c_str (),
+      "camera.vendor", G_TYPE_STRING, camera.vendor.c_str (), "camera.model", G_TYPE_STRING,
+      camera.model.c_str (), "camera.serial", G_TYPE_STRING, camera.serial.c_str (),
+      "camera.address", G_TYPE_STRING, camera.address.c_str (), nullptr);
+  if (!camera.problem.empty ())
+    gst_structure_set (
+        properties, "camera.problem", G_TYPE_STRING, camera.problem.c_str (), nullptr);
+
+  auto name = camera.vendor + " " + camera.model + " (" + camera.serial + ")";
+  if (!camera.problem.empty ())
+    name += ", not usable: " + camera.problem;
+  /* by its id, Aravis would use the network that answered first, which may not be the one that
+   * images can come by */
+  const auto &camera_name = camera.is_gige () ? camera.address : camera.id;
+  return new_device (name, "Source/Video", properties, "aravissrc",
+      gst_structure_new ("settings", "camera-name", G_TYPE_STRING, camera_name.c_str (), nullptr));
+}
+
+GstDevice *
+new_pair_device (const KnownPair &pair)
+{
+  auto properties = gst_structure_new ("stereo-pair-properties", "device.api", G_TYPE_STRING,
+      "aravis", "rig.file", G_TYPE_STRING, pair.rig_path.c_str (), "rig.view-id", G_TYPE_INT,
+      pair.view_id, "camera.left", G_TYPE_STRING, pair.cameras[0].c_str (), "camera.right",
+      G_TYPE_STRING, pair.cameras[1].c_str (), nullptr);
+  if (!pair.cameras[2].empty ())
+    gst_structure_set (
+        properties, "camera.third", G_TYPE_STRING, pair.cameras[2].c_str (), nullptr);
+  return new_device (pair.display_name, "Source/Video/Stereo", properties, "stereocamsrc",
+      gst_structure_new ("settings", "rig", G_TYPE_STRING, pair.rig_path.c_str (), "view-id",
+          G_TYPE_INT, pair.view_id, nullptr));
+}
+
+static gboolean
+set_field (GQuark field, const GValue *value, gpointer element)
+{
+  g_object_set_property (G_OBJECT (element), g_quark_to_string (field), value);
+  return TRUE;
+}
+
+static GstElement *
+gst_camera_device_create_element (GstDevice *device, const gchar *name)
+{
+  auto self = GST_CAMERA_DEVICE (device);
+  GstElement *element = gst_element_factory_make (self->factory, name);
+  if (element)
+    gst_structure_foreach (self->settings, set_field, element);
+  return element;
+}
+
+static gboolean
+gst_camera_device_reconfigure_element (GstDevice *device, GstElement *element)
+{
+  auto self = GST_CAMERA_DEVICE (device);
+  GstElementFactory *factory = gst_element_get_factory (element);
+  if (!factory || g_strcmp0 (GST_OBJECT_NAME (factory), self->factory) != 0)
+    return FALSE;
+  GstState state = GST_STATE_NULL;
+  gst_element_get_state (element, &state, nullptr, 0);
+  if (state > GST_STATE_READY)
+    return FALSE; // the camera is chosen when streaming starts
+  gst_structure_foreach (self->settings, set_field, element);
+  return TRUE;
+}
+
+static void
+gst_camera_device_finalize (GObject *object)
+{
+  auto self = GST_CAMERA_DEVICE (object);
+  g_free (self->factory);
+  if (self->settings)
+    gst_structure_free (self->settings);
+  G_OBJECT_CLASS (gst_camera_device_parent_class)->finalize (object);
+}
+
+static void
+gst_camera_device_init (GstCameraDevice *)
+{
+}
+
+static void
+gst_camera_device_class_init (GstCameraDeviceClass *klass)
+{
+  auto device_class = GST_DEVICE_CLASS (klass);
+  G_OBJECT_CLASS (klass)->finalize = gst_camera_device_finalize;
+  device_class->create_element = gst_camera_device_create_element;
+  device_class->reconfigure_element = gst_camera_device_reconfigure_element;
+}
