@@ -3,8 +3,8 @@
  * SECTION:element-plyenc
  * @title: plyenc
  *
- * Encodes each frame set as a point cloud: one binary PLY or PCD file per buffer, as downstream's
- * caps name it, in world coordinates and metres, for multifilesink.
+ * Encodes each frame set as a point cloud: one binary PLY file per buffer, in world coordinates and
+ * metres, for multifilesink.
  *
  * ## Example launch line
  * |[
@@ -30,8 +30,8 @@ GST_DEBUG_CATEGORY_STATIC (gst_ply_enc_debug);
 using rangecast::PointCloudFormat;
 
 struct GstPlyEncPrivate {
-  std::mutex lock;           /* guards settings */
-  PointCloudFormat settings; /* `kind` is that of the output caps */
+  std::mutex lock; /* guards settings */
+  PointCloudFormat settings;
 
   /* streaming thread */
   gstrange::RangeInfo info;
@@ -48,7 +48,7 @@ struct _GstPlyEnc {
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
 static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
-    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS ("application/x-ply; application/x-pcd"));
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS ("application/x-ply"));
 
 G_DEFINE_TYPE (GstPlyEnc, gst_ply_enc, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (plyenc, "plyenc", GST_RANK_NONE, gst_ply_enc_get_type ())
@@ -60,7 +60,6 @@ current_format (GstPlyEncPrivate *priv)
   return priv->settings;
 }
 
-/* Of the output PLY is the first, where both are possible. */
 static GstCaps *
 gst_ply_enc_transform_caps (
     GstBaseTransform *, GstPadDirection direction, GstCaps *, GstCaps *filter)
@@ -79,13 +78,6 @@ gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
 {
   auto self = GST_PLY_ENC (base);
   GST_INFO_OBJECT (self, "caps %" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
-  {
-    std::lock_guard guard (self->priv->lock);
-    self->priv->settings.kind =
-        gst_structure_has_name (gst_caps_get_structure (out, 0), "application/x-pcd")
-            ? PointCloudFormat::kPcd
-            : PointCloudFormat::kPly;
-  }
   const rangecast::Status status = gstrange::parse_caps (in, self->priv->info);
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
@@ -228,7 +220,7 @@ gst_ply_enc_class_init (GstPlyEncClass *klass)
   gst_element_class_add_static_pad_template (element_class, &sink_template);
   gst_element_class_add_static_pad_template (element_class, &src_template);
   gst_element_class_set_static_metadata (element_class, "PLY encoder", "Encoder/Image",
-      "Encodes each range frame set as a binary PLY or PCD point cloud", "gst-rangecast");
+      "Encodes each range frame set as a binary PLY point cloud", "gst-rangecast");
 
   transform_class->start = GST_DEBUG_FUNCPTR (gst_ply_enc_start);
   transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_ply_enc_sink_event);

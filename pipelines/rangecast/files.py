@@ -153,8 +153,8 @@ def build_convert(args):
         fail_unless((args.rgbd and is_pattern(file)) or Path(file).is_file(), f"no file '{file}'")
         fail_unless(os.path.realpath(file) != os.path.realpath(out), f"'{out}' is what is converted: choose another name to write")
     images = args.rgbd or len(inputs) > 1
-    fail_unless(args.learn or out.lower().endswith((".ply", ".pcd", ".png")[: 2 + images]),
-                f"'{out}': needs a name that ends in .ply, .pcd" + " or .png" * images)  # fmt: skip
+    fail_unless(args.learn or out.lower().endswith((".ply", ".png")[: 1 + images]),
+                f"'{out}': needs a name that ends in .ply" + " or .png" * images)  # fmt: skip
     launch = convert_rgbd(args, inputs, out) if args.rgbd else convert_pair(args, *inputs, out) if images else convert_recording(args, *inputs, out)
     if not args.learn and not options.numbered(out):
         launch.option("--drop-empty", out)

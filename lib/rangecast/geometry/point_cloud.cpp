@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <iterator>
 
 namespace rangecast {
 
@@ -132,46 +131,6 @@ surface_normal (const ConstRangeImage &image, const Intrinsics &intrinsics, int 
 
 namespace {
 
-std::string
-ply_header (const PointCloudFormat &format, const std::string &points)
-{
-  std::string text = "ply\nformat binary_little_endian 1.0\ncomment world, metres, y up\n"
-                     "element vertex " +
-                     points + "\nproperty float x\nproperty float y\nproperty float z\n";
-  if (format.with_normals)
-    text += "property float nx\nproperty float ny\nproperty float nz\n";
-  text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-  if (format.with_view_id)
-    text += "property uchar view_id\n";
-  return text + "end_header\n";
-}
-
-/* rgb is declared as a float, but its bytes are blue, green, red and 0. */
-std::string
-pcd_header (const PointCloudFormat &format, const std::string &points)
-{
-  std::string fields = "x y z", sizes = "4 4 4", types = "F F F", counts = "1 1 1";
-  if (format.with_normals) {
-    fields += " normal_x normal_y normal_z";
-    sizes += " 4 4 4";
-    types += " F F F";
-    counts += " 1 1 1";
-  }
-  fields += " rgb";
-  sizes += " 4";
-  types += " F";
-  counts += " 1";
-  if (format.with_view_id) {
-    fields += " view_id";
-    sizes += " 1";
-    types += " U";
-    counts += " 1";
-  }
-  return "# .PCD v0.7 - world, metres, y up\nVERSION 0.7\nFIELDS " + fields + "\nSIZE " + sizes +
-         "\nTYPE " + types + "\nCOUNT " + counts + "\nWIDTH " + points +
-         "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + points + "\nDATA binary\n";
-}
-
 std::uint8_t *
 write_vector (Vec3 vector, std::uint8_t *to)
 {
@@ -186,17 +145,23 @@ write_vector (Vec3 vector, std::uint8_t *to)
 std::string
 PointCloudWriter::header (std::size_t points) const
 {
-  const std::string count = std::to_string (points);
-  return format_.kind == PointCloudFormat::kPcd ? pcd_header (format_, count)
-                                                : ply_header (format_, count);
+  std::string text = "ply\nformat binary_little_endian 1.0\ncomment world, metres, y up\n"
+                     "element vertex " +
+                     std::to_string (points) +
+                     "\nproperty float x\nproperty float y\nproperty float z\n";
+  if (format_.with_normals)
+    text += "property float nx\nproperty float ny\nproperty float nz\n";
+  text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  if (format_.with_view_id)
+    text += "property uchar view_id\n";
+  return text + "end_header\n";
 }
 
 std::size_t
 PointCloudWriter::size (std::size_t points) const
 {
-  const std::size_t point_size = 12 + (format_.with_normals ? 12 : 0) +
-                                 (format_.kind == PointCloudFormat::kPcd ? 4 : 3) +
-                                 (format_.with_view_id ? 1 : 0);
+  const std::size_t point_size =
+      15 + (format_.with_normals ? 12 : 0) + (format_.with_view_id ? 1 : 0);
   return header (points).size () + points * point_size;
 }
 
@@ -210,14 +175,8 @@ PointCloudWriter::write_point (
   if (format_.with_normals)
     to = write_vector (
         view.world_from_view.rotation * surface_normal (image, view.intrinsics, x, y), to);
-  const Rgbx colour = image.colour.at (x, y);
-  if (format_.kind == PointCloudFormat::kPcd) {
-    const std::uint8_t bgr0[] = {colour.b, colour.g, colour.r, 0};
-    to = std::copy (std::begin (bgr0), std::end (bgr0), to);
-  } else {
-    std::memcpy (to, &colour, 3);
-    to += 3;
-  }
+  std::memcpy (to, &image.colour.at (x, y), 3);
+  to += 3;
   if (format_.with_view_id)
     *to++ = static_cast<std::uint8_t> (image.view_id);
   return to;

@@ -42,19 +42,14 @@ struct DepthRange {
 [[nodiscard]] Vec3 surface_normal (
     const ConstRangeImage &image, const Intrinsics &intrinsics, int x, int y);
 
-/** File format of point clouds, and the fields of a point besides x y z (float, world, metres) and
- *  its colour. */
+/** What the points of a binary PLY file have besides x y z (float, world, metres) and red green
+ * blue (uchar). */
 struct PointCloudFormat {
-  enum Kind {
-    kPly, ///< binary little-endian PLY: x y z [nx ny nz] red green blue (uchar) [view_id (uchar)]
-    kPcd  ///< binary PCD 0.7: x y z [normal_x normal_y normal_z] rgb (packed) [view_id (uint8)]
-  };
-  Kind kind = kPly;
   bool with_normals = false; ///< surface_normal() in world coordinates
   bool with_view_id = false;
 };
 
-/** Writes point clouds as files. */
+/** Writes point clouds as PLY files. */
 class PointCloudWriter {
 public:
   explicit PointCloudWriter (PointCloudFormat format) : format_ (format) {}

@@ -1,18 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include <sstream> /* before check.h, whose macro `fail` it does not survive */
-
 #include "../rangecast-check.hpp"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cstring>
 #include <glib/gstdio.h>
-#include <map>
 #include <random>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <vector>
 
 using namespace rangecast;
@@ -393,177 +387,6 @@ GST_START_TEST (test_points_and_normals_of_a_cut_roi_are_those_of_the_whole_imag
 }
 GST_END_TEST;
 
-/* ---- formats ---- */
-
-/* A file as a reader of PCD finds it: by its header, of which it knows nothing before
- * ("The PCD (Point Cloud Data) file format", pointclouds.org). */
-class Pcd {
-public:
-  explicit Pcd (GstBuffer *buffer)
-  {
-    GstMapInfo map;
-    fail_unless (gst_buffer_map (buffer, &map, GST_MAP_READ));
-    bytes_.assign (reinterpret_cast<const char *> (map.data), map.size);
-    gst_buffer_unmap (buffer, &map);
-    std::size_t at = 0;
-    while (!words_.contains ("DATA"))
-      at = take_line (at);
-    data_ = at;
-    find_fields ();
-    fail_unless_equals_int (bytes_.size () - data_, points () * stride_);
-  }
-
-  /** What a line of the header says after its name. */
-  [[nodiscard]] const std::vector<std::string> &words (const char *name) const
-  {
-    const auto found = words_.find (name);
-    fail_unless (found != words_.end (), "no %s in the header", name);
-    return found->second;
-  }
-  [[nodiscard]] std::size_t points () const { return std::stoul (words ("POINTS").at (0)); }
-  /** Bytes of one point's field. */
-  template <typename T> [[nodiscard]] T value (std::size_t point, const std::string &field) const
-  {
-    const auto found = fields_.find (field);
-    fail_unless (found != fields_.end (), "no field %s", field.c_str ());
-    fail_unless_equals_int (found->second.size, sizeof (T));
-    fail_unless_cmp (found->second.type, ==, (std::is_floating_point_v<T> ? "F" : "U"));
-    T value;
-    std::memcpy (
-        &value, bytes_.data () + data_ + point * stride_ + found->second.offset, sizeof value);
-    return value;
-  }
-  /** Red, green, blue: of a float whose bits are 0x00rrggbb, as PCL packs them. */
-  [[nodiscard]] std::array<guint8, 3> colour (std::size_t point) const
-  {
-    const auto bits = std::bit_cast<guint32> (value<float> (point, "rgb"));
-    fail_unless_equals_int (bits >> 24, 0);
-    return {guint8 (bits >> 16), guint8 (bits >> 8), guint8 (bits)};
-  }
-
-private:
-  struct Field {
-    std::size_t offset, size;
-    std::string type;
-  };
-
-  std::size_t take_line (std::size_t at)
-  {
-    const std::size_t end = bytes_.find ('\n', at);
-    fail_unless (end != bytes_.npos, "the header has no end");
-    std::istringstream line (bytes_.substr (at, end - at));
-    std::string name, word;
-    line >> name;
-    if (!name.starts_with ('#')) {
-      fail_if (words_.contains (name), "two lines %s", name.c_str ());
-      auto &words = words_[name];
-      while (line >> word)
-        words.push_back (word);
-    }
-    return end + 1;
-  }
-
-  void find_fields ()
-  {
-    const auto &names = words ("FIELDS");
-    for (const char *name : {"SIZE", "TYPE", "COUNT"})
-      fail_unless_equals_int (words (name).size (), names.size ());
-    for (std::size_t i = 0; i < names.size (); i++) {
-      const std::size_t size = std::stoul (words ("SIZE")[i]);
-      fail_unless (words ("COUNT")[i] == "1");
-      fields_[names[i]] = {stride_, size, words ("TYPE")[i]};
-      stride_ += size;
-    }
-  }
-
-  std::string bytes_;
-  std::map<std::string, std::vector<std::string>> words_;
-  std::map<std::string, Field> fields_;
-  std::size_t data_ = 0, stride_ = 0;
-};
-
-/* The same frame set as PLY or PCD, with all that a file can have. */
-static GstBuffer *
-whole_file (const Rig &rig, const char *format)
-{
-  GstHarness *h = gst_harness_new_parse ("plyenc normals=true view-id=true");
-  gst_harness_set_sink_caps_str (h, (std::string ("application/x-") + format).c_str ());
-  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
-  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig, 0, {7, 5, 40, 30}));
-  gst_harness_teardown (h);
-  return output;
-}
-
-GST_START_TEST (test_pcd_read_by_its_header_has_the_points_of_the_ply)
-{
-  const Rig rig = ring_rig (2);
-  GstBuffer *ply_file = whole_file (rig, "ply"), *pcd_file = whole_file (rig, "pcd");
-  const Ply ply = parse_ply (ply_file, true, true);
-  const Pcd pcd (pcd_file);
-  ck_assert_uint_gt (ply.points, 500);
-  fail_unless_equals_int (pcd.points (), ply.points);
-  std::size_t wrong = 0;
-  for (std::size_t i = 0; i < ply.points; i++) {
-    const char *const place[] = {"x", "y", "z"}, *const normal[] = {
-                                                     "normal_x", "normal_y", "normal_z"};
-    const auto rgb = pcd.colour (i);
-    for (std::size_t k = 0; k < 3; k++)
-      wrong += pcd.value<float> (i, place[k]) != ply.xyz[3 * i + k] ||
-               pcd.value<float> (i, normal[k]) != ply.normals[3 * i + k] ||
-               rgb[k] != ply.rgb[3 * i + k];
-    wrong += pcd.value<guint8> (i, "view_id") != ply.view_id[i];
-  }
-  fail_unless_equals_int (wrong, 0);
-  gst_buffer_unref (ply_file);
-  gst_buffer_unref (pcd_file);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_pcd_header_says_what_readers_ask_for)
-{
-  const Rig rig = ring_rig (2);
-  GstBuffer *file = whole_file (rig, "pcd");
-  const Pcd pcd (file);
-  using Words = std::vector<std::string>;
-  fail_unless_cmp (pcd.words ("VERSION"), ==, Words{"0.7"});
-  fail_unless_cmp (pcd.words ("WIDTH"), ==, pcd.words ("POINTS"));
-  fail_unless_cmp (pcd.words ("HEIGHT"), ==, Words{"1"}); /* a cloud, not a picture */
-  fail_unless ((pcd.words ("VIEWPOINT") == Words{"0", "0", "0", "1", "0", "0", "0"}));
-  fail_unless_cmp (pcd.words ("DATA"), ==, Words{"binary"});
-  gst_buffer_unref (file);
-}
-GST_END_TEST;
-
-/* Whether the next file, and what the caps say of it, are PCD. */
-static void
-expect_format (GstHarness *h, const Rig &rig, bool pcd)
-{
-  GstBuffer *output = gst_harness_push_and_pull (h, make_frame_set (rig));
-  fail_unless_equals_int (gst_buffer_memcmp (output, 0, "ply\n", 4) != 0, pcd);
-  gst_buffer_unref (output);
-  GstCaps *caps = gst_pad_get_current_caps (h->sinkpad);
-  fail_unless (gst_structure_has_name (
-      gst_caps_get_structure (caps, 0), pcd ? "application/x-pcd" : "application/x-ply"));
-  gst_caps_unref (caps);
-}
-
-GST_START_TEST (test_format_is_the_one_that_downstream_names)
-{
-  const Rig rig = ring_rig (1);
-  for (const bool pcd : {false, true}) {
-    GstHarness *h = gst_harness_new ("plyenc");
-    gst_harness_set_sink_caps_str (h, pcd ? "application/x-pcd" : "application/x-ply");
-    gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
-    expect_format (h, rig, pcd);
-    gst_harness_teardown (h);
-  }
-  GstHarness *h = gst_harness_new ("plyenc"); /* both are possible */
-  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
-  expect_format (h, rig, false);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
 static Suite *
 plyenc_suite ()
 {
@@ -583,9 +406,6 @@ plyenc_suite ()
   tcase_add_test (tc, test_normal_of_a_lone_point_or_line_is_towards_the_camera);
   tcase_add_test (tc, test_normals_of_noise_have_length_1_and_face_the_camera);
   tcase_add_test (tc, test_points_and_normals_of_a_cut_roi_are_those_of_the_whole_image);
-  tcase_add_test (tc, test_pcd_read_by_its_header_has_the_points_of_the_ply);
-  tcase_add_test (tc, test_pcd_header_says_what_readers_ask_for);
-  tcase_add_test (tc, test_format_is_the_one_that_downstream_names);
   return suite;
 }
 
