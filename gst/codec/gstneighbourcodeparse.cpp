@@ -98,15 +98,13 @@ G_DEFINE_TYPE (GstNeighbourCodeParse, gst_neighbour_code_parse, GST_TYPE_BASE_PA
 
 /* ---- typefinder ---- */
 
-/* Not with the maximum, at which typefinding stops: uridecodebin3 of GStreamer 1.22 starts its
- * source before decodebin3, which loses what comes before it is ready. */
 static void
 find_type (GstTypeFind *find, gpointer)
 {
   const guint8 *data = gst_type_find_peek (find, 0, kAccessUnitHeaderSize);
   AccessUnitHeader header;
   if (data && rangecast::begins_access_unit ({data, kAccessUnitHeaderSize}, header))
-    gst_type_find_suggest_simple (find, GST_TYPE_FIND_NEARLY_CERTAIN, GST_NEIGHBOUR_CODE_MEDIA_TYPE,
+    gst_type_find_suggest_simple (find, GST_TYPE_FIND_MAXIMUM, GST_NEIGHBOUR_CODE_MEDIA_TYPE,
         "version", G_TYPE_INT, rangecast::kBitstreamVersion, nullptr);
 }
 
@@ -133,10 +131,32 @@ reset_min_frame_size (GstBaseParse *base)
   gst_base_parse_set_min_frame_size (base, stream.reads_stream ? guint (kAccessUnitHeaderSize) : 1);
 }
 
+/* Lets a state change of the pipeline end, for 5 s at most: uridecodebin3 of GStreamer 1.22 starts
+ * its source before decodebin3, which loses what comes before it is in PAUSED. */
+static void
+wait_for_state_change (GstBaseParse *base)
+{
+  auto top = static_cast<GstElement *> (gst_object_ref (base));
+  while (GstObject *parent = gst_object_get_parent (GST_OBJECT (top))) {
+    gst_object_unref (top);
+    top = GST_ELEMENT (parent);
+  }
+  for (int i = 0; i < 5000 && !GST_PAD_IS_FLUSHING (GST_BASE_PARSE_SRC_PAD (base)); i++) {
+    if (GST_STATE_TRYLOCK (top)) {
+      GST_STATE_UNLOCK (top);
+      break;
+    }
+    g_usleep (1000);
+  }
+  gst_object_unref (top);
+}
+
 static bool
 set_source_caps (GstBaseParse *base)
 {
   Stream &stream = GST_NEIGHBOUR_CODE_PARSE (base)->priv->stream;
+  if (!gst_pad_has_current_caps (GST_BASE_PARSE_SRC_PAD (base)))
+    wait_for_state_change (base);
   stream.src_caps_set = false;
   if (!require_downstream (GST_ELEMENT (base), GST_BASE_PARSE_SRC_PAD (base), false))
     return false;
@@ -149,14 +169,6 @@ set_source_caps (GstBaseParse *base)
   gst_base_parse_merge_tags (base, tags, GST_TAG_MERGE_REPLACE);
   gst_tag_list_unref (tags);
   return stream.src_caps_set;
-}
-
-/* Flow return after downstream has refused the caps. */
-static GstFlowReturn
-caps_refused_flow (GstBaseParse *base)
-{
-  return GST_PAD_IS_FLUSHING (GST_BASE_PARSE_SRC_PAD (base)) ? GST_FLOW_FLUSHING
-                                                             : GST_FLOW_NOT_NEGOTIATED;
 }
 
 static gboolean
@@ -373,7 +385,8 @@ finish_access_unit (
   stream.in_sync = stream.found = true;
   reset_min_frame_size (base);
   if (!update_caps (base))
-    return caps_refused_flow (base);
+    return GST_PAD_IS_FLUSHING (GST_BASE_PARSE_SRC_PAD (base)) ? GST_FLOW_FLUSHING
+                                                               : GST_FLOW_NOT_NEGOTIATED;
   if (stream.src_caps_set && part.expected)
     warn_damage (base, frame, part);
   if (!stream.src_caps_set || part.length <= units)
@@ -462,25 +475,13 @@ gst_neighbour_code_parse_sink_event (GstBaseParse *base, GstEvent *event)
 
 /* ---- life ---- */
 
-static void
-reset_stream (GstNeighbourCodeParsePrivate *priv)
+static gboolean
+gst_neighbour_code_parse_reset (GstBaseParse *base)
 {
+  GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
   priv->stream = {};
   priv->seek.reset ();
-}
-
-static gboolean
-gst_neighbour_code_parse_start (GstBaseParse *base)
-{
-  reset_stream (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
   reset_min_frame_size (base);
-  return TRUE;
-}
-
-static gboolean
-gst_neighbour_code_parse_stop (GstBaseParse *base)
-{
-  reset_stream (GST_NEIGHBOUR_CODE_PARSE (base)->priv);
   return TRUE;
 }
 
@@ -505,8 +506,7 @@ gst_neighbour_code_parse_class_init (GstNeighbourCodeParseClass *klass)
       "Codec/Parser/Converter/Video", "Divides neighbour code byte streams into access units",
       "gst-rangecast");
 
-  parse_class->start = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_start);
-  parse_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_stop);
+  parse_class->start = parse_class->stop = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_reset);
   parse_class->set_sink_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_set_sink_caps);
   parse_class->sink_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_sink_event);
   parse_class->src_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_parse_src_event);
