@@ -2,6 +2,7 @@
 /* Strips and the orbit camera. */
 #include "../test-support.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <rangecast/surface/orbit.hpp>

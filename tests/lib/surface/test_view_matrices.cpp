@@ -3,12 +3,13 @@
  * of mode blend. */
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <rangecast/surface/orbit.hpp>
 #include <rangecast/surface/painting.hpp>
 #include <rangecast/surface/reduced_view.hpp>
 #include <rangecast/surface/scene_hull.hpp>
 #include <rangecast/surface/strips.hpp>
-#include <rangecast/surface/orbit.hpp>
 #include <set>
 #include <vector>
 
