@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The page's main thread: it owns the picture and the camera; decoder.js, a worker, owns stream, decoder and geometry. Parameters of the
-// address: src=URL of a recording; server=URL of a stream (default: this page's server, if that has one); stats; fit=0: the first camera's view; azimuth, elevation (degrees); time (ms) and paused.
+// address: src=URL of a recording; server=URL of a stream (default: this page's server, if that has one); stats; fit=0: the first camera's view; azimuth, elevation (degrees); time (ms) and paused;
+// transparent: nothing but the person.
 // A token comes in the fragment (#token=...), which stays in this browser.
 import { Core } from './core.js';
 import { followPointers } from './pointers.js';
@@ -12,6 +13,7 @@ import { Stats } from './stats.js';
 const element = (id) => document.getElementById (id);
 const canvas = element ('picture');
 const parameters = new URLSearchParams (location.search);
+document.documentElement.classList.toggle ('transparent', parameters.has ('transparent'));
 
 // ---- what the page says ----
 
@@ -47,7 +49,7 @@ class Page {
     this.worker.onmessage = ({ data }) => this[data.type] (data);
     this.worker.postMessage ({ type: 'start', module });
     this.camera = new Core (module);
-    this.renderer = new Renderer (canvas, (number) => this.camera.text (this.camera.call ('rc_shader', number)));
+    this.renderer = new Renderer (canvas, (number) => this.camera.text (this.camera.call ('rc_shader', number)), parameters.has ('transparent'));
     this.speech = new Speech (say, (wait) => this.worker.postMessage ({ type: 'hold', wait }));
     this.stats = new Stats (element ('stats'), parameters.has ('stats'), (latency) => this.speech.follow (latency));
     this.pending = null; // the newest frame set, not uploaded yet

@@ -43,11 +43,12 @@ class Program {
 
 export class Renderer {
   // shader (number): its source
-  constructor (canvas, shader) {
+  constructor (canvas, shader, transparent = false) {
     this.canvas = canvas;
     this.shader = shader;
+    this.transparent = transparent;
     // Kept, so that a picture can be saved at any time.
-    this.gl = canvas.getContext ('webgl2', { alpha: false, antialias: false, depth: true, preserveDrawingBuffer: true, powerPreference: 'high-performance' });
+    this.gl = canvas.getContext ('webgl2', { alpha: transparent, premultipliedAlpha: false, antialias: false, depth: true, preserveDrawingBuffer: true, powerPreference: 'high-performance' });
     if (!this.gl)
       throw new Error ('This browser has no WebGL2, or it is switched off.');
     this.start ();
@@ -116,7 +117,9 @@ export class Renderer {
     const { gl, canvas: { width, height } } = this;
     gl.bindFramebuffer (gl.FRAMEBUFFER, null);
     gl.viewport (0, 0, width, height);
-    gl.clearColor (picture[0], picture[1], picture[2], 1);
+    if (this.transparent)
+      picture.fill (0, 0, 4);
+    gl.clearColor (...picture.subarray (0, 4));
     gl.clear (gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     if (this.layers.length > 0 && picture[17] === this.layers.length)
       this.drawBlended (picture, width, height);

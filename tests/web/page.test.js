@@ -85,6 +85,20 @@ for (const angle of [-30, 100])
     await page.close ();
   });
 
+test ('a transparent page shows nothing but the person', async () => {
+  const page = await open ('src=scene.rcnc&paused&transparent'), url = await picture (page);
+  const alphas = await page.evaluate (async (from) => {
+    const image = await createImageBitmap (await (await fetch (from)).blob ()), canvas = new OffscreenCanvas (image.width, image.height);
+    const context = canvas.getContext ('2d');
+    context.drawImage (image, 0, 0);
+    return [[2, 2], [image.width / 2, image.height / 2]].map ((at) => context.getImageData (...at, 1, 1).data[3]);
+  }, url);
+  assert.deepEqual (alphas, [0, 255]);
+  assert.equal (await page.evaluate (() => getComputedStyle (document.getElementById ('bar')).display + getComputedStyle (document.body).backgroundColor),
+    'nonergba(0, 0, 0, 0)');
+  await page.close ();
+});
+
 test ('a recording that is cut off is shown to its end, and says so', async () => {
   const page = await open ('src=cut.rcnc');
   await messageMatches (page, '^The recording is cut off: ');
