@@ -32,6 +32,23 @@ print(len({struct.unpack_from("<f", points, i * size + 8)[0] for i in range(coun
   [ "$depths" -gt 1000 ] || fail "only $depths different depths"
 }
 
+# Sender and receiver of coded frame sets, one after the other.
+test_recipes_of_coded_streams_run () {
+  local sender receiver sending
+  need_gl
+  grep -E '^gst-launch-1.0 .*(shm|srt)s' "$source_dir/docs/guide/recipes.md" |
+    sed -e "s,/tmp/avatar,$PWD/avatar,; s/ glimagesink/ fakesink num-buffers=10/" >lines
+  [ "$(wc -l <lines)" = 4 ] || fail "expected four lines: $(cat lines)"
+  while read -r sender && read -r receiver; do
+    timeout 60 bash -c "exec $sender" >sender.log 2>&1 &
+    sending=$!
+    until_true 30 timeout 20 bash -c "$receiver" >receiver.log 2>&1 || fail "$sender: $(tail -n 3 sender.log); $receiver: $(tail -n 3 receiver.log)"
+    grep -q 'Got EOS' receiver.log || fail "$(cat receiver.log)"
+    kill $sending
+    wait $sending || true
+  done <lines
+}
+
 test_each_page_is_in_the_index () {
   local page missing=
   for page in "$source_dir"/docs/guide/*.md "$source_dir"/docs/formats/*.md "$source_dir"/docs/engineering/*.md; do
