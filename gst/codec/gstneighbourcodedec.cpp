@@ -398,7 +398,9 @@ gst_neighbour_code_dec_generate_output (GstBaseTransform *base, GstBuffer **outp
     return GST_FLOW_NOT_NEGOTIATED;
   }
   if (GstBuffer *input = g_steal_pointer (&base->queued_buf)) {
-    const GstFlowReturn flow = handle_input (self, input, output);
+    const bool is_skipped = base->segment.flags & GST_SEGMENT_FLAG_TRICKMODE_KEY_UNITS &&
+                            GST_BUFFER_FLAG_IS_SET (input, GST_BUFFER_FLAG_DELTA_UNIT);
+    const GstFlowReturn flow = is_skipped ? GST_FLOW_OK : handle_input (self, input, output);
     gst_buffer_unref (input);
     if (flow != GST_FLOW_OK || *output)
       return flow;
@@ -522,16 +524,6 @@ make_stats (const GstNeighbourCodeDecPrivate *priv)
 }
 
 static void
-gst_neighbour_code_dec_finalize (GObject *object)
-{
-  GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (object)->priv;
-  reset_stream (priv);
-  drop_pool (priv->pool);
-  delete priv;
-  G_OBJECT_CLASS (gst_neighbour_code_dec_parent_class)->finalize (object);
-}
-
-static void
 gst_neighbour_code_dec_init (GstNeighbourCodeDec *self)
 {
   self->priv = new GstNeighbourCodeDecPrivate;
@@ -545,7 +537,7 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto transform_class = GST_BASE_TRANSFORM_CLASS (klass);
 
-  object_class->finalize = gst_neighbour_code_dec_finalize;
+  object_class->finalize = delete_private<GstNeighbourCodeDec>;
 
   install_properties<GstNeighbourCodeDec, decoder_properties, make_stats> (object_class,
       "Counters since the element was started: frames, points, slices, bad-slices, "

@@ -449,7 +449,7 @@ gst_neighbour_code_parse_pre_push_frame (GstBaseParse *base, GstBaseParseFrame *
 static gboolean
 gst_neighbour_code_parse_src_event (GstBaseParse *base, GstEvent *event)
 {
-  if (GST_EVENT_TYPE (event) == GST_EVENT_SEEK && NeighbourCodeSeek::reads_file (base))
+  if (GST_EVENT_TYPE (event) == GST_EVENT_SEEK)
     event = GST_NEIGHBOUR_CODE_PARSE (base)->priv->seek.handle_seek (base, event);
   if (!event)
     return FALSE;

@@ -12,6 +12,12 @@ using rangecast::TakeList;
 
 namespace {
 
+bool
+is_pulling (GstBaseParse *base)
+{
+  return GST_PAD_MODE (GST_BASE_PARSE_SINK_PAD (base)) == GST_PAD_MODE_PULL;
+}
+
 void
 read_file (GstPad *pad, guint64 offset, gsize size, std::vector<guint8> &to)
 {
@@ -71,12 +77,6 @@ choose (const StreamFile::Target &target, guint64 pts, GstSeekFlags flags)
 
 } // namespace
 
-bool
-NeighbourCodeSeek::reads_file (GstBaseParse *base)
-{
-  return GST_PAD_MODE (GST_BASE_PARSE_SINK_PAD (base)) == GST_PAD_MODE_PULL;
-}
-
 void
 NeighbourCodeSeek::reset ()
 {
@@ -92,7 +92,7 @@ NeighbourCodeSeek::time_of (
   if (!GST_CLOCK_TIME_IS_VALID (frame_duration))
     frame_duration = 0;
   const bool is_first = takes_.empty (); /* which changes in this thread only */
-  if (is_first && reads_file (base)) {
+  if (is_first && is_pulling (base)) {
     StreamFile file = file_part (base, 0);
     TakeList takes = file.takes (unit.offset, frame_duration);
     takes.interrupt ();
@@ -166,11 +166,14 @@ NeighbourCodeSeek::handle_seek (GstBaseParse *base, GstEvent *event)
   GstSeekType start_type, stop_type;
   gint64 start, stop;
   gst_event_parse_seek (event, &rate, &format, &flags, &start_type, &start, &stop_type, &stop);
-  if (rate < 0) { /* reverse playback is not supported */
+  if (rate < 0) {
+    GST_ELEMENT_WARNING (base, STREAM, NOT_IMPLEMENTED,
+        ("Reverse playback is not supported: seek with a positive rate"), (nullptr));
     gst_event_unref (event);
     return nullptr;
   }
-  if (format != GST_FORMAT_TIME || start_type != GST_SEEK_TYPE_SET || start < 0)
+  if (!is_pulling (base) || format != GST_FORMAT_TIME || start_type != GST_SEEK_TYPE_SET ||
+      start < 0)
     return event;
   const GstClockTime found = find_place (base, GstClockTime (start), flags);
   if (!GST_CLOCK_TIME_IS_VALID (found))

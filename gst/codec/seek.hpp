@@ -11,9 +11,6 @@
  *  lock is never held while pulling, pushing, querying or posting. */
 class NeighbourCodeSeek {
 public:
-  /** Whether the parser is in pull mode. */
-  static bool reads_file (GstBaseParse *base);
-
   void reset ();
   /** The time of the next access unit, which has one in the stream. The first one of a file also
    *  sets the parser's duration.

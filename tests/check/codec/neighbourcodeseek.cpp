@@ -143,14 +143,34 @@ GST_START_TEST (test_pushed_file_is_sought_by_time_too)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_trick_mode_decodes_key_frame_sets_only)
+{
+  const Recording recording (20, 16);
+  const TemporaryFile file (with_delta_units (recording));
+  Player player (file, "", "neighbourcodedec !");
+  fail_unless (player.seek (0, GST_SEEK_FLAG_TRICKMODE | GST_SEEK_FLAG_TRICKMODE_KEY_UNITS));
+  fail_unless (player.finish ());
+  const std::vector<GstClockTime> keys = {0, 5 * kFrame, 10 * kFrame, 15 * kFrame};
+  fail_unless (player.seen == keys);
+  fail_unless (player.seek (0, GST_SEEK_FLAG_ACCURATE));
+  fail_unless (player.finish ());
+  fail_unless_equals_int (player.seen.size (), 20);
+}
+GST_END_TEST;
+
 GST_START_TEST (test_reverse_playback_is_refused)
 {
   const Recording recording (20, 16);
   const TemporaryFile file (recording.bytes);
-  Player player (file);
-  fail_unless (player.wait ());
-  fail_if (gst_element_seek (player.pipeline, -1.0, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
-      GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_SET, 10 * kFrame));
+  for (const char *between : {"", "queue !"}) {
+    Player player (file, between);
+    GstBus *bus = gst_element_get_bus (player.pipeline);
+    fail_unless (player.wait ());
+    fail_if (gst_element_seek (player.pipeline, -1.0, GST_FORMAT_TIME, GST_SEEK_FLAG_FLUSH,
+        GST_SEEK_TYPE_SET, 0, GST_SEEK_TYPE_SET, 10 * kFrame));
+    fail_unless_contains (next_message_text (bus, GST_MESSAGE_WARNING), "Reverse playback");
+    gst_object_unref (bus);
+  }
 }
 GST_END_TEST;
 
@@ -221,6 +241,7 @@ neighbourcodeseek_suite ()
   tcase_add_test (tc, test_seek_finds_its_place_in_spite_of_damage);
   tcase_add_test (tc, test_times_that_are_missing_are_right_after_a_seek);
   tcase_add_test (tc, test_pushed_file_is_sought_by_time_too);
+  tcase_add_test (tc, test_trick_mode_decodes_key_frame_sets_only);
   tcase_add_test (tc, test_reverse_playback_is_refused);
   tcase_add_test (tc, test_takes_of_a_file_follow_each_other);
   tcase_add_test (tc, test_seek_finds_its_take_and_the_rig_there);
