@@ -99,7 +99,6 @@ FrameMatcher::next (GstClockTime tolerance, bool timeout)
 {
   release ();
   peek (tolerance);
-  drop_far_ahead ();
   const GstFlowReturn flow = take_set (tolerance, timeout);
   release_heads ();
   return flow;
@@ -138,41 +137,6 @@ FrameMatcher::take_set (GstClockTime tolerance, bool timeout)
   }
   segment_sent_ = true; /* GstAggregator sends it with the first buffer */
   return GST_FLOW_OK;
-}
-
-/* Sources that are not live and stamp buffers by the clock (fdsrc do-timestamp=true) may do so in
- * the moment between the pipeline's clock and its base time, and be hours ahead. */
-void
-FrameMatcher::drop_far_ahead ()
-{
-  if (GST_STATE (element_) != GST_STATE_PLAYING ||
-      !GST_CLOCK_TIME_IS_VALID (gst_aggregator_get_latency (GST_AGGREGATOR (element_))))
-    return;
-  const GstClockTime now = gst_element_get_current_running_time (element_);
-  for (std::size_t i = 0; i < names_.size () && GST_CLOCK_TIME_IS_VALID (now); i++) {
-    PadStream &stream = streams_[i];
-    const bool is_ahead =
-        stream.head == Head::kFrame && stream.time > now + kMaxAhead &&
-        std::ranges::any_of (streams_, [&stream] (const PadStream &other) {
-          return other.head == Head::kFrame &&
-                 GST_CLOCK_DIFF (other.time, stream.time) > GstClockTimeDiff (kMaxAhead);
-        });
-    if (!is_ahead || !GST_CLOCK_TIME_IS_VALID (stream.time))
-      continue;
-    gst_aggregator_pad_drop_buffer (stream.pad);
-    stream.head = Head::kMissing;
-    dropped_[i]++;
-    dropped_since_set_ = true;
-    GST_CAT_DEBUG_OBJECT (category_, stream.pad,
-        "dropping frame at %" GST_TIME_FORMAT ": far ahead of the clock",
-        GST_TIME_ARGS (stream.time));
-    if (!std::exchange (warned_far_ahead_, true))
-      GST_ELEMENT_WARNING (element_, STREAM, FAILED,
-          ("Pad %s: dropped a buffer %.0f s ahead of the clock", GST_PAD_NAME (stream.pad),
-              double (stream.time - now) / GST_SECOND),
-          ("running time %" GST_TIME_FORMAT "; further ones are only logged",
-              GST_TIME_ARGS (stream.time)));
-  }
 }
 
 /* Once for each time that a pad falls silent, and for images that never pair up. */
@@ -333,7 +297,7 @@ FrameMatcher::start ()
   flush ();
   for (auto &dropped : dropped_)
     dropped = 0;
-  warned_far_ahead_ = warned_unmatched_ = false;
+  warned_unmatched_ = false;
 }
 
 void

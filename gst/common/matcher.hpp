@@ -53,12 +53,11 @@ struct PadStream : MatchStream {
 /** Matches the images of two or three sink pads of an aggregator by running time, for the streaming
  *  thread. An image waits for its partners until they have an image or a GAP of a later time. In a
  *  live pipeline it waits no longer than kPatience beyond the element's latency, so that a source
- *  that feeds several pads is never blocked for good, and images that are more than kMaxAhead ahead
- *  of the clock and of another pad are dropped. Times in which images were dropped because of a GAP
- *  are announced downstream by GAP events. */
+ *  that feeds several pads is never blocked for good. Times in which images were dropped because of
+ *  a GAP are announced downstream by GAP events. */
 class FrameMatcher {
 public:
-  static constexpr GstClockTime kPatience = GST_SECOND / 2, kMaxAhead = 10 * GST_SECOND;
+  static constexpr GstClockTime kPatience = GST_SECOND / 2;
   static constexpr std::size_t kMaxPads = 3;
 
   /** @param names  of the sink pads; the first two are required, the third one may come and go */
@@ -94,7 +93,6 @@ private:
   void peek (GstClockTime tolerance);
   void release_heads ();
   GstFlowReturn take_set (GstClockTime tolerance, bool timeout);
-  void drop_far_ahead ();
   void warn_unmatched (std::size_t index);
   void drop (std::size_t index, GstClockTime tolerance);
   void push_gap (GstClockTime begin, GstClockTime end);
@@ -108,7 +106,7 @@ private:
   std::array<std::atomic<guint64>, kMaxPads> dropped_{};
   GstClockTime running_ = GST_CLOCK_TIME_NONE, output_end_ = 0;
   bool discont_ = false, dropped_since_set_ = false, segment_sent_ = false;
-  bool warned_far_ahead_ = false, warned_unmatched_ = false;
+  bool warned_unmatched_ = false;
   guint64 unmatched_ = 0; /* images dropped since the last set */
   GstClockID link_timer_ = nullptr;
 };

@@ -74,6 +74,7 @@ struct CombineSettings {
   int colour_view_id = -1; /* -1: colour comes from the depth camera, too */
   RegisterInto into = RegisterInto::kDepth;
   double depth_scale = kDefaultDepthScale; /* metres per unit of the input */
+  bool do_timestamp = false;
 };
 
 } // namespace
@@ -150,6 +151,32 @@ gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, 
     priv->negotiate = true;
   }
   return GST_AGGREGATOR_CLASS (gst_range_combine_parent_class)->sink_event (aggregator, pad, event);
+}
+
+/* For do-timestamp. The running time is 0 until the element plays: its base time may be old. */
+static GstPadProbeReturn
+stamp_arrival (GstPad *pad, GstPadProbeInfo *info, gpointer data)
+{
+  auto self = GST_RANGE_COMBINE (data);
+  {
+    std::lock_guard guard (self->priv->lock);
+    if (!self->priv->settings.do_timestamp)
+      return GST_PAD_PROBE_OK;
+  }
+  const GstClockTime now = GST_STATE (self) == GST_STATE_PLAYING
+                               ? gst_element_get_current_running_time (GST_ELEMENT (self))
+                               : 0;
+  GstBuffer *buffer = gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
+  GST_PAD_PROBE_INFO_DATA (info) = buffer;
+  GST_BUFFER_DTS (buffer) = GST_CLOCK_TIME_NONE;
+  if (GstEvent *event = gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0)) {
+    const GstSegment *segment;
+    gst_event_parse_segment (event, &segment);
+    GST_BUFFER_PTS (buffer) =
+        gst_segment_position_from_running_time (segment, GST_FORMAT_TIME, now);
+    gst_event_unref (event);
+  }
+  return GST_PAD_PROBE_OK;
 }
 
 /* ---- negotiation ---- */
@@ -495,6 +522,10 @@ combine_properties ()
       P::number<&S::colour_view_id> ("colour-view-id", "Colour view ID",
           "view-id of the colour camera in the rig (-1 = colour and depth are registered)", -1,
           rangecast::kMaxViews - 1, kMutableReady),
+      P::boolean<&S::do_timestamp> ("do-timestamp", "Do timestamp",
+          "Pair live images by their time of arrival, for sources whose timestamps differ in "
+          "origin",
+          kMutableReady),
       P::enumeration<&S::into> ("into", "Output view",
           "Output view if colour and depth come from different cameras",
           GST_TYPE_RANGE_COMBINE_INTO, kMutableReady),
@@ -526,6 +557,8 @@ gst_range_combine_init (GstRangeCombine *self)
   auto priv = self->priv = new GstRangeCombinePrivate;
   priv->colour_pad = add_sink_pad (GST_ELEMENT (self), kPadNames[0]);
   priv->depth_pad = add_sink_pad (GST_ELEMENT (self), kPadNames[1]);
+  for (GstAggregatorPad *pad : {priv->colour_pad, priv->depth_pad})
+    gst_pad_add_probe (GST_PAD (pad), GST_PAD_PROBE_TYPE_BUFFER, stamp_arrival, self, nullptr);
   priv->matcher.emplace (GST_ELEMENT (self), GST_CAT_DEFAULT, kPadNames);
 }
 

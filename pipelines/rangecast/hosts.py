@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 from . import options, transport
+from .depthcams import DEPTH_CAMERAS, add_depth_camera
 from .launch import Launch, fail_unless, has_display
 
 QUEUE = ["queue", "max-size-buffers=2"]
@@ -16,12 +17,13 @@ def size_caps(size, fps=None, media="video/x-raw"):
 
 # ---- camera ----
 
-INPUT_HELP = """what the pair is (default %(default)s):
+INPUT_HELP = f"""what the camera is (default %(default)s):
 avatar: the built-in figure; avatar=MODEL: a glTF or OBJ model;
 range: its exact range images, without cameras and stereo matching;
 DIR: recorded pairs DIR/viewN-left.* and -right.*, videos or images viewN-left-%%05d.png from 0, which begin with the empty scene;
 side-by-side=SOURCE, top-bottom=SOURCE: a stereo camera that packs both images into one, in gst-launch-1.0 syntax;
-cameras: the machine-vision cameras that the rig names; cameras=LEFT,RIGHT[,THIRD]: by name, serial number or address"""
+cameras: the machine-vision cameras that the rig names; cameras=LEFT,RIGHT[,THIRD]: by name, serial number or address;
+{DEPTH_CAMERAS}"""
 
 
 def add_camera_options(parser):
@@ -77,25 +79,31 @@ def machine_vision(args):
     return words
 
 
-def camera_source(args):
-    """Words up to stereodepth's pads, and the properties of stereodepth that the source needs; None: range images."""
+def add_source(launch, args):
+    """Adds the elements up to range images."""
     kind, _, value = args.input.partition("=")
     views = args.views or options.count_views(args.rig)
     scene = ["avatartestsrc", "name=cameras", "is-live=true", f"views={views}", f"view-id={args.view}", f"empty-frames={args.learn + 5}"]
+    matching = []
     if kind == "range":
-        return [*scene, "!", size_caps(args.size, args.fps, "video/x-range"), "!", *QUEUE], None
+        return launch.add(*scene, "!", size_caps(args.size, args.fps, "video/x-range"), "!", *QUEUE)
+    if kind in ("openni2", "v4l2"):
+        return add_depth_camera(launch, args.input, args, args.rig, args.view)
     if kind == "avatar":
-        words = [*scene, f"loop-frames={args.loop}", *([f"location={options.existing_file(value)}"] if value else [])]
+        launch.add(*scene, f"loop-frames={args.loop}", *([f"location={options.existing_file(value)}"] if value else []))
         for side in ("left", "right"):
-            words += [f"cameras.{side}", "!", size_caps(args.size, args.fps) + ",format=RGBx", "!", *QUEUE, "!", f"depth.{side}"]
-        return words, []
-    if kind in ("side-by-side", "top-bottom"):
-        return [*options.elements(value), "!", *QUEUE, "!", "depth.left"], [f"packing={kind}"]
-    if kind == "cameras":
-        return machine_vision(args), []
-    fail_unless(Path(args.input).is_dir(), f"--input: '{args.input}' is none of: avatar, avatar=MODEL, range, cameras, "
-                "cameras=LEFT,RIGHT, side-by-side=SOURCE, top-bottom=SOURCE, a folder of recorded pairs")  # fmt: skip
-    return recorded_side(args.input, args.view, "left", args.fps) + recorded_side(args.input, args.view, "right", args.fps), []
+            launch.add(f"cameras.{side}", "!", size_caps(args.size, args.fps) + ",format=RGBx", "!", *QUEUE, "!", f"depth.{side}")
+    elif kind in ("side-by-side", "top-bottom"):
+        launch.add(*options.elements(value), "!", *QUEUE, "!", "depth.left")
+        matching = [f"packing={kind}"]
+    elif kind == "cameras":
+        launch.add(*machine_vision(args))
+    else:
+        fail_unless(Path(args.input).is_dir(), f"--input: '{args.input}' is none of: avatar, avatar=MODEL, range, cameras, cameras=LEFT,RIGHT, "
+                    "side-by-side=SOURCE, top-bottom=SOURCE, openni2, v4l2=DEPTH,COLOUR, a folder of recorded pairs")  # fmt: skip
+        for side in ("left", "right"):
+            launch.add(*recorded_side(args.input, args.view, side, args.fps))
+    return launch.add("stereodepth", "name=depth", f"rig={args.rig}", f"view-id={args.view}", *matching, *args.depth)
 
 
 def build_camera(args):
@@ -109,15 +117,11 @@ def build_camera(args):
     adaptive = any(re.fullmatch(r"adaptive-bitrate=(true|t|yes|1)", one, re.I) for one in args.encoder)
     fail_unless(not adaptive or (args.feedback_port and len(args.to) == 1 and not transport.is_multicast(args.to)),
                 "--encoder: adaptive-bitrate needs --feedback-port, and one receiver in --to")  # fmt: skip
-    source, matching = camera_source(args)
-    launch = Launch(*source)
+    launch = Launch()
+    add_source(launch, args)
     if args.threads:
         launch.environment["OPENCV_FOR_THREADS_NUM"] = str(args.threads)  # OpenCV's own pool works for our loops, too
-    if matching is None:
-        launch.add("!")
-    else:
-        launch.add("stereodepth", "name=depth", f"rig={args.rig}", f"view-id={args.view}", *matching, *args.depth, "!")
-    launch.add("roiextract", f"background-frames={args.learn}", "!", *QUEUE, "leaky=downstream", "!", "neighbourcodeenc", *args.encoder)
+    launch.add("!", "roiextract", f"background-frames={args.learn}", "!", *QUEUE, "leaky=downstream", "!", "neighbourcodeenc", *args.encoder)
     transport.send(args, launch, adaptive)
     fail_unless(bool(args.microphone) == bool(args.audio_to), "--microphone and --audio-to need each other")
     if args.microphone:

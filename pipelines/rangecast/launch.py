@@ -54,6 +54,7 @@ class Launch:
         self.words = [str(word) for word in words]
         self.options = []
         self.environment = {}
+        self.feed = []  # a program whose output fdsrc reads
 
     def add(self, *words):
         self.words += [str(word) for word in words]
@@ -69,11 +70,14 @@ class Launch:
         """For a shell: rangecast-run where options need it, else gst-launch-1.0."""
         words = self.command() if self.options else ["gst-launch-1.0", "-e", *self.words]
         setting = [f"{name}={shlex.quote(value)}" for name, value in self.environment.items()]
-        return " ".join([*setting, *("\\\n  !" if word == "!" else shlex.quote(word) for word in words)])
+        feed = [shlex.join(map(str, self.feed)), "|"] if self.feed else []
+        return " ".join([*feed, *setting, *("\\\n  !" if word == "!" else shlex.quote(word) for word in words)])
 
     def run(self):
         """Replaces this process, so that signals reach the pipeline."""
         os.environ.update(self.environment)
+        if self.feed:  # ends with the pipe
+            os.dup2(subprocess.Popen(list(map(str, self.feed)), stdout=subprocess.PIPE).stdout.fileno(), 0)
         sys.stdout.flush()
         os.execvp("rangecast-run", self.command())
 

@@ -153,7 +153,7 @@ SHARED = {
     "--settle": dict(type=number(0, 100000), metavar="N", help="frames to skip before that, while exposure settles"),
     "--loop": dict(type=number(0, 100000), metavar="N", default=0,
                    help="draw only the first N simulated images and repeat them, so that cameras take hardly any CPU time"),
-    "--depth": dict(type=properties, metavar="WHAT", default=[], help="properties of stereodepth, e.g. 'near=0.4 far=1.5'"),
+    "--depth": dict(type=properties, metavar="WHAT", default=[], help="properties of stereodepth, or rangecombine for a depth camera, e.g. 'near=0.4 far=1.5'"),
     "--encoder": dict(type=properties, metavar="WHAT", default=[], help="properties of neighbourcodeenc, e.g. 'profile=entropy temporal=true'"),
     "--render": dict(type=properties, metavar="WHAT", default=[], help="properties of striprender, e.g. 'mode=strips', which is faster"),
     "--orbit": dict(type=degrees, metavar="DEG", default="0", help="orbit, degrees per second (default %(default)s)"),

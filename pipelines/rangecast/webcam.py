@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""webcam: a USB stereo camera, plugged in, to an avatar in a window."""
+"""webcam: a USB stereo camera or depth camera, plugged in, to an avatar in a window."""
 
 import os
 import shlex
@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 from . import options
+from .depthcams import DEPTH_CAMERAS, add_depth_camera, v4l2_source
 from .launch import Launch, fail_unless, has_display
 
 
@@ -15,11 +16,12 @@ def add_webcam(parser):
     source = parser.add_mutually_exclusive_group()
     source.add_argument("--device", default="/dev/video0", metavar="FILE", help="the camera (default /dev/video0): packs both images into one")
     options.add(source, "--source", help="another source of packed images, in gst-launch-1.0 syntax")
+    source.add_argument("--camera", metavar="WHAT", help=f"a depth camera instead: {DEPTH_CAMERAS}")
     parser.add_argument("--packing", choices=("side-by-side", "top-bottom"), default="side-by-side", help="default side-by-side")
-    options.add(parser, "--size", default="1280x480", help="size of the packed images (default 1280x480)")
+    options.add(parser, "--size", default=None, help="size of the packed images (default 1280x480), or of V4L2's depth and colour (640x480)")
     options.add(parser, "--fps", default=30)
-    options.add(parser, "--rig", type=str, default="webcam.yaml",
-                help="the camera's calibration (default webcam.yaml); if there is none, 'rangecast calibrate' makes it first")  # fmt: skip
+    options.add(parser, "--rig", type=str, help="the camera's calibration (default webcam.yaml); if there is none, 'rangecast calibrate' makes it first; "
+                "OpenNI 2 needs none")  # fmt: skip
     parser.add_argument("--calibrate", type=options.words, metavar="OPTIONS", default=[], help="options of that, e.g. '--square 0.03'")
     options.add(parser, "--learn", default=0)
     options.add(parser, "--settle", "--depth")
@@ -31,16 +33,12 @@ def add_webcam(parser):
 def build_webcam(args):
     fail_unless(args.png or args.print or has_display(), "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --png FILE")
     fail_unless(args.learn or args.settle is None, "--settle needs --learn")
-    source = args.source
-    if not source:
-        fail_unless(args.print or os.path.exists(args.device),
-                    f"--device: no camera '{args.device}'; gst-device-monitor-1.0 Video/Source lists the cameras")  # fmt: skip
-        pixels = f"width={args.size[0]},height={args.size[1]},framerate={args.fps}/1"  # larger sizes are often JPEG only
-        source = ["v4l2src", f"device={args.device}", "!", f"image/jpeg,{pixels};video/x-raw,{pixels}", "!", "decodebin", "!", "videoconvert"]
-    if not args.print and not os.path.exists(args.rig):
-        calibrate(args, source)
-    launch = Launch(*source, *"! queue max-size-buffers=2 ! depth.left stereodepth name=depth".split())
-    launch.add(f"packing={args.packing}", f"rig={args.rig}", *args.depth)
+    args.size = args.size or ((640, 480) if args.camera else (1280, 480))
+    launch = Launch()
+    if args.camera:
+        add_depth_camera(launch, args.camera, args, args.rig and options.existing_file(args.rig), 0)
+    else:
+        add_stereo_camera(launch, args)
     settle = args.settle if args.settle is not None else 0 if args.source else 10 * args.fps
     if args.learn:
         launch.add("!", "roiextract", f"settle-frames={settle}", f"background-frames={args.learn}")
@@ -55,6 +53,17 @@ def build_webcam(args):
     patience = 60 + 2 * (args.learn + settle) // args.fps if args.learn else 30
     launch.option("--frames", 30 if args.learn else 1, "--timeout", patience, "--snapshot", args.png)
     return launch
+
+
+def add_stereo_camera(launch, args):
+    args.rig = args.rig or "webcam.yaml"
+    fail_unless(args.source or args.print or os.path.exists(args.device),
+                f"--device: no camera '{args.device}'; gst-device-monitor-1.0 Video/Source lists the cameras")  # fmt: skip
+    source = args.source or v4l2_source(args.device, args.size, args.fps)
+    if not args.print and not os.path.exists(args.rig):
+        calibrate(args, source)
+    launch.add(*source, *"! queue max-size-buffers=2 ! depth.left stereodepth name=depth".split())
+    launch.add(f"packing={args.packing}", f"rig={args.rig}", *args.depth)
 
 
 def calibrate(args, source):

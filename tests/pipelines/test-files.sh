@@ -121,19 +121,80 @@ test_people_are_cut_out_of_a_real_recording_without_their_shadows () {
   done
 }
 
-# As docs/guide/cameras.md reads depth that v4l2src cannot: raw frames from a pipe, beside live colour.
-test_raw_depth_from_a_pipe_joins_live_colour () {
-  gst-launch-1.0 -q avatartestsrc num-buffers=20 views=1 ! video/x-range,width=160,height=120,framerate=10/1 ! rangesplit name=s \
-    s.depth ! queue ! video/x-raw,format=GRAY16_LE ! filesink location=depth.raw  s.colour ! queue ! fakesink
-  for i in {0..19}; do
-    dd if=depth.raw bs=38400 count=1 skip="$i" 2>/dev/null
-    sleep 0.1
-  done | timeout 60 gst-launch-1.0 -q fdsrc do-timestamp=true blocksize=38400 \
-    ! rawvideoparse format=gray16-le width=160 height=120 framerate=10/1 ! queue ! c.depth \
-    videotestsrc is-live=true ! video/x-raw,width=160,height=120,framerate=10/1 ! queue ! c.colour \
-    rangecombine name=c focal-length=150 depth-scale=0.0001 ! neighbourcodeenc ! filesink location=pipe.rcnc
-  count-points pipe.rcnc >points.txt
-  [ "$(grep -c ' [1-9][0-9]\{3,\} points' points.txt)" -ge 10 ] || fail "$(cat points.txt)"
+# The head as a depth camera sees it: depth in 0.1 mm, colour, and a rig with the view of another colour camera.
+record_head () {
+  gst-launch-1.0 -q avatartestsrc num-buffers=20 views=2 arc=10 rig-export=rig.yaml ! video/x-range,width=160,height=120,framerate=10/1 \
+    ! rangesplit mask=false name=s s.depth ! queue ! filesink location=depth.raw \
+    s.colour ! queue ! videoconvert ! video/x-raw,format=RGB ! filesink location=colour.raw
+}
+
+test_openni_recording_shows_the_head_with_intrinsics_unit_and_mirroring_of_the_camera () {
+  need_gl
+  gst-inspect-1.0 openni2src >/dev/null 2>&1 || skip "no openni2src"
+  record_head
+  local source_dir=$source_dir/tests/pipelines
+  python3 "$source_dir/write-oni.py" head.oni 160x120 10 53.1301 depth.raw colour.raw --tenth-mm
+  rangecast webcam --camera openni2=head.oni --print >string.txt
+  grep -q 'depth-scale=0.0001 focal-length=160.00' string.txt || fail "$(cat string.txt)"
+  rangecast webcam --camera openni2=head.oni --png head.png
+  expect_file head.png 50000
+  python3 "$source_dir/write-oni.py" mirrored.oni 160x120 10 60 depth.raw colour.raw --mirror
+  rangecast camera --input openni2=mirrored.oni --view 1 --rig rig.yaml --to 127.0.0.1:5000 --depth far=2 --print >string.txt
+  [ "$(grep -c 'videoflip video-direction=horiz' string.txt)$(grep -c 'rig=rig.yaml view-id=1 depth-scale=0.001 far=2' string.txt)" = 21 ] ||
+    fail "$(cat string.txt)"
+  expect_error "no OpenNI 2 camera or recording none.oni" rangecast webcam --camera openni2=none.oni --png none.png
+  expect_error "'kinect' is none of: openni2" rangecast webcam --camera kinect --png none.png
+}
+
+# Frame i is a plane at 1 m + i cm with the grey 20 i; the first three have no colour. Each source counts from its own first frame.
+test_openni_depth_and_colour_are_paired_by_time () {
+  gst-inspect-1.0 openni2src >/dev/null 2>&1 || skip "no openni2src"
+  python3 -c 'import struct
+open("depth.raw", "wb").write(b"".join(struct.pack("<H", 1000 + 10 * i) * 768 for i in range(12)))
+open("colour.raw", "wb").write(b"".join(bytes([20 * i]) * 3 * 768 for i in range(12)))'
+  python3 "$source_dir/tests/pipelines/write-oni.py" planes.oni 32x24 2 60 depth.raw colour.raw --colour-from 3
+  timeout 60 gst-launch-1.0 -q openni2src location=planes.oni sourcetype=depth ! queue ! c.depth \
+    openni2src location=planes.oni sourcetype=color ! queue ! c.colour \
+    rangecombine name=c do-timestamp=true focal-length=30 ! plyenc ! multifilesink max-files=0 location=%d.ply & # plays for ever
+  local player=$!
+  until_true 50 test -e 7.ply
+  kill -INT $player
+  wait $player || true
+  python3 - <<'EOF' || fail "wrong pairs"
+import struct
+from pathlib import Path
+pairs = set()
+for file in Path().glob("*.ply"):
+    points = file.read_bytes().partition(b"end_header\n")[2]
+    if len(points) >= 15:
+        _, _, z, grey = struct.unpack("<fffB", points[:13])
+        pairs.add((round(abs(z) * 100) - 100, round(grey / 20)))
+print(sorted(pairs))
+assert len(pairs) >= 3 and all(depth == colour for depth, colour in pairs)
+EOF
+}
+
+# v4l2-ctl writes Z16, which v4l2src does not know; here a script and videotestsrc stand for the two devices.
+test_v4l2_depth_camera_shows_the_head () {
+  need_gl
+  record_head
+  mkdir tools
+  cat >tools/v4l2-ctl <<'EOF'
+#!/bin/sh
+[ "$*" = "-d /dev/video2 --set-fmt-video width=160,height=120,pixelformat=Z16  --set-parm 10 --stream-mmap --stream-to=-" ] || exit 1
+for i in $(seq 0 19); do
+  dd if=depth.raw bs=38400 count=1 skip=$i 2>/dev/null
+  sleep 0.1
+done
+EOF
+  chmod +x tools/v4l2-ctl
+  local camera="v4l2=/dev/video2,videotestsrc is-live=true ! video/x-raw,width=160,height=120,framerate=10/1"
+  PATH=$PWD/tools:$PATH rangecast webcam --camera "$camera" --rig rig.yaml --size 160x120 --fps 10 --depth depth-scale=0.0001 --png head.png
+  expect_file head.png 30000
+  expect_error "v4l2 needs --rig" rangecast webcam --camera "$camera" --png none.png
+  rangecast webcam --camera v4l2=/dev/video2,/dev/video4 --rig rig.yaml --png none.png --print >string.txt
+  grep -q '^v4l2-ctl -d /dev/video2 .*--stream-to=- | rangecast-run .*fdsrc' string.txt || fail "$(cat string.txt)"
+  grep -q 'colour-view-id=1' string.txt || fail "$(cat string.txt)"
 }
 
 # usage: adapt EXAMPLE: a copy that ends by itself and needs neither a window nor a camera
