@@ -80,7 +80,6 @@ ViewEncoder::configure (const View &view, const EncoderSettings &settings)
     if (Status s = depth_.set (view, settings.depth_bits); !s.ok ())
       return s;
     colour_ = ColourQuantiser (settings.colour_bits);
-    plain_codes_.set (depth_, colour_);
   }
   const bool comparable = same_codes && settings.profile == settings_.profile && settings.temporal;
   if (!same_view) {
@@ -274,7 +273,7 @@ ViewEncoder::code (PartitionId id, PartitionEncoder &memory)
       misfits.store (true, std::memory_order_relaxed);
   } else {
     memory.plain.code_partition (
-        image_, plain_codes_, plain, header, partition.bytes, partition.result);
+        image_, depth_, colour_, plain, header, partition.bytes, partition.result);
   }
 }
 

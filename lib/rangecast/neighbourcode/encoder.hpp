@@ -142,7 +142,6 @@ private:
   bool configured_ = false;
   DepthQuantiser depth_;
   ColourQuantiser colour_;
-  PlainCodes plain_codes_;
   ReferencePair references_;
   RefreshSchedule refresh_;
   ReferenceChoice reference_choice_;

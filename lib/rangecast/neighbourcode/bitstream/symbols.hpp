@@ -48,12 +48,6 @@ store_little_endian (std::uint64_t value, std::uint8_t *to)
   std::memcpy (to, &value, sizeof value);
 }
 
-/** Symbols of profile plain are handled sixteen at a time. */
-inline constexpr int kGroup = 16, kGroupBits = kGroup * kSymbolBits;
-inline constexpr std::uint64_t kGroupMask = (std::uint64_t{1} << kGroupBits) - 1;
-inline constexpr std::uint64_t kGroupLowBits = 0x249249249249; /* the lowest of each symbol */
-inline constexpr std::uint64_t kInvalidGroup = kGroupLowBits * kInvalid;
-
 /** Writes numbers of up to 56 bits, least significant bit first. The memory needs 8 bytes more than
  *  the result. It is complete after each call; the last byte is filled with zeros. */
 class BitWriter {
@@ -84,6 +78,7 @@ private:
 class LittleEndianBits {
 public:
   explicit LittleEndianBits (std::span<const std::uint8_t> bytes) : bytes_ (bytes) {}
+  [[nodiscard]] std::size_t size () const { return 8 * bytes_.size (); }
   /** At least 57 bits from bit `at` on, which is at most the end. */
   [[nodiscard]] std::uint64_t from (std::size_t at) const
   {

@@ -7,9 +7,7 @@
 
 #include "../../geometry/quantiser.hpp"
 #include "../../geometry/range_image.hpp"
-#include "../bitstream/symbols.hpp"
 #include "../bitstream/unit.hpp"
-#include "functions.hpp"
 
 namespace rangecast {
 
@@ -26,8 +24,11 @@ public:
       std::uint64_t &points);
 
 private:
-  std::vector<ShownPixel> rows_; /* the current row and the one above it, padded */
-  std::vector<ShownPixel> full_; /* pixels of the slice, and one more that may be read */
+  struct alignas (8) Pixel { /* aligned, so that one load copies it */
+    std::uint16_t depth = 0;
+    Rgbx colour{};
+  };
+  std::vector<Pixel> upper_; /* the row above, and one pixel behind it */
 };
 
 } // namespace rangecast
