@@ -2,12 +2,15 @@
 """check: what this machine lacks; with a rig file, its geometry."""
 
 import os
+import platform
+import re
 import resource
 import shutil
 import socket
 import subprocess
 from pathlib import Path
 
+from . import __version__
 from .launch import has_display, has_element
 
 ELEMENTS = {
@@ -31,6 +34,7 @@ SOCKET_BUFFER = 4194304
 
 def add_check(parser):
     parser.add_argument("rig", nargs="?", metavar="RIG", help="print the geometry of this rig file; without it, check this machine")
+    parser.add_argument("--report", action="store_true", help="print what a report about a camera needs: versions, cameras, formats; no serial numbers")
     parser.set_defaults(main=check)
 
 
@@ -38,9 +42,50 @@ def check(args):
     if args.rig:
         os.execvp("rig-check", ["rig-check", args.rig])
     findings = [*elements(), opengl(), display(), socket_buffer(), realtime(), ports(), cameras()]
-    for good, what, remedy in findings:
-        print(f"{'ok     ' if good else 'missing'}  {what}" + ("" if good or not remedy else f": {remedy}"))
-    return 0 if all(good for good, _, _ in findings) else 1
+    lines = [f"{'ok     ' if good else 'missing'}  {what}" + ("" if good or not remedy else f": {remedy}") for good, what, remedy in findings]
+    print(report(lines) if args.report else "\n".join(lines))
+    return 0 if args.report or all(good for good, _, _ in findings) else 1
+
+
+def run(*command, **environment):
+    """(status, both outputs)"""
+    try:
+        child = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=30, text=True,
+                               errors="replace", env={**os.environ, **environment}, check=False)  # fmt: skip
+        return child.returncode, child.stdout
+    except (OSError, subprocess.TimeoutExpired):
+        return 1, ""
+
+
+# ---- the report ----
+
+DEVICE_LINES = re.compile(r"\s*(name|class|caps|video/|image/|device\.(api|bus|path)|v4l2\.device\.(driver|card|version)|camera\.(vendor|model|protocol))")
+
+
+def report(lines):
+    model = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text(errors="replace"))
+    versions = [f"gst-rangecast {__version__}", platform.freedesktop_os_release()["PRETTY_NAME"], platform.platform(),
+                *run("gst-inspect-1.0", "--version")[1].splitlines()[1:2]]  # fmt: skip
+    for element, library in ("stereodepth", "opencv_core"), ("stereocamsrc", "aravis-0.8"), ("openni2src", "OpenNI2"):
+        plugin = re.search(r"Filename\s+(\S+)", run("gst-inspect-1.0", element)[1])
+        path = plugin and re.search(rf"lib{library}\S* => (\S+)", run("ldd", plugin[1])[1])
+        versions.append(os.path.basename(os.path.realpath(path[1])) if path else f"no {library}")
+    networks = [f"{net.name[:4]} MTU {(net / 'mtu').read_text().strip()}" for net in Path("/sys/class/net").iterdir() if net.name != "lo"]
+    devices = run("gst-device-monitor-1.0", "Video/Source")[1]
+    formats = [run("v4l2-ctl", "-d", str(path), "--list-formats-ext")[1] for path in sorted(Path("/dev").glob("video*"))]
+    if formats and not shutil.which("v4l2-ctl"):
+        formats = ["no v4l2-ctl: apt-get install v4l-utils"]
+    usb = [" ".join((path / name).read_text().strip() for name in ("idVendor", "idProduct", "speed", "product") if (path / name).exists())
+           for path in sorted(Path("/sys/bus/usb/devices").glob("*-*")) if (path / "idVendor").exists()]  # fmt: skip
+    parts = [", ".join(versions), f"{os.cpu_count()} x {model[1] if model else 'CPU'}; {', '.join(networks)}", *lines, "USB (vendor, product, Mbit/s):", *usb,
+             *filter(DEVICE_LINES.match, devices.splitlines()), *formats]  # fmt: skip
+    text = "\n".join(parts)
+    for serial in re.findall(r"serial\S* = (.{4,})", devices):
+        text = text.replace(serial, "...")
+    return text
+
+
+# ---- the findings ----
 
 
 def elements():
@@ -48,12 +93,9 @@ def elements():
 
 
 def opengl():
-    command = ["gst-launch-1.0", "-q", *"gltestsrc num-buffers=1 ! gldownload ! fakesink".split()]
-    try:
-        good = subprocess.run(command, capture_output=True, timeout=30, check=False).returncode == 0
-    except subprocess.TimeoutExpired:
-        good = False
-    return good, "OpenGL", "install libgl1-mesa-dri, libegl-mesa0 and gstreamer1.0-gl"
+    status, log = run("gst-launch-1.0", "-q", *"gltestsrc num-buffers=1 ! gldownload ! fakesink".split(), GST_DEBUG="glcontext:4", GST_DEBUG_NO_COLOR="1")
+    renderer = re.search(r"GL_RENDERER: (.*)", log)
+    return status == 0, "OpenGL" + (f": {renderer[1]}" if renderer else ""), "install libgl1-mesa-dri, libegl-mesa0 and gstreamer1.0-gl"
 
 
 def display():
@@ -87,10 +129,5 @@ def ports():
 
 def cameras():
     found = sorted(path.name for path in Path("/dev").glob("video*"))
-    if shutil.which("arv-tool-0.8"):
-        try:
-            said = subprocess.run(["arv-tool-0.8"], capture_output=True, text=True, timeout=30, check=False).stdout
-            found += [line.strip() for line in said.splitlines() if line.strip() and "No device" not in line]
-        except subprocess.TimeoutExpired:
-            pass
+    found += [line.strip() for line in run("arv-tool-0.8")[1].splitlines() if line.strip() and "No device" not in line]
     return bool(found), "cameras" + (": " + ", ".join(found) if found else ""), "none seen; the source tree simulates some: ./pipelines/demo.sh --input cameras"

@@ -42,6 +42,19 @@ wait_for_size () { # file bytes seconds
   fail "$1 did not reach $2 bytes in $3 s: $(tail -n 20 host.log)"
 }
 
+test_report_has_versions_and_cameras_without_serial_numbers () {
+  need_cameras
+  start_cameras cameras.log --views 1 --rig-export rig.yaml
+  rangecast check --report >report.txt
+  stop_all "$cameras"
+  local what
+  for what in "^gst-rangecast [0-9.]*, .*, Linux-$(uname -r).*, GStreamer 1\.[0-9.]*, libopencv_core.so.4.*, libaravis-0.8.so.0" '^ok .*UDP receive buffers' \
+    '^ok .*OpenGL: .' 'name  : rangecast scene (\.\.\.)' 'video/x-bayer, format=rggb'; do
+    grep -q -e "$what" report.txt || fail "no '$what': $(cat report.txt)"
+  done
+  ! grep view0-left report.txt || fail "a serial number"
+}
+
 test_host_takes_bayer_cameras_by_address () {
   need_cameras
   start_cameras cameras.log --views 1 --rig-export rig.yaml --colour bayer
