@@ -17,10 +17,11 @@ for suite; do
   debootstrap --variant=minbase "$suite" "$root" >"$root/debootstrap.log" || { tail "$root/debootstrap.log"; exit 1; }
   mkdir "$root/srv/gst-rangecast"
   git archive HEAD | tar -x -C "$root/srv/gst-rangecast"
+  mount --bind "$root" "$root" # `ip netns exec` wants a mount point as root
   for folder in dev proc sys; do mount --rbind "/$folder" "$root/$folder"; done
   if chroot "$root" env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 \
     bash -c 'cd /srv/gst-rangecast && time ./pipelines/demo.sh && time ./tests/run.sh' 2>&1 | tee "$root/srv/tests.log"; then
-    for folder in dev proc sys; do umount --recursive --lazy "$root/$folder"; done
+    umount --recursive --lazy "$root"
     rm -r --one-file-system "$root"
   else
     status=1
