@@ -9,7 +9,6 @@
 #include <rangecast/surface/orbit.hpp>
 #include <rangecast/surface/view_tint.hpp>
 #include <string>
-#include <vector>
 
 namespace {
 
@@ -19,47 +18,12 @@ using rangecast::Status;
 using rangecast::Vec3;
 using rangecast::View;
 
-/* One camera of the rig. */
-struct Camera {
-  std::string name;
-  View view; /* plain, with an id of its own */
-};
-
-/* ---- cameras ---- */
-
 std::string
 name_of (const View &view)
 {
   const std::string number = "view " + std::to_string (view.id);
   return number + (view.name.empty () || view.name == number ? "" : " " + view.name);
 }
-
-void
-add_partner (const View &view, const std::optional<PartnerCamera> &partner, const char *which,
-    std::vector<Camera> &cameras)
-{
-  if (!partner || cameras.size () >= rangecast::kMaxViews)
-    return;
-  View camera = view;
-  camera.intrinsics = partner->intrinsics;
-  camera.world_from_view = view.world_from_view * partner->partner_from_left.inverse ();
-  cameras.push_back ({name_of (view) + " " + which, camera});
-}
-
-std::vector<Camera>
-cameras_of (const Rig &rig)
-{
-  std::vector<Camera> cameras;
-  for (const View &view : rig.views)
-    cameras.push_back ({name_of (view) + (view.right ? " left" : ""), view});
-  for (const View &view : rig.views) {
-    add_partner (view, view.right, "right", cameras);
-    add_partner (view, view.third, "third", cameras);
-  }
-  return cameras;
-}
-
-/* ---- tables ---- */
 
 double
 degrees (double radians)
@@ -80,21 +44,22 @@ axis_of (const View &view)
 }
 
 void
-print_cameras (const std::vector<Camera> &cameras, Vec3 target)
+print_cameras (const Rig &rig, Vec3 target)
 {
   std::printf ("%-24s %-7s %-10s %-15s %-24s %s\n", "camera", "colour", "size", "field of view",
       "position, metres", "distance of axis and camera from the centre");
-  for (std::size_t i = 0; i < cameras.size (); i++) {
-    const View &v = cameras[i].view;
+  for (std::size_t i = 0; i < rig.views.size (); i++) {
+    const View &v = rig.views[i];
     const Vec3 at = v.world_from_view.translation, off = cross (target - at, axis_of (v));
     const auto field = [] (double size, double f) {
       return 2 * degrees (std::atan (size / 2 / f));
     };
     const std::string size = std::to_string (v.width) + "x" + std::to_string (v.height);
+    const std::string_view colour = rangecast::view_colour (i).name; /* of striprender tint-views */
     std::printf ("%-24s %-7.*s %-10s %5.1f x %-4.1f deg %7.3f %7.3f %7.3f  %.0f mm, %.2f m\n",
-        cameras[i].name.c_str (), int (rangecast::view_colour (i).name.size ()),
-        rangecast::view_colour (i).name.data (), size.c_str (), field (v.width, v.intrinsics.fx),
-        field (v.height, v.intrinsics.fy), at.x, at.y, at.z, norm (off) * 1000, norm (target - at));
+        name_of (v).c_str (), int (colour.size ()), colour.data (), size.c_str (),
+        field (v.width, v.intrinsics.fx), field (v.height, v.intrinsics.fy), at.x, at.y, at.z,
+        norm (off) * 1000, norm (target - at));
   }
 }
 
@@ -183,7 +148,7 @@ check_rig (const char *path)
   const Vec3 centre = rangecast::scene_frame (rig).target;
   std::printf ("views: %zu; centre (where the optical axes meet): %.3f %.3f %.3f m\n\n",
       rig.views.size (), centre.x, centre.y, centre.z);
-  print_cameras (cameras_of (rig), centre);
+  print_cameras (rig, centre);
   print_pairs (rig);
   print_views (rig);
   std::fflush (stdout);

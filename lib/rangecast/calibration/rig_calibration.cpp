@@ -58,7 +58,7 @@ check_pair (
   const std::string view = "view " + std::to_string (left.view_id) + ": ";
   const Vec3 x = right_from_left.rotation * Vec3{1, 0, 0};
   const double roll = std::atan2 (x.y, x.x) * 180 / M_PI; /* about the optical axis, degrees */
-  char text[64];
+  char text[100];
   if (std::abs (roll) > kMaxRollDeg) {
     std::snprintf (text, sizeof text, "%.0f degrees", roll);
     return bad (view + right.name + " (right) " +
@@ -67,10 +67,13 @@ check_pair (
                 " about its axis; turn the camera, or its images with videoflip");
   }
   const Vec3 c = right_from_left.inverse ().translation;
+  if (std::abs (c.x) < std::abs (c.y) || std::abs (c.x) < 0.5 * std::abs (c.z)) {
+    std::snprintf (
+        text, sizeof text, "%.3f m to the right, %.3f m below and %.3f m ahead", c.x, c.y, c.z);
+    return bad (view + right.name + " (right) stands " + text + " of " + left.name +
+                " (left); mount them side by side");
+  }
   std::snprintf (text, sizeof text, "%.4f m", norm (c));
-  if (std::abs (c.x) < std::abs (c.y) || std::abs (c.x) < 0.5 * std::abs (c.z))
-    return bad (view + left.name + " and " + right.name + " stand " + text +
-                " apart, but not side by side; mount them side by side");
   if (c.x < 0)
     return bad (view + "left and right cameras are swapped: " + right.name + " (right) stands " +
                 text + " to the left of " + left.name +
