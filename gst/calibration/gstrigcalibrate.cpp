@@ -5,8 +5,7 @@
  *
  * Calibrates any number of cameras, stereo pairs and their poses from images of a chessboard or
  * ChArUco board. Selects frames automatically, reports in element messages which camera saw the
- * board and what is still missing, and writes the rig file at EOS or on the action signal
- * #GstRigCalibrate::calibrate.
+ * board and what is still missing, and writes the rig file at EOS.
  *
  * ## Example launch line
  * |[
@@ -44,8 +43,8 @@ GST_DEBUG_CATEGORY_STATIC (gst_rig_calibrate_debug);
 #define GST_CAT_DEFAULT gst_rig_calibrate_debug
 
 /* aggregate waits for one image of each camera, drops those whose capture times do not match, and
- * posts the set as a job. Jobs look for the board, keep useful sets, draw a preview and, at EOS, on
- * `calibrate` or with auto-finish, calibrate. If live, sets that arrive while a job runs are
+ * posts the set as a job. Jobs look for the board, keep useful sets, draw a preview and, at EOS or
+ * with auto-finish calibrate. If live, sets that arrive while a job runs are
  * skipped; otherwise the streaming thread waits for each job. It pushes the previews. */
 
 /* Maximum frame rate of what is taken for single photographs instead of video, Hz. */
@@ -66,7 +65,7 @@ static constexpr GstClockTime kLatency = 200 * GST_MSECOND;
 static constexpr GstClockTime kMaxLateness = GST_SECOND;
 
 struct GstRigCalibratePrivate {
-  /* Guards the members up to stale; never held across a push, message or job. */
+  /* Guards the members up to finished; never held across a push, message or job. */
   std::mutex lock;
   RigCalibrateSettings settings;
   CameraInputs cameras;
@@ -76,7 +75,6 @@ struct GstRigCalibratePrivate {
   GstClockTime still_capture = 0;
   Status failure;        /* of the first job that failed */
   bool finished = false; /* auto-finish has calibrated: EOS */
-  bool stale = true;     /* frames were taken since the last calibration */
 
   BackgroundJobs jobs; /* thread-safe */
 
@@ -196,8 +194,6 @@ calibrate (GstRigCalibrate *self, std::stop_token stop)
     post_result (GST_ELEMENT (self), priv->session, result,
         location.empty () || !status.ok () ? nullptr : location.c_str ());
   }
-  std::lock_guard guard (priv->lock);
-  priv->stale = !status.ok ();
   return status;
 }
 
@@ -247,7 +243,6 @@ examine (GstRigCalibrate *self, CalibrationImages &set, bool &taken)
     std::lock_guard guard (priv->lock);
     priv->examined++;
     priv->taken += taken;
-    priv->stale |= taken;
   }
   draw_still (self, set, images);
   for (std::size_t i = 0; i < set.buffers.size (); i++)
@@ -273,18 +268,6 @@ examine_job (GstRigCalibrate *self, CalibrationImages &set, std::stop_token stop
   if (priv->failure.ok () && status.code () != StatusCode::kInterrupted)
     priv->failure = std::move (status);
   priv->finished |= finished;
-}
-
-/* ---- from any thread ---- */
-
-static void
-gst_rig_calibrate_calibrate (GstRigCalibrate *self)
-{
-  self->priv->jobs.post ([self] (std::stop_token stop) {
-    const Status status = calibrate (self, std::move (stop));
-    if (status.code () != StatusCode::kInterrupted)
-      gst_range_post_warning (GST_ELEMENT (self), status);
-  });
 }
 
 /* ---- output ---- */
@@ -399,7 +382,7 @@ explain_no_images (const CameraInputs &cameras)
                                  "half a frame"};
 }
 
-/* All pads are at EOS: calibrates, unless that was done already. */
+/* All pads are at EOS: calibrates. */
 static GstFlowReturn
 finish (GstRigCalibrate *self, const CameraInputs &cameras)
 {
@@ -407,15 +390,13 @@ finish (GstRigCalibrate *self, const CameraInputs &cameras)
   if (!priv->jobs.wait_until_idle ())
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   Status status;
-  bool stale;
   {
     std::lock_guard guard (priv->lock);
     status = priv->failure;
-    stale = priv->stale;
   }
   if (status.ok () && priv->sets == 0)
     status = explain_no_images (cameras);
-  if (status.ok () && stale) {
+  if (status.ok ()) {
     const auto outcome = std::make_shared<Status> ();
     priv->jobs.post (
         [self, outcome] (std::stop_token stop) { *outcome = calibrate (self, std::move (stop)); });
@@ -517,7 +498,6 @@ gst_rig_calibrate_release_pad (GstElement *element, GstPad *pad)
     self->priv->session.clear ();
     std::lock_guard guard (self->priv->lock);
     self->priv->examined = self->priv->taken = 0;
-    self->priv->stale = true;
   });
   gst_child_proxy_child_removed (GST_CHILD_PROXY (element), G_OBJECT (pad), GST_PAD_NAME (pad));
   GST_ELEMENT_CLASS (gst_rig_calibrate_parent_class)->release_pad (element, pad);
@@ -580,7 +560,6 @@ gst_rig_calibrate_start (GstAggregator *aggregator)
     priv->examined = priv->taken = priv->skipped = priv->dropped = 0;
     priv->failure = {};
     priv->finished = false;
-    priv->stale = true;
     for (const auto &camera : priv->cameras) {
       camera->info.reset ();
       camera->refused = false;
@@ -649,15 +628,6 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   object_class->finalize = delete_private<GstRigCalibrate>;
   install_properties<GstRigCalibrate, rig_calibrate_properties, make_stats> (
       object_class, "Counters since the element was started: examined, taken, skipped, dropped");
-  /**
-   * GstRigCalibrate::calibrate:
-   *
-   * Calibrates from the frames taken so far, in the background, and posts a rigcalibrate-result
-   * message or a warning. The stream continues.
-   */
-  g_signal_new_class_handler ("calibrate", G_TYPE_FROM_CLASS (klass),
-      GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION), G_CALLBACK (gst_rig_calibrate_calibrate),
-      nullptr, nullptr, nullptr, G_TYPE_NONE, 0);
 
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &sink_template, GST_TYPE_RIG_CALIBRATE_PAD);
