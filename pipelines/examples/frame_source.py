@@ -32,7 +32,7 @@ def cameras():
     """One for each view. Here: 1 m before the origin of the world, which it looks at."""
     pose = [[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 1]]  # world_from_view: x right, y down, z forward to y up
     intrinsics = [[300, 0, 159.5], [0, 300, 119.5], [0, 0, 1]]
-    return [GstRange.new_camera(0, WIDTH, HEIGHT, intrinsics, pose, depth_unit=UNIT, min_depth=0.5, max_depth=1.5)]
+    return [GstRange.new_camera(0, WIDTH, HEIGHT, intrinsics, pose, depth_unit=UNIT, near=0.5, far=1.5)]
 
 
 def capture(number):

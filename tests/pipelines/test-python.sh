@@ -55,7 +55,7 @@ END
 test_cameras_have_matrices () {
   check <<'END'
 k, pose = [[300, 0, 31], [0, 301, 22], [0, 0, 1]], [[0, 0, -1, 1], [0, -1, 0, 2], [-1, 0, 0, 3]]
-made = GstRange.new_caps([GstRange.new_camera(2, 64, 48, k, pose, depth_unit=0.002, min_depth=0.5, max_depth=2)], 29.97)
+made = GstRange.new_caps([GstRange.new_camera(2, 64, 48, k, pose, depth_unit=0.002, near=0.5, far=2)], 29.97)
 camera = GstRange.map_views(GstRange.new_buffer(made, {2: (depth, colour)}), made)[0].camera
 assert (camera.intrinsics == k).all() and (camera.pose == pose + [[0, 0, 0, 1]]).all()
 assert (camera.view_id, camera.depth_unit, camera.min_depth, camera.max_depth) == (2, 0.002, 0.5, 2)

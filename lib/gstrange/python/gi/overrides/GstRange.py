@@ -109,7 +109,7 @@ def map_views(frame_set, caps=None):
 def new_camera(view_id, width, height, intrinsics, pose=None, **fields):
     """A GstRange.RangeCamera of width x height pixels. intrinsics: 3x3 matrix, or the focal length in pixels with the principal
     point at the centre of the image; pose: world_from_view, 3x4 or 4x4, metres, by default at the origin of the world
-    with y up, looking along -z; other fields by name: depth_unit, min_depth, max_depth (metres)."""
+    with y up, looking along -z; other fields by name: depth_unit, near, far (metres)."""
     camera = GstRange.RangeCamera()
     focal = float(intrinsics) if np.ndim(intrinsics) == 0 else 1.0
     camera.init(view_id, width, height, focal)
@@ -117,10 +117,11 @@ def new_camera(view_id, width, height, intrinsics, pose=None, **fields):
         camera.intrinsics = intrinsics
     if pose is not None:
         camera.pose = pose
+    names = {"depth_unit": "depth_unit", "near": "min_depth", "far": "max_depth"}  # as properties of elements have them
     for name, value in fields.items():
-        if name not in ("depth_unit", "min_depth", "max_depth"):
-            raise TypeError(f"new_camera: unexpected {name}; use depth_unit, min_depth or max_depth")
-        setattr(camera, name, value)
+        if name not in names:
+            raise TypeError(f"new_camera: unexpected {name}; use depth_unit, near or far")
+        setattr(camera, names[name], value)
     return camera
 
 
