@@ -29,6 +29,8 @@ def add_call(parser):
 def call(args, host):
     views = options.count_views(args.rig)
     fail_unless(views > 0, f"--rig: '{args.rig}' has no views: it is no rig file")
+    if args.input.startswith(("openni2", "v4l2")):
+        views = 1  # of which there may be another one, of the colour camera
     peer, port = options.address(f"{args.peer}:{args.base_port}")
     key = ["--key", args.key] if args.key else []
     fec = ["--fec-percent", args.fec_percent] if args.fec_percent else []

@@ -38,7 +38,7 @@ def add_depth_camera(launch, what, args, rig, view):
         properties = [f"colour-view-id={view + 1}"]
         width, height = args.size
         # v4l2src does not know Z16.
-        launch.feed = ["v4l2-ctl", "-d", depth, "--set-fmt-video", f"width={width},height={height},pixelformat=Z16 ", "--set-parm", args.fps,
+        launch.feed = ["v4l2-ctl", "-d", depth, "--set-fmt-video", f"width={width},height={height},pixelformat=Z16 ", "--set-parm", str(args.fps),
                        "--stream-mmap", "--stream-to=-"]  # fmt: skip
         launch.add("fdsrc", f"blocksize={2 * width * height}", "!", "rawvideoparse", "format=gray16-le", f"width={width}", f"height={height}",
                    f"framerate={args.fps}/1", *QUEUE, "combine.depth")  # fmt: skip

@@ -70,16 +70,21 @@ class Launch:
         """For a shell: rangecast-run where options need it, else gst-launch-1.0."""
         words = self.command() if self.options else ["gst-launch-1.0", "-e", *self.words]
         setting = [f"{name}={shlex.quote(value)}" for name, value in self.environment.items()]
-        feed = [shlex.join(map(str, self.feed)), "|"] if self.feed else []
+        feed = [shlex.join(self.feed), "|"] if self.feed else []
         return " ".join([*feed, *setting, *("\\\n  !" if word == "!" else shlex.quote(word) for word in words)])
 
     def run(self):
         """Replaces this process, so that signals reach the pipeline."""
         os.environ.update(self.environment)
-        if self.feed:  # ends with the pipe
-            os.dup2(subprocess.Popen(list(map(str, self.feed)), stdout=subprocess.PIPE).stdout.fileno(), 0)
+        if self.feed:
+            os.dup2(self.open_feed().fileno(), 0)
         sys.stdout.flush()
         os.execvp("rangecast-run", self.command())
 
+    def open_feed(self):
+        return subprocess.Popen(self.feed, stdout=subprocess.PIPE).stdout  # the program ends with its pipe
+
     def spawn(self, **options):
+        if self.feed:
+            options["stdin"] = self.open_feed()
         return subprocess.Popen(self.command(), env={**os.environ, **self.environment}, **options)
