@@ -4,7 +4,78 @@
 #include <algorithm>
 #include <gstrange/gstrangepairing.hpp>
 
+#include "common/elementproperties.hpp"
+
+using rangecast::CameraRole;
 using rangecast::StatusCode;
+
+/* ---- sink pads ---- */
+
+struct CalibratePadSettings {
+  int view_id;
+  CameraRole role;
+};
+
+struct _GstRigCalibratePad {
+  GstAggregatorPad parent;
+  CalibratePadSettings settings; /* guarded by the object lock */
+};
+
+G_DEFINE_TYPE (GstRigCalibratePad, gst_rig_calibrate_pad, GST_TYPE_AGGREGATOR_PAD)
+
+#define GST_TYPE_RIG_CALIBRATE_ROLE (gst_rig_calibrate_role_get_type ())
+static GType
+gst_rig_calibrate_role_get_type (void)
+{
+  static const GType type = [] {
+    static const GEnumValue values[] = {
+        {int (CameraRole::kLeft), "Left camera of a stereo pair, or the only camera of a view",
+            "left"},
+        {int (CameraRole::kRight), "Right camera of a stereo pair", "right"},
+        {int (CameraRole::kThird), "Third camera of a view", "third"}, {}};
+    return g_enum_register_static ("GstRigCalibrateRole", values);
+  }();
+  return type;
+}
+
+rangecast::CalibrationCamera
+calibration_camera (GstRigCalibratePad *pad)
+{
+  rangecast::CalibrationCamera camera;
+  GST_OBJECT_LOCK (pad);
+  camera.name = GST_OBJECT_NAME (pad);
+  camera.view_id = pad->settings.view_id;
+  camera.role = pad->settings.role;
+  GST_OBJECT_UNLOCK (pad);
+  return camera;
+}
+
+static PropertyTable<CalibratePadSettings> &
+pad_properties ()
+{
+  using P = PropertyTable<CalibratePadSettings>;
+  static P table = {
+      P::number<&CalibratePadSettings::view_id> ("view", "View",
+          "view-id of the view that the camera belongs to (default: the number of the pad)", 0,
+          rangecast::kMaxViews - 1, kMutableReady),
+      P::enumeration<&CalibratePadSettings::role> ("role", "Role", "Role of the camera in its view",
+          GST_TYPE_RIG_CALIBRATE_ROLE, kMutableReady),
+  };
+  return table;
+}
+
+static void
+gst_rig_calibrate_pad_init (GstRigCalibratePad *)
+{
+}
+
+static void
+gst_rig_calibrate_pad_class_init (GstRigCalibratePadClass *klass)
+{
+  install_pad_properties<GstRigCalibratePad, pad_properties> (G_OBJECT_CLASS (klass));
+}
+
+/* ---- images ---- */
 
 CalibrationImages::~CalibrationImages ()
 {

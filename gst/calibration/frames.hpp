@@ -2,7 +2,6 @@
 #pragma once
 
 #include "common/videoframereader.hpp"
-#include "pad.hpp"
 
 #include <memory>
 #include <optional>
@@ -10,6 +9,18 @@
 #include <vector>
 
 /* From the sink pads of rigcalibrate to sets of images of one moment. */
+
+G_BEGIN_DECLS
+
+/* Sink pad of rigcalibrate, with the properties view and role. */
+#define GST_TYPE_RIG_CALIBRATE_PAD (gst_rig_calibrate_pad_get_type ())
+G_DECLARE_FINAL_TYPE (
+    GstRigCalibratePad, gst_rig_calibrate_pad, GST, RIG_CALIBRATE_PAD, GstAggregatorPad)
+
+G_END_DECLS
+
+/** The pad's name, view and role, without the image size. Any thread. */
+rangecast::CalibrationCamera calibration_camera (GstRigCalibratePad *pad);
 
 /** One sink pad. */
 struct CameraInput {

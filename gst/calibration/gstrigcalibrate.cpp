@@ -102,10 +102,8 @@ static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink_%u", 
 static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
     "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE ("RGBx")));
 
-static void gst_rig_calibrate_child_proxy_init (gpointer iface, gpointer data);
-
 G_DEFINE_TYPE_WITH_CODE (GstRigCalibrate, gst_rig_calibrate, GST_TYPE_AGGREGATOR,
-    G_IMPLEMENT_INTERFACE (GST_TYPE_CHILD_PROXY, gst_rig_calibrate_child_proxy_init))
+    G_IMPLEMENT_INTERFACE (GST_TYPE_CHILD_PROXY, init_pad_proxy))
 GST_ELEMENT_REGISTER_DEFINE (
     rigcalibrate, "rigcalibrate", GST_RANK_NONE, gst_rig_calibrate_get_type ())
 
@@ -463,24 +461,21 @@ gst_rig_calibrate_get_next_time (GstAggregator *aggregator)
 
 /* ---- request pads ---- */
 
-static GstPad *
-gst_rig_calibrate_request_new_pad (
-    GstElement *element, GstPadTemplate *pad_template, const gchar *name, const GstCaps *caps)
+static GstAggregatorPad *
+gst_rig_calibrate_create_new_pad (
+    GstAggregator *aggregator, GstPadTemplate *pad_template, const gchar *name, const GstCaps *caps)
 {
-  auto self = GST_RIG_CALIBRATE (element);
-  GstPad *pad = GST_ELEMENT_CLASS (gst_rig_calibrate_parent_class)
-                    ->request_new_pad (element, pad_template, name, caps);
-  if (!pad)
-    return nullptr;
+  GstRigCalibratePrivate *priv = GST_RIG_CALIBRATE (aggregator)->priv;
+  GstAggregatorPad *pad = GST_AGGREGATOR_CLASS (gst_rig_calibrate_parent_class)
+                              ->create_new_pad (aggregator, pad_template, name, caps);
   unsigned number = 0;
-  if (sscanf (GST_PAD_NAME (pad), "sink_%u", &number) == 1)
-    set_default_view (
-        GST_RIG_CALIBRATE_PAD (pad), int (std::min<unsigned> (number, rangecast::kMaxViews - 1)));
-  {
-    std::lock_guard guard (self->priv->lock);
-    self->priv->cameras.push_back (std::make_shared<CameraInput> (GST_RIG_CALIBRATE_PAD (pad)));
+  if (pad && sscanf (GST_PAD_NAME (pad), "sink_%u", &number) == 1)
+    g_object_set (
+        pad, "view", int (std::min<unsigned> (number, rangecast::kMaxViews - 1)), nullptr);
+  if (pad) {
+    std::lock_guard guard (priv->lock);
+    priv->cameras.push_back (std::make_shared<CameraInput> (GST_RIG_CALIBRATE_PAD (pad)));
   }
-  gst_child_proxy_child_added (GST_CHILD_PROXY (element), G_OBJECT (pad), GST_PAD_NAME (pad));
   return pad;
 }
 
@@ -499,29 +494,7 @@ gst_rig_calibrate_release_pad (GstElement *element, GstPad *pad)
     std::lock_guard guard (self->priv->lock);
     self->priv->examined = self->priv->taken = 0;
   });
-  gst_child_proxy_child_removed (GST_CHILD_PROXY (element), G_OBJECT (pad), GST_PAD_NAME (pad));
   GST_ELEMENT_CLASS (gst_rig_calibrate_parent_class)->release_pad (element, pad);
-}
-
-static GObject *
-gst_rig_calibrate_get_child_by_index (GstChildProxy *proxy, guint index)
-{
-  const CameraInputs cameras = current_cameras (GST_RIG_CALIBRATE (proxy));
-  return index < cameras.size () ? G_OBJECT (gst_object_ref (cameras[index]->pad)) : nullptr;
-}
-
-static guint
-gst_rig_calibrate_get_children_count (GstChildProxy *proxy)
-{
-  return guint (current_cameras (GST_RIG_CALIBRATE (proxy)).size ());
-}
-
-static void
-gst_rig_calibrate_child_proxy_init (gpointer iface, gpointer)
-{
-  auto proxy = static_cast<GstChildProxyInterface *> (iface);
-  proxy->get_child_by_index = gst_rig_calibrate_get_child_by_index;
-  proxy->get_children_count = gst_rig_calibrate_get_children_count;
 }
 
 /* ---- lifecycle ---- */
@@ -639,9 +612,10 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   gst_type_mark_as_plugin_api (GST_TYPE_RIG_CALIBRATE_PAD, GstPluginAPIFlags (0));
 
   element_class->change_state = GST_DEBUG_FUNCPTR (gst_rig_calibrate_change_state);
-  element_class->request_new_pad = GST_DEBUG_FUNCPTR (gst_rig_calibrate_request_new_pad);
+  announce_pads (element_class);
   element_class->release_pad = GST_DEBUG_FUNCPTR (gst_rig_calibrate_release_pad);
 
+  aggregator_class->create_new_pad = GST_DEBUG_FUNCPTR (gst_rig_calibrate_create_new_pad);
   aggregator_class->start = GST_DEBUG_FUNCPTR (gst_rig_calibrate_start);
   aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_rig_calibrate_flush);
   aggregator_class->propose_allocation = GST_DEBUG_FUNCPTR (propose_video_meta);

@@ -52,15 +52,17 @@ AccessUnitWriter::begin_rest (gsize size)
   return map_memory (size);
 }
 
-void
+guint8 *
 AccessUnitWriter::add (std::span<const guint8> slices)
 {
   rangecast::SliceHeader first;
   if (header_.capture_time_ns == 0 && rangecast::read_slice_header (slices, first).ok ())
     header_.capture_time_ns = first.capture_time_ns;
-  std::ranges::copy (slices, map_.data + end_);
+  guint8 *to = map_.data + end_;
+  std::ranges::copy (slices, to);
   header_.size += guint32 (slices.size ());
   end_ += slices.size ();
+  return to;
 }
 
 GstBuffer *

@@ -27,7 +27,7 @@ public:
   rangecast::Status begin (bool key, gsize size, gsize more = 0);
   /** Begins a buffer that continues an access unit. @return kNoSpace if memory is short */
   rangecast::Status begin_rest (gsize size);
-  void add (std::span<const guint8> slices);
+  guint8 *add (std::span<const guint8> slices); ///< @return where they are, until finish()
   /** @param time  in the byte stream: see byte_stream_time()
    *  @return (transfer full): without times and flags */
   GstBuffer *finish (GstClockTime time);

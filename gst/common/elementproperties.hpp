@@ -86,3 +86,53 @@ install_properties (
   if constexpr (!std::is_null_pointer_v<decltype (kTable)>)
     kTable ().install (klass, properties::kFirstSettingId);
 }
+
+/** The same for a pad's class. `Pad` has `settings`, which the pad's object lock guards and which
+ * zero bytes make valid. */
+template <typename Pad, auto kTable>
+void
+install_pad_properties (GObjectClass *klass)
+{
+  klass->set_property = [] (GObject *pad, guint id, const GValue *value, GParamSpec *) {
+    GST_OBJECT_LOCK (pad);
+    kTable ().set (reinterpret_cast<Pad *> (pad)->settings, id, value);
+    GST_OBJECT_UNLOCK (pad);
+  };
+  klass->get_property = [] (GObject *pad, guint id, GValue *value, GParamSpec *) {
+    GST_OBJECT_LOCK (pad);
+    kTable ().get (reinterpret_cast<Pad *> (pad)->settings, id, value);
+    GST_OBJECT_UNLOCK (pad);
+  };
+  kTable ().install (klass, 1);
+}
+
+/** GstChildProxy of an element whose children are its sink pads, so that launch strings can set
+ * their properties: sink_1::view=0. For G_IMPLEMENT_INTERFACE, with announce_pads() in class_init.
+ */
+inline void
+init_pad_proxy (gpointer iface, gpointer)
+{
+  auto proxy = static_cast<GstChildProxyInterface *> (iface);
+  proxy->get_child_by_index = [] (GstChildProxy *element, guint index) {
+    GST_OBJECT_LOCK (element);
+    gpointer pad = g_list_nth_data (GST_ELEMENT_CAST (element)->sinkpads, index);
+    if (pad)
+      gst_object_ref (pad);
+    GST_OBJECT_UNLOCK (element);
+    return static_cast<GObject *> (pad);
+  };
+  proxy->get_children_count = [] (GstChildProxy *element) {
+    return guint (GST_ELEMENT_CAST (element)->numsinkpads);
+  };
+}
+
+inline void
+announce_pads (GstElementClass *klass)
+{
+  klass->pad_added = [] (GstElement *element, GstPad *pad) {
+    gst_child_proxy_child_added (GST_CHILD_PROXY (element), G_OBJECT (pad), GST_PAD_NAME (pad));
+  };
+  klass->pad_removed = [] (GstElement *element, GstPad *pad) {
+    gst_child_proxy_child_removed (GST_CHILD_PROXY (element), G_OBJECT (pad), GST_PAD_NAME (pad));
+  };
+}

@@ -56,8 +56,6 @@ read (const GValue *value)
     return g_value_get_boolean (value) != FALSE;
   else if constexpr (std::same_as<T, double>)
     return g_value_get_double (value);
-  else if constexpr (std::same_as<T, float>)
-    return g_value_get_float (value);
   else if constexpr (std::same_as<T, std::string>) {
     const gchar *text = g_value_get_string (value);
     return text ? text : "";
@@ -82,8 +80,6 @@ write (const T &member, GValue *value)
     g_value_set_boolean (value, member);
   else if constexpr (std::same_as<T, double>)
     g_value_set_double (value, member);
-  else if constexpr (std::same_as<T, float>)
-    g_value_set_float (value, member);
   else if constexpr (std::same_as<T, std::string>)
     g_value_set_string (value, member.empty () ? nullptr : member.c_str ());
   else if constexpr (std::is_enum_v<T>)
@@ -121,8 +117,6 @@ number_spec (const char *name, const char *nick, const char *blurb, T minimum, T
 {
   if constexpr (std::same_as<T, double>)
     return g_param_spec_double (name, nick, blurb, minimum, maximum, default_value, flags);
-  else if constexpr (std::same_as<T, float>)
-    return g_param_spec_float (name, nick, blurb, minimum, maximum, default_value, flags);
   else if constexpr (std::same_as<T, gint>)
     return g_param_spec_int (name, nick, blurb, minimum, maximum, default_value, flags);
   else if constexpr (std::same_as<T, guint>)
@@ -143,7 +137,7 @@ public:
 
   PropertyTable (std::initializer_list<Row> rows) : rows_ (rows) {}
 
-  /** A number (gint, guint, gint64, guint64, float or double).
+  /** A number (gint, guint, gint64, guint64 or double).
    *  @tparam kPath  path from Settings to the member: pointers to members, or functions that return
    *  a reference */
   template <auto... kPath, typename Minimum, typename Maximum>

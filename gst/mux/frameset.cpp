@@ -11,6 +11,8 @@
 using rangecast::Status;
 using rangecast::StatusCode;
 
+static constexpr gsize kViewIdByte = 4; /* of a slice */
+
 void
 FrameSetJoiner::begin (bool coded)
 {
@@ -24,15 +26,15 @@ FrameSetJoiner::begin (bool coded)
 }
 
 bool
-FrameSetJoiner::add (GstBuffer *buffer)
+FrameSetJoiner::add (GstBuffer *buffer, int id_offset)
 {
   if (coded_ ? size_ + gst_buffer_get_size (buffer) > writer_.max_size ()
-             : !gstrange::append_metas (frame_set_, buffer, size_))
+             : !gstrange::append_metas (frame_set_, buffer, size_, guint (id_offset)))
     return false;
   is_key_ = is_key_ && !GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_DELTA_UNIT);
   size_ += gst_buffer_get_size (buffer);
   memories_ += gst_buffer_n_memory (buffer);
-  parts_.push_back (buffer);
+  parts_.push_back ({buffer, id_offset});
   return true;
 }
 
@@ -63,8 +65,8 @@ FrameSetJoiner::copy_parts ()
   bool all = gst_memory_map (copy, &map, GST_MAP_WRITE);
   if (all) {
     guint8 *end = map.data;
-    for (GstBuffer *buffer : parts_)
-      all = all && copy_bytes (buffer, end);
+    for (const Part &part : parts_)
+      all = all && copy_bytes (part.buffer, end);
     gst_memory_unmap (copy, &map);
   }
   return all ? Status{} : Status{StatusCode::kBadData, "cannot map an input buffer"};
@@ -76,16 +78,16 @@ FrameSetJoiner::write_access_unit (GstClockTime time)
 {
   if (Status s = writer_.begin (is_key_, size_); !s.ok ())
     return s;
-  const auto add_slice = [this] (gsize, std::span<const guint8> unit,
-                             const rangecast::UnitHeader &header) {
-    if (header.type == guint8 (rangecast::UnitType::kSlice))
-      writer_.add (unit);
-    return true;
-  };
   bool all = true;
-  for (GstBuffer *buffer : parts_) {
+  for (const Part &part : parts_) {
+    const auto add_slice = [&] (gsize, std::span<const guint8> unit,
+                               const rangecast::UnitHeader &header) {
+      if (header.type == guint8 (rangecast::UnitType::kSlice) && unit.size () > kViewIdByte)
+        writer_.add (unit)[kViewIdByte] += guint8 (part.id_offset);
+      return true;
+    };
     Status damage; /* what follows it is skipped */
-    all = for_each_unit (buffer, add_slice, damage) && all;
+    all = for_each_unit (part.buffer, add_slice, damage) && all;
   }
   gst_buffer_unref (std::exchange (frame_set_, writer_.finish (time)));
   set_key (frame_set_, is_key_);
@@ -101,7 +103,7 @@ FrameSetJoiner::finish (GstClockTime time, GstBuffer *&frame_set)
   else if (memories_ > gst_buffer_get_max_memory ())
     status = copy_parts ();
   else
-    for (GstBuffer *buffer : parts_) {
+    for (const auto &[buffer, id_offset] : parts_) {
       gst_buffer_copy_into (frame_set_, buffer, GST_BUFFER_COPY_MEMORY, 0, gsize (-1));
       gst_buffer_add_parent_buffer_meta (frame_set_, buffer); /* keeps the memory in its pool */
     }

@@ -26,9 +26,10 @@ public:
   void begin (bool coded);
   /** Appends the views of a buffer.
    *  @param buffer  transfer none; must live until finish()
+   *  @param id_offset  added to its view-ids
    *  @return false, and nothing is added, if it is raw and has a view-id that was added before, or
    *  if it would make a coded frame set too long */
-  bool add (GstBuffer *buffer);
+  bool add (GstBuffer *buffer, int id_offset);
   /** @param time  in the byte stream of coded ones
    *  @param[out] frame_set  transfer full, without times; nullptr on error
    *  @return kNoSpace if memory is short, kBadData if a buffer cannot be mapped */
@@ -42,15 +43,20 @@ public:
   }
 
 private:
+  struct Part {
+    GstBuffer *buffer;
+    int id_offset;
+  };
+
   rangecast::Status copy_parts ();
   rangecast::Status write_access_unit (GstClockTime time);
 
   GstBuffer *frame_set_ = nullptr;
   bool coded_ = false;
-  bool is_key_ = true;             /* coded */
-  gsize size_ = 0;                 /* bytes of all buffers */
-  guint memories_ = 0;             /* of all buffers */
-  std::vector<GstBuffer *> parts_; /* kept for its memory */
+  bool is_key_ = true;      /* coded */
+  gsize size_ = 0;          /* bytes of all buffers */
+  guint memories_ = 0;      /* of all buffers */
+  std::vector<Part> parts_; /* kept for its memory */
   RecycledMemories copies_;
   AccessUnitWriter writer_;
 };

@@ -122,7 +122,8 @@ static GstStaticPadTemplate sink_template =
 static GstStaticPadTemplate src_template =
     GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (MUX_CAPS));
 
-G_DEFINE_TYPE (GstRangeMux, gst_range_mux, GST_TYPE_AGGREGATOR)
+G_DEFINE_TYPE_WITH_CODE (GstRangeMux, gst_range_mux, GST_TYPE_AGGREGATOR,
+    G_IMPLEMENT_INTERFACE (GST_TYPE_CHILD_PROXY, init_pad_proxy))
 GST_ELEMENT_REGISTER_DEFINE (rangemux, "rangemux", GST_RANK_NONE, gst_range_mux_get_type ())
 
 /* ---- 1. buffers at the pads ---- */
@@ -292,7 +293,7 @@ join_matching (GstRangeMux *self, const MuxStreams &streams, FrameTimes &times)
       continue;
     times.running = std::min (times.running, stream->running);
     drop_buffer (priv, *stream);
-    if (!priv->joiner.add (stream->buffer))
+    if (!priv->joiner.add (stream->buffer, stream->id_offset))
       GST_WARNING_OBJECT (stream->pad, "dropping a buffer: its view-id is that of another pad, or "
                                        "the frame set is too long");
     set_state (self, *stream, StreamState::kIn, stream->running);
@@ -415,6 +416,9 @@ handle_caps (GstRangeMux *self, MuxStream &stream, GstCaps *caps)
 {
   gstrange::RangeInfo info;
   Status status = gstrange::parse_caps (caps, info);
+  const int id_offset = place_rig (GST_RANGE_MUX_PAD (stream.pad), info.rig);
+  if (status.ok ())
+    status = rangecast::validate (info.rig);
   if (!status.ok ())
     status = {status.code (),
         "pad " + std::string (GST_PAD_NAME (stream.pad)) + ": " + status.message ()};
@@ -430,6 +434,7 @@ handle_caps (GstRangeMux *self, MuxStream &stream, GstCaps *caps)
   stream.coded =
       gst_structure_has_name (gst_caps_get_structure (caps, 0), GST_NEIGHBOUR_CODE_MEDIA_TYPE);
   stream.info = std::move (info);
+  stream.id_offset = id_offset;
   stream.has_caps = true;
   stream.chosen = false; /* displaces no other */
   self->priv->caps_dirty = true;
@@ -637,13 +642,16 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
       "out-of-sync, skipped, and a structure for each sink pad");
 
   gst_element_class_add_static_pad_template_with_gtype (
-      element_class, &sink_template, GST_TYPE_AGGREGATOR_PAD);
+      element_class, &sink_template, GST_TYPE_RANGE_MUX_PAD);
   gst_element_class_add_static_pad_template_with_gtype (
       element_class, &src_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Range multiplexer", "Muxer/Video",
       "Combines the views of several range streams into frame sets by capture time",
       "gst-rangecast");
 
+  gst_type_mark_as_plugin_api (GST_TYPE_RANGE_MUX_PAD, GstPluginAPIFlags (0));
+
+  announce_pads (element_class);
   element_class->release_pad = GST_DEBUG_FUNCPTR (gst_range_mux_release_pad);
   element_class->set_clock = GST_DEBUG_FUNCPTR (gst_range_mux_set_clock);
 

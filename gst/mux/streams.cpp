@@ -2,12 +2,83 @@
 #include "streams.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <gstrange/gstrangestatus.hpp>
+#include <numbers>
 
+#include "common/elementproperties.hpp"
+
+using rangecast::Pose;
 using rangecast::Rig;
 using rangecast::Status;
 using rangecast::StatusCode;
 using rangecast::View;
+
+/* ---- sink pads ---- */
+
+struct MuxPadSettings {
+  int view_id_offset;
+  double x, y, z, yaw;
+};
+
+struct _GstRangeMuxPad {
+  GstAggregatorPad parent;
+  MuxPadSettings settings; /* guarded by the object lock */
+};
+
+G_DEFINE_TYPE (GstRangeMuxPad, gst_range_mux_pad, GST_TYPE_AGGREGATOR_PAD)
+
+int
+place_rig (GstRangeMuxPad *pad, Rig &rig)
+{
+  GST_OBJECT_LOCK (pad);
+  const MuxPadSettings s = pad->settings;
+  GST_OBJECT_UNLOCK (pad);
+  const double angle = s.yaw * std::numbers::pi / 180, c = std::cos (angle), n = std::sin (angle);
+  const Pose world_from_rig = {{c, 0, n, 0, 1, 0, -n, 0, c}, {s.x, s.y, s.z}};
+  for (View &view : rig.views) {
+    view.id += s.view_id_offset;
+    if (s.x != 0 || s.y != 0 || s.z != 0 ||
+        s.yaw != 0) /* else the rig stays the same in each bit */
+      view.world_from_view = world_from_rig * view.world_from_view;
+  }
+  return s.view_id_offset;
+}
+
+static PropertyTable<MuxPadSettings> &
+pad_properties ()
+{
+  using P = PropertyTable<MuxPadSettings>;
+  static P table = {
+      P::number<&MuxPadSettings::view_id_offset> ("view-id-offset", "View-id offset",
+          "Added to the stream's view-ids, so that several rigs with equal ones make one scene", 0,
+          rangecast::kMaxViews - 1, kMutableReady),
+      P::number<&MuxPadSettings::x> (
+          "x", "X", "x of the stream's origin in the scene in metres", -1000, 1000, kMutableReady),
+      P::number<&MuxPadSettings::y> ("y", "Y",
+          "y (height) of the stream's origin in the scene in metres", -1000, 1000, kMutableReady),
+      P::number<&MuxPadSettings::z> (
+          "z", "Z", "z of the stream's origin in the scene in metres", -1000, 1000, kMutableReady),
+      P::number<&MuxPadSettings::yaw> ("yaw", "Yaw",
+          "Rotation of the stream about its vertical axis in degrees, counterclockwise seen from "
+          "above",
+          -360, 360, kMutableReady),
+  };
+  return table;
+}
+
+static void
+gst_range_mux_pad_init (GstRangeMuxPad *)
+{
+}
+
+static void
+gst_range_mux_pad_class_init (GstRangeMuxPadClass *klass)
+{
+  install_pad_properties<GstRangeMuxPad, pad_properties> (G_OBJECT_CLASS (klass));
+}
+
+/* ---- streams ---- */
 
 void
 MuxStream::reset ()
@@ -61,9 +132,10 @@ clash_of (const MuxStream &stream, const std::vector<MuxStream *> &chosen)
   for (const MuxStream *other : chosen) {
     for (const View &view : stream.info.rig.views)
       if (other->info.rig.find (view.id))
-        return {StatusCode::kBadValue, "pads " + std::string (GST_PAD_NAME (other->pad)) + " and " +
-                                           name + " both have view-id " + std::to_string (view.id) +
-                                           "; give each camera host another view-id"};
+        return {StatusCode::kBadValue,
+            "pads " + std::string (GST_PAD_NAME (other->pad)) + " and " + name +
+                " both have view-id " + std::to_string (view.id) +
+                "; give each camera host another view-id, or set view-id-offset of a pad"};
     if (other->coded != stream.coded)
       return {StatusCode::kBadValue, "pads " + std::string (GST_PAD_NAME (other->pad)) + " and " +
                                          name + ": streams must be all raw or all coded"};

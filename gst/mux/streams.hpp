@@ -12,6 +12,17 @@
 #include "common/matcher.hpp"
 #include "common/statsreporter.hpp"
 
+G_BEGIN_DECLS
+
+/* Sink pad of rangemux, with the properties view-id-offset, x, y, z and yaw. */
+#define GST_TYPE_RANGE_MUX_PAD (gst_range_mux_pad_get_type ())
+G_DECLARE_FINAL_TYPE (GstRangeMuxPad, gst_range_mux_pad, GST, RANGE_MUX_PAD, GstAggregatorPad)
+
+G_END_DECLS
+
+/** Renumbers and moves the views of a stream as the pad's properties say. @return view-id-offset */
+int place_rig (GstRangeMuxPad *pad, rangecast::Rig &rig);
+
 /** Whether a stream's buffers become part of frame sets, and why not. */
 enum class StreamState {
   kIn,
@@ -48,7 +59,8 @@ struct MuxStream : PadStream {
 
   /* streaming thread */
   bool has_caps = false, coded = false;
-  gstrange::RangeInfo info;
+  gstrange::RangeInfo info;                 ///< moved as the pad's properties say
+  int id_offset = 0;                        ///< what was added to its view-ids
   rangecast::Status other_rig;              ///< how it differs from the property `rig`
   rangecast::Status clash;                  ///< why it is not chosen
   bool chosen = false;                      ///< by choose_streams()

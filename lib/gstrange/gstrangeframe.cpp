@@ -58,17 +58,18 @@ copy_layout (GstRangeMeta *to, const GstRangeMeta *from)
 }
 
 bool
-append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base)
+append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base, guint id_offset)
 {
   gpointer state = nullptr;
   while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state))
-    if (gst_buffer_get_range_meta (frame_set, meta->view_id))
+    if (gst_buffer_get_range_meta (frame_set, meta->view_id + id_offset))
       return false;
   state = nullptr;
   while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state)) {
     auto added = reinterpret_cast<GstRangeMeta *> (
         gst_buffer_add_meta (frame_set, GST_RANGE_META_INFO, nullptr));
     copy_layout (added, meta);
+    added->view_id += id_offset;
     added->depth_offset += base;
     added->colour_offset += base;
   }

@@ -27,8 +27,9 @@ void copy_layout (GstRangeMeta *to, const GstRangeMeta *from);
 
 /** Adds the metas of `views` to a frame set like gst_range_buffer_append(), without its memories.
  *  @param base  offset in `frame_set` of the bytes of `views`
+ *  @param id_offset  added to the view-ids of `views`
  *  @return false, and nothing is added, if both contain the same view-id */
-bool append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base);
+bool append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base, guint id_offset = 0);
 
 /** Maps all views of a frame set during its lifetime, without allocations. After a failure views()
  *  is empty and status() names the view. */

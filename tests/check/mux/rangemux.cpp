@@ -134,6 +134,60 @@ GST_START_TEST (test_coded_access_units_are_joined)
 }
 GST_END_TEST;
 
+/* One person twice in a scene. */
+static const char *const kTwice[] = {
+    "t. ! m.sink_0 t. ! m.sink_1 m. ! ",
+    "t. ! neighbourcodeenc ! tee name=c "
+    "c. ! m.sink_0 c. ! m.sink_1 m. ! neighbourcodedec ! ",
+};
+
+GST_START_TEST (test_equal_rigs_make_one_scene_renumbered_and_moved)
+{
+  const std::string launch =
+      "rangemux name=m sink_1::view-id-offset=4 sink_1::x=1 sink_1::y=2 sink_1::z=3 sink_1::yaw=90 "
+      "avatartestsrc views=2 num-buffers=1 empty-frames=0 ! video/x-range,width=64,height=48 ! "
+      "tee name=t " +
+      std::string (kTwice[__i__]) + "appsink name=sink sync=false";
+  GstElement *pipeline = gst_parse_launch (launch.c_str (), nullptr);
+  GstElement *sink = gst_bin_get_by_name (GST_BIN (pipeline), "sink");
+  gst_element_set_state (pipeline, GST_STATE_PLAYING);
+  GstSample *sample = nullptr;
+  g_signal_emit_by_name (sink, "pull-sample", &sample);
+  fail_unless (sample != nullptr);
+  gstrange::RangeInfo info;
+  fail_unless_ok (gstrange::parse_caps (gst_sample_get_caps (sample), info));
+  {
+    const gstrange::RangeFrameMap frame (gst_sample_get_buffer (sample), GST_MAP_READ);
+    const auto images = frame.views ();
+    fail_unless_equals_int (images.size (), 4);
+    for (int i = 0; i < 2; i++) {
+      const RangeImage &image = images[i], &twin = images[i + 2];
+      fail_unless_equals_int (twin.view_id, image.view_id + 4);
+      fail_unless_equals_int (twin.roi.width, image.roi.width);
+      fail_unless (std::memcmp (twin.depth.row (0), image.depth.row (0), 2 * image.roi.width) == 0);
+      const Vec3 from = info.rig.find (i)->world_from_view * Vec3{0.1, 0.2, 0.3};
+      const Vec3 to = info.rig.find (i + 4)->world_from_view * Vec3{0.1, 0.2, 0.3};
+      fail_unless (norm (to - Vec3{from.z + 1, from.y + 2, 3 - from.x}) < 1e-9);
+    }
+  }
+  gst_sample_unref (sample);
+  gst_element_set_state (pipeline, GST_STATE_NULL);
+  gst_object_unref (sink);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
+GST_START_TEST (test_offset_beyond_the_last_view_id_names_the_pad)
+{
+  Mux mux (2);
+  gst_child_proxy_set (GST_CHILD_PROXY (mux.out->element), "sink_1::view-id-offset", 63, nullptr);
+  gst_harness_push_event (mux.in[1],
+      gst_event_new_caps (gstrange::make_range_caps (gstrange::make_info (mux.one (1), 30, 1))));
+  fail_unless_contains (
+      next_message_text (mux.bus, GST_MESSAGE_ERROR), "sink_1: view-id 64: must be 0 to 63");
+}
+GST_END_TEST;
+
 GST_START_TEST (test_request_for_a_key_frame_set_goes_to_all_streams)
 {
   Mux mux (3, true);
@@ -167,6 +221,9 @@ rangemux_suite ()
   tcase_add_test (tc, test_what_comes_after_its_frame_set_is_dropped_and_counted);
   tcase_add_test (tc, test_two_pads_with_one_view_are_one_error_that_names_both);
   tcase_add_test (tc, test_coded_access_units_are_joined);
+  tcase_add_loop_test (
+      tc, test_equal_rigs_make_one_scene_renumbered_and_moved, 0, G_N_ELEMENTS (kTwice));
+  tcase_add_test (tc, test_offset_beyond_the_last_view_id_names_the_pad);
   tcase_add_test (tc, test_request_for_a_key_frame_set_goes_to_all_streams);
   return suite;
 }
