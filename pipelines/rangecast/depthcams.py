@@ -13,7 +13,7 @@ from .launch import Fail, fail_unless
 DEPTH_CAMERAS = """openni2, openni2=URI: a depth camera of OpenNI 2 (Xtion, Kinect, Astra), or a recording FILE.oni;
 v4l2=DEPTH,COLOUR: the V4L2 devices of a camera with pixel format Z16 (RealSense), views N and N + 1 of the rig"""
 QUEUE = "! queue max-size-buffers=2 leaky=downstream !".split()
-DEPTH_SENSOR, FIELD_OF_VIEW, VIDEO_MODE, MIRRORING, IMAGE_REGISTRATION, TENTH_MM = 3, 1, 3, 7, 5, 101  # OniCEnums.h, OniCProperties.h
+COLOUR, DEPTH, FIELD_OF_VIEW, VIDEO_MODE, MIRRORING, IMAGE_REGISTRATION, TENTH_MM = 2, 3, 1, 3, 7, 5, 101  # OniCEnums.h, OniCProperties.h
 
 
 def v4l2_source(device, size, fps):
@@ -54,27 +54,30 @@ def ask_openni(uri, rig):
     except OSError:
         raise Fail("no OpenNI 2: apt-get install libopenni2-0 gstreamer1.0-plugins-bad") from None
     oni.oniGetExtendedError.restype = ctypes.c_char_p
-    device, stream, mode = ctypes.c_void_p(), ctypes.c_void_p(), (ctypes.c_int * 4)()  # pixel format, width, height, frame rate
-    angle, mirrored, registered = ctypes.c_float(), ctypes.c_int(), ctypes.c_int(1)
+    device, angle, mirrored, registered = ctypes.c_void_p(), ctypes.c_float(), ctypes.c_int(), ctypes.c_int(1)
+    streams = {sensor: ctypes.c_void_p() for sensor in (COLOUR, DEPTH)}
+    modes = {sensor: (ctypes.c_int * 4)() for sensor in streams}  # pixel format, width, height, frame rate
 
-    def get(what, name, value):
+    def get(handle, name, value):
         size = ctypes.c_int(ctypes.sizeof(value))
-        return what[0](what[1], name, ctypes.byref(value), ctypes.byref(size)) == 0
+        call = oni.oniDeviceGetProperty if handle is device else oni.oniStreamGetProperty
+        return call(handle, name, ctypes.byref(value), ctypes.byref(size)) == 0
 
-    opened = (
-        oni.oniInitialize(2002) == 0
-        and oni.oniDeviceOpen(uri.encode() or None, ctypes.byref(device)) == 0
-        and oni.oniDeviceCreateStream(device, DEPTH_SENSOR, ctypes.byref(stream)) == 0
-        and get((oni.oniStreamGetProperty, stream), VIDEO_MODE, mode)
-    )
+    opened = oni.oniInitialize(2002) == 0 and oni.oniDeviceOpen(uri.encode() or None, ctypes.byref(device)) == 0
+    for sensor, stream in streams.items():
+        opened = opened and oni.oniDeviceCreateStream(device, sensor, ctypes.byref(stream)) == 0 and get(stream, VIDEO_MODE, modes[sensor])
     said = " ".join((oni.oniGetExtendedError() or b"").decode(errors="replace").split())
     fail_unless(opened, f"no OpenNI 2 camera or recording{' ' * bool(uri)}{uri}: {said}")
+    sizes = [f"{mode[1]}x{mode[2]}" for mode in modes.values()]
+    fail_unless(sizes[0] == sizes[1], f"colour is {sizes[0]} but depth {sizes[1]}, and openni2src needs one size")
+    mode = modes[DEPTH]
     properties = [f"depth-scale={0.0001 if mode[0] == TENTH_MM else 0.001}"]
-    if not rig and get((oni.oniStreamGetProperty, stream), FIELD_OF_VIEW, angle) and 0 < angle.value < math.pi:
+    if not rig and get(streams[DEPTH], FIELD_OF_VIEW, angle) and 0 < angle.value < math.pi:
         properties.append(f"focal-length={mode[1] / 2 / math.tan(angle.value / 2):.2f}")
-    get((oni.oniStreamGetProperty, stream), MIRRORING, mirrored)
-    get((oni.oniDeviceGetProperty, device), IMAGE_REGISTRATION, registered)
-    oni.oniStreamDestroy(stream)
+    get(streams[DEPTH], MIRRORING, mirrored)
+    get(device, IMAGE_REGISTRATION, registered)
+    for stream in streams.values():
+        oni.oniStreamDestroy(stream)
     oni.oniDeviceClose(device)  # oniShutdown() may crash
     if not rig and not registered.value:
         print("warning: depth is not registered to colour; see docs/guide/cameras.md#depth-cameras", file=sys.stderr)

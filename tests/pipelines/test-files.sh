@@ -142,6 +142,8 @@ test_openni_recording_shows_the_head_with_intrinsics_unit_and_mirroring_of_the_c
   rangecast camera --input openni2=mirrored.oni --view 1 --rig rig.yaml --to 127.0.0.1:5000 --depth far=2 --print >string.txt
   [ "$(grep -c 'videoflip video-direction=horiz' string.txt)$(grep -c 'rig=rig.yaml view-id=1 depth-scale=0.001 far=2' string.txt)" = 21 ] ||
     fail "$(cat string.txt)"
+  python3 "$source_dir/write-oni.py" wide.oni 160x120 10 60 depth.raw colour.raw --wide-colour
+  expect_error "colour is 320x120 but depth 160x120" rangecast webcam --camera openni2=wide.oni --png none.png
   expect_error "no OpenNI 2 camera or recording none.oni" rangecast webcam --camera openni2=none.oni --png none.png
   expect_error "'kinect' is none of: openni2" rangecast webcam --camera kinect --png none.png
 }

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """An OpenNI recording of raw depth (GRAY16_LE) and colour (RGB), without compression.
 
-usage: write-oni.py OUT WIDTHxHEIGHT FPS DEGREES DEPTH COLOUR [--mirror] [--tenth-mm] [--colour-from N]
+usage: write-oni.py OUT WIDTHxHEIGHT FPS DEGREES DEPTH COLOUR [--mirror] [--tenth-mm] [--wide-colour] [--colour-from N]
 """
 import argparse
 import math
@@ -19,6 +19,7 @@ def main():
         parser.add_argument(name)
     parser.add_argument("--mirror", action="store_true")
     parser.add_argument("--tenth-mm", action="store_true")
+    parser.add_argument("--wide-colour", action="store_true", help="say that colour has twice the width")
     parser.add_argument("--colour-from", type=int, default=0, metavar="N", help="frame N, counted from 0")
     args = parser.parse_args()
     width, height = map(int, args.size.split("x"))
@@ -45,7 +46,7 @@ def main():
         for node, (kind, name, size, pixels) in nodes.items():
             record(NODE_ADDED, node, string(name) + struct.pack("<I4sIQQ", kind, b"NONE", frames, 0, frames * step))
             set_property(INT, node, "oniRequiredFrameSize", struct.pack("<Q", width * height * size))
-            set_property(GENERAL, node, "xnMapOutputMode", struct.pack("<III", width, height, int(args.fps)))
+            set_property(GENERAL, node, "xnMapOutputMode", struct.pack("<III", width << (node == 2 and args.wide_colour), height, int(args.fps)))
             set_property(INT, node, "oniPixelFormat", struct.pack("<Q", pixels))
             set_property(GENERAL, node, "xnFOV", struct.pack("<dd", angle, angle * height / width))
             set_property(GENERAL, node, "xnCropping", bytes(12))
