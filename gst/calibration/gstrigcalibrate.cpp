@@ -21,7 +21,6 @@
 
 #include "common/backgroundjobs.hpp"
 #include "common/elementproperties.hpp"
-#include "common/recycledmemories.hpp"
 #include "frames.hpp"
 #include "messages.hpp"
 #include "settings.hpp"
@@ -80,7 +79,6 @@ struct GstRigCalibratePrivate {
 
   /* jobs, and the streaming thread while there are none */
   rangecast::CalibrationSession session;
-  RecycledMemories stills;
 
   /* streaming thread */
   bool begin = true; /* no set was examined yet */
@@ -201,13 +199,8 @@ draw_still (GstRigCalibrate *self, const CalibrationImages &set, const MappedIma
 {
   GstRigCalibratePrivate *priv = self->priv;
   const TileLayout layout = rangecast::lay_out (set.described, kTileWidth);
-  const gsize size = gsize (layout.width ()) * layout.height () * 4;
-  GstMemory *memory = priv->stills.acquire (size);
+  GstBuffer *still = gst_buffer_new_and_alloc (layout.width () * layout.height () * 4);
   GstMapInfo map;
-  if (!memory)
-    return;
-  GstBuffer *still = gst_buffer_new ();
-  gst_buffer_append_memory (still, memory);
   if (gst_buffer_map (still, &map, GST_MAP_WRITE)) {
     priv->session.draw (images.views, {reinterpret_cast<rangecast::Rgbx *> (map.data),
                                           layout.width (), layout.height (), layout.width () * 4});
@@ -561,7 +554,6 @@ gst_rig_calibrate_stop (GstAggregator *aggregator)
     priv->still = nullptr;
   }
   gst_clear_buffer (&still);
-  priv->stills.drop ();
   return TRUE;
 }
 

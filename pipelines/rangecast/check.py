@@ -41,7 +41,7 @@ def add_check(parser):
 def check(args):
     if args.rig:
         os.execvp("rig-check", ["rig-check", args.rig])
-    findings = [*elements(), opengl(), display(), socket_buffer(), realtime(), ports(), cameras()]
+    findings = [*elements(), opengl(), display(), socket_buffer(), realtime(), cameras()]
     lines = [f"{'ok     ' if good else 'missing'}  {what}" + ("" if good or not remedy else f": {remedy}") for good, what, remedy in findings]
     print(report(lines) if args.report else "\n".join(lines))
     return 0 if args.report or all(good for good, _, _ in findings) else 1
@@ -112,19 +112,6 @@ def socket_buffer():
 def realtime():
     soft, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
     return soft > 0 or os.geteuid() == 0, "the right to real-time priority", "rtprio in /etc/security/limits.conf, or exposures drift under load"
-
-
-def ports():
-    taken = []
-    for port in (8080, *range(18400, 18406)):
-        kind = socket.SOCK_STREAM if port == 8080 else socket.SOCK_DGRAM
-        with socket.socket(socket.AF_INET, kind) as one:
-            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, int(kind == socket.SOCK_STREAM))
-            try:
-                one.bind(("127.0.0.1", port))
-            except OSError:
-                taken.append(str(port))
-    return not taken, "the default ports of demo and serve", f"{', '.join(taken)} in use: see --base-port and --port"
 
 
 def cameras():

@@ -93,26 +93,6 @@ print_pairs (const Rig &rig)
   }
 }
 
-void
-print_views (const Rig &rig)
-{
-  if (rig.views.size () < 2)
-    return;
-  std::printf ("\n%-24s %-24s %11s %s\n", "view", "nearest view", "distance", "axes differ");
-  for (const View &view : rig.views) {
-    const View *nearest = nullptr;
-    const auto distance = [&] (const View &other) {
-      return norm (other.world_from_view.translation - view.world_from_view.translation);
-    };
-    for (const View &other : rig.views)
-      if (&other != &view && (!nearest || distance (other) < distance (*nearest)))
-        nearest = &other;
-    std::printf ("%-24s %-24s %9.3f m %7.1f deg\n", name_of (view).c_str (),
-        name_of (*nearest).c_str (), distance (*nearest),
-        angle_deg (axis_of (view), axis_of (*nearest)));
-  }
-}
-
 /* Reports views that stereodepth would refuse, and pairs that stand badly. @return the number of
  * the former */
 int
@@ -150,7 +130,6 @@ check_rig (const char *path)
       rig.views.size (), centre.x, centre.y, centre.z);
   print_cameras (rig, centre);
   print_pairs (rig);
-  print_views (rig);
   std::fflush (stdout);
   return print_problems (rig) == 0;
 }
