@@ -5,16 +5,17 @@ import configparser
 import json
 import math
 import re
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
 from .launch import Fail, fail_unless
 
-WIDE_M = 1  # a baseline beyond this is rather in board squares or millimetres
 IDENTITY = [1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0]
 ONE_CAMERA = "has only one camera, and a rig needs a pair: give the files of both"
+POSES = ("poses of depth cameras, as in cameraconfig.json of cwipc or calibration.txt of LiveScan3D, are not a stereo calibration: write each as "
+         "world_from_view of a view into a rig file, with the intrinsics that the camera reports: docs/formats/rig.md")  # fmt: skip
+NAMES = "; docs/formats/rig.md has the names that are found"
 PINHOLE_MODELS = "plumb_bob radtan radial_tangential brown_conrady brown rational_polynomial rational pinhole perspective opencv none"
 ZED_SIZES = {"2k": (2208, 1242), "fhd": (1920, 1080), "hd": (1280, 720), "vga": (672, 376), "fhd1200": (1920, 1200), "svga": (960, 600),
              "4k": (3840, 2160), "qhdplus": (3200, 1800)}  # fmt: skip
@@ -83,13 +84,16 @@ def pinhole(value, what):
 def rotation(value, what):
     """9 numbers, row by row, of a matrix or of Rodrigues' vector."""
     numbers = need(value, 3 if value is not None and len(flat(value)) == 3 else 9, what)
-    if len(numbers) == 9:
-        return numbers
-    angle = math.hypot(*numbers)
-    x, y, z = (one / angle for one in numbers) if angle else (0, 0, 0)
-    c, s = math.cos(angle), math.sin(angle)
-    return [c + x * x * (1 - c), x * y * (1 - c) - z * s, x * z * (1 - c) + y * s, x * y * (1 - c) + z * s, c + y * y * (1 - c),
-            y * z * (1 - c) - x * s, x * z * (1 - c) - y * s, y * z * (1 - c) + x * s, c + z * z * (1 - c)]  # fmt: skip
+    if len(numbers) == 9:  # rounded ones become orthonormal by a step of Newton's method; rig-check refuses others
+        turn = Pose(numbers, [0, 0, 0])
+        square = turn * turn.inverse()
+        near = all(abs(one - unit) < 0.002 for one, unit in zip(square.rotation, IDENTITY))
+        return [1.5 * one - 0.5 * cube for one, cube in zip(numbers, (square * turn).rotation)] if near else numbers
+    x, y, z = numbers
+    angle = math.hypot(x, y, z) or 1
+    skew = Pose([0, -z, y, z, 0, -x, -y, x, 0], [0, 0, 0])
+    s, c = math.sin(angle) / angle, (1 - math.cos(angle)) / angle**2
+    return [one + s * a + c * b for one, a, b in zip(IDENTITY, skew.rotation, (skew * skew).rotation)]
 
 
 def metres(value, unit, what="T"):
@@ -117,14 +121,7 @@ def lens(value, model, what):
 
 def parse(path):
     """The documents of a file, as dictionaries."""
-    try:
-        return parse_text(path)
-    except (ElementTree.ParseError, configparser.Error, json.JSONDecodeError, RecursionError) as error:
-        raise Fail(f"cannot be read ({str(error).splitlines()[0]})") from None
-
-
-def parse_text(path):
-    text = Path(path).read_bytes().decode("utf-8-sig", errors="replace")
+    text = Path(path).read_text("utf-8-sig", "replace")
     fail_unless("\0" not in text, UNKNOWN)
     if text.lstrip().startswith("<"):
         return [xml_value(ElementTree.fromstring(text))]
@@ -136,6 +133,12 @@ def parse_text(path):
         return [{name.lower(): dict(ini[name]) for name in ini.sections()}]
     if re.match(r"\s*cam0=", text):  # Middlebury
         return [dict(re.findall(r"^(\w+)=(.*)$", text, re.M))]
+    if re.fullmatch(r"[-+.\deE\s]+", text):  # projection matrices as those of KITTI, without their names
+        lines = [line for line in text.splitlines() if line.strip()]
+        counts = [len(line.split()) for line in lines]
+        fail_unless(len(counts) != 6 or counts[0] != 3, POSES)
+        if set(counts) == {12}:
+            return [{f"P{i}": line for i, line in enumerate(lines[:4])}]
     try:
         import yaml  # noqa: PLC0415: other formats do without it
     except ImportError:
@@ -182,11 +185,11 @@ def kalibr(documents, args):
 def pose_of(value, what):
     """A 4 x 4 matrix."""
     rows = need(value, 16, what)
-    return Pose([rows[4 * i + j] for i in range(3) for j in range(3)], rows[3:12:4])
+    return Pose(rotation([rows[4 * i + j] for i in range(3) for j in range(3)], what), rows[3:12:4])
 
 
 def luxonis(documents, args):
-    """Factory calibration of an OAK: the extrinsics of a camera take a point to that of toCameraSocket, in centimetres."""
+    """Factory calibration of an OAK: the extrinsics of a camera take a point to that of toCameraSocket."""
     file = documents[0]
     if "cameraData" not in file:
         return None
@@ -200,7 +203,8 @@ def luxonis(documents, args):
         if way["toCameraSocket"] == -1:
             return socket, Pose(IDENTITY, [0, 0, 0])
         root, pose = to_root(way["toCameraSocket"], (*seen, socket))
-        return root, pose * Pose(rotation(way["rotationMatrix"], "rotationMatrix"), metres([way["translation"][axis] for axis in "xyz"], 0.01))
+        unit = (1, 0.01, 0.001, 0.0254, 0.3048)[way.get("lengthUnit", 1)]  # dai::LengthUnit
+        return root, pose * Pose(rotation(way["rotationMatrix"], "rotationMatrix"), metres([way["translation"][axis] for axis in "xyz"], unit))
 
     chosen = [socket for socket in data if not set(sockets) <= set(data) or socket in sockets]
     cameras, roots = {}, set()
@@ -260,7 +264,7 @@ def kitti(documents, args):
             k, d, r, t = (f"{kind}_0{found[1]}" for kind in "KDRT")
             cameras[found[1]] = Camera(args.size, pinhole(file.get(k), k), lens(file.get(d), "opencv", d), Pose(rotation(file.get(r), r), metres(file.get(t), 1, t)))
         else:
-            cameras[found[1]] = projected(file[name], size and need(size, 2, "S_rect"), name)
+            cameras.setdefault(found[1], projected(file[name], size and need(size, 2, "S_rect"), name))
     return cameras
 
 
@@ -273,17 +277,16 @@ def projected(value, size, name):
 
 
 def panoptic(documents, args):
-    """CMU Panoptic: X_camera = R X_world + t, in centimetres; the HD cameras, unless others are chosen."""
+    """CMU Panoptic: X_camera = R X_world + t, in centimetres; the HD cameras, unless it has none or others are chosen."""
     cameras = documents[0].get("cameras")
     if not (isinstance(cameras, list) and all(isinstance(one, dict) and "distCoef" in one for one in cameras)):
         return None
     found = {}
-    for one in cameras:
+    hd = [one for one in cameras if one.get("type") == "hd"] or cameras
+    for one in [one for one in cameras if str(one["name"]) in args.cameras] if args.cameras else hd:
         name = str(one["name"])
-        if name not in args.cameras if args.cameras else one.get("type", "hd") != "hd":
-            continue
         found[name] = Camera(need(one["resolution"], 2, "resolution"), pinhole(one["K"], f"{name}: K"), lens(one["distCoef"], "opencv", f"{name}: distCoef"),
-                             Pose(rotation(one["R"], f"{name}: R"), metres(one["t"], 0.01, f"{name}: t")))  # fmt: skip
+                             Pose(rotation(one["R"], f"{name}: R"), metres(one["t"], 1 if args.unit else 0.01, f"{name}: t")))  # fmt: skip
     return found
 
 
@@ -296,14 +299,10 @@ def middlebury(documents, args):
     size = [need(file.get(name), 1, name)[0] for name in ("width", "height")]
     baseline = need(file.get("baseline"), 1, "baseline")[0] / 1000
     left, right = (Camera(size, pinhole(file.get(name), name), [], Pose(IDENTITY, [x, 0, 0])) for name, x in (("cam0", 0), ("cam1", -baseline)))
-    nearest = file.get("vmax", file.get("ndisp"))
-    if nearest:
-
-        def depth(disparity):
-            return left.intrinsics[0] * baseline / (need(disparity, 1, "a disparity")[0] + right.intrinsics[2] - left.intrinsics[2])
-
-        left.near = depth(nearest)
-        left.far = depth(file["vmin"]) if "vmin" in file else 10 * left.near
+    offset = right.intrinsics[2] - left.intrinsics[2]
+    depths = [left.intrinsics[0] * baseline / (need(file[name], 1, name)[0] + offset) for name in ("vmax", "ndisp", "vmin") if name in file]
+    if depths:
+        left.near, left.far = depths[0], depths[-1] if "vmin" in file else 10 * depths[0]
     return {"left": left, "right": right}
 
 
@@ -331,18 +330,19 @@ def ros(documents, args):
     return from_first(cameras)
 
 
+TO = "(?:(?:left|(?:camera|cam)?[01])to(?:right|(?:camera|cam)?[12]))?"
 KINDS = {
     "matrix": "m|k|mtx|(?:camera|cam)(?:matrix|mtx)|matrix|intrinsics?|intrinsicmatrix|cameraintrinsics?",
-    "distortion": "d|dist|dist(?:ortion)?(?:coef|coeff|coefficient)s?|distortion|distortionparameters?",
-    "rotation": "r|rot|rotation|rotationmatrix|rotation(?:left|1)to(?:right|2)",
-    "translation": "t|trans|translation|translationvector|translation(?:left|1)to(?:right|2)",
+    "distortion": "d|dist(?:ortion)?(?:(?:coef|coeff|coefficient|param|parameter)s?)?",
+    "rotation": f"(?:r|rot|rotation)(?:matrix)?{TO}",
+    "translation": f"(?:t|trans|translation)(?:vector|matrix)?{TO}(?:mm|cm|m)?",
     "width": "(?:image|img|imagesize)?width",
     "height": "(?:image|img|imagesize)?height",
     "size": "(?:image|img)?(?:size|resolution)",
     "model": "(?:distortion|lens)(?:model|type)",
     "camera": "camera(?:model|type)",
 }
-NAME = "(?:calibration|stereo|extrinsics?|cameras?|cam)*(left|right|[012])?(?:%s)(?:camera|cam)?(left|right|[lr012])?"
+NAME = "(?:calibration|stereo|extrinsics?|cameras?|cam)*(left|right|[012])?(?:cameras?|cam|intrinsics?)*(?:%s)(?:camera|cam)?(left|right|[lr012])?"
 
 
 def opencv(documents, args):
@@ -364,8 +364,10 @@ def opencv(documents, args):
                 continue
             for kind in KINDS:
                 found = match(kind, path + str(name))
-                if found and not (side and kind in ("rotation", "translation")):  # those of camera_info rectify
+                # The rotation of camera_info rectifies; a number is no matrix, but a coefficient k1.
+                if found and not (side and kind in ("rotation", "translation")) and not (kind == "matrix" and isinstance(value, (int, float))):
                     values.setdefault((kind, side_of(found) or side), value)
+                    values.setdefault(("name of " + kind, side_of(found) or side), str(name).lower())
 
     for document in documents:
         side = ""
@@ -377,6 +379,8 @@ def opencv(documents, args):
     if not sides and ("rotation", "") not in values:
         return None
     fail_unless(len(sides) != 1, ONE_CAMERA)
+    fail_unless(sides, "no M1 or K1, the camera matrices: give their file, too" + NAMES)
+    fail_unless({("rotation", ""), ("translation", "")} <= set(values), "no R and T from the left to the right camera: give their file, too" + NAMES)
     cameras = {}
     for name, number, side in zip(("left", "right"), "12", next((pair for pair in ("LR", "12", "01") if set(pair) <= sides), "12")):
         matrix, distortion = (values.get((kind, side)) for kind in ("matrix", "distortion"))
@@ -386,10 +390,8 @@ def opencv(documents, args):
         size = size or (None if width is None or height is None else [width, height])
         cameras[name] = Camera(size and need(size, 2, "image size"), pinhole(matrix, f"M{number} or K{number}"), lens(distortion, model, f"D{number}"),
                                Pose(IDENTITY, [0, 0, 0]))  # fmt: skip
-    pose = Pose(rotation(values.get(("rotation", "")), "R"), metres(values.get(("translation", "")), args.unit or 1))
-    cameras["right"].pose, baseline = pose, math.hypot(*pose.translation)
-    if baseline > WIDE_M:
-        print(f"rangecast import: warning: the baseline is {baseline:.3g} m; is the unit of T really metres? See --unit", file=sys.stderr)
+    unit = 1 if args.unit else {"mm": 0.001, "cm": 0.01}.get(values["name of translation", ""].rpartition("_")[2], 1)
+    cameras["right"].pose = Pose(rotation(values["rotation", ""], "R"), metres(values["translation", ""], unit))
     return cameras
 
 
@@ -403,12 +405,15 @@ def from_first(cameras):
 
 FORMATS = [kalibr, luxonis, zed, kitti, panoptic, middlebury, ros, opencv]
 UNKNOWN = ("not a calibration that import reads, which are those of OpenCV (YAML, XML, JSON), ROS, Kalibr, KITTI, Luxonis, ZED, CMU Panoptic and "
-           "Middlebury: see docs/formats/rig.md. Poses alone, as in cameraconfig.json of cwipc or calibration_*.txt of LiveScan3D, do not make a rig")  # fmt: skip
+           "Middlebury: see docs/formats/rig.md")  # fmt: skip
 
 
 def read_cameras(files, args):
     """{name: Camera} of the files of one calibration, in their order; the first two are left and right."""
-    documents = [document for file in dict.fromkeys(files) for document in parse(file)]
+    try:
+        documents = [document for file in dict.fromkeys(files) for document in parse(file)]
+    except (ElementTree.ParseError, configparser.Error, json.JSONDecodeError, RecursionError) as error:
+        raise Fail(f"cannot be read ({str(error).splitlines()[0]})") from None
     fail_unless(documents, UNKNOWN)
     for reader in FORMATS:
         try:
@@ -417,6 +422,8 @@ def read_cameras(files, args):
             raise Fail(f"damaged calibration of the kind {reader.__name__}: {type(error).__name__} {error}") from None
         if cameras is not None:
             fail_unless(len(documents) == 1 or reader in (ros, opencv), "one file of this kind holds all cameras: leave the others out")
-            fail_unless(args.unit is None or reader is opencv, "--unit is for calibrations of OpenCV: the unit of this one is known")
+            fail_unless(args.unit is None or reader not in (luxonis, zed, middlebury), "--unit: the unit of this calibration is known")
+            for one in cameras.values():
+                one.pose.translation = metres(one.pose.translation, args.unit or 1)
             return cameras
-    raise Fail(UNKNOWN)
+    raise Fail(POSES if "'trafo'" in str(documents) else UNKNOWN)

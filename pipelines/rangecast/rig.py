@@ -2,6 +2,7 @@
 """import: the calibration of a stereo pair in another format, to a rig file."""
 
 import json
+import math
 import os
 import re
 import subprocess
@@ -36,7 +37,7 @@ def add_import(parser):
     options.add(parser, "--near", "--far")
     parser.add_argument("--scale", type=positive, default=1, metavar="S", help="factor by which images are scaled before stereodepth")
     options.add(parser, "--size", type=options.any_size, default=None, help="size of the images that were calibrated, if the files have none or several")
-    parser.add_argument("--unit", type=positive, metavar="M", help="OpenCV: unit of T in metres, which is that of the board's squares (default 1)")
+    parser.add_argument("--unit", type=positive, metavar="M", help="unit of translations in metres, which is that of the board's squares (default 1)")
     parser.set_defaults(main=import_rig)
 
 
@@ -65,6 +66,9 @@ def choose(cameras, args):
         fail_unless(all(0 < centre < side for centre, side in zip(one.intrinsics[2:], one.size)),
                     f"the principal point {one.intrinsics[2]:g}, {one.intrinsics[3]:g} lies outside of an image of {one.size[0]:g}x{one.size[1]:g}")  # fmt: skip
     fail_unless(left.size == right.size, "the cameras have images of different sizes; scale them to one size with videoscale and calibrate again")
+    baseline = math.hypot(*(right.pose * left.pose.inverse()).translation)
+    if baseline > 1:  # rather in board squares or millimetres
+        print(f"rangecast import: warning: the baseline is {baseline:.3g} m; --unit 0.001 if translations are in millimetres", file=sys.stderr)
     return left, right
 
 
@@ -101,7 +105,8 @@ def text_of(args, left, right):
 def import_rig(args):
     fail_unless(not args.append or os.path.exists(args.out), f"--append: no rig file '{args.out}' yet: leave --append out")
     try:
-        view = text_of(args, *choose(read_cameras(args.files, args), args))
+        cameras = read_cameras(args.files, args)
+        view = text_of(args, *choose(cameras, args))
     except Fail as error:
         raise Fail(f"{', '.join(args.files)}: {error}") from None
     before = Path(args.out).read_text() if args.append else HEADER
@@ -111,7 +116,9 @@ def import_rig(args):
     checked = subprocess.run(["rig-check", file.name], capture_output=True, text=True, check=False)  # says what stereodepth would say
     if checked.returncode != 0:
         os.unlink(file.name)
-        raise Fail(f"{args.files[-1]}: " + checked.stderr.strip().removeprefix("rig-check: ").removeprefix(f"{file.name}: "))
+        right, left = reversed(args.cameras or list(cameras)[:2])
+        cure = f": --cameras {right},{left} swaps them" if "swapped" in checked.stderr else ""
+        raise Fail(f"{args.files[-1]}: " + checked.stderr.strip().removeprefix("rig-check: ").removeprefix(f"{file.name}: ") + cure)
     sys.stderr.write(checked.stderr.replace("rig-check:", "rangecast import:"))
     os.chmod(file.name, 0o644)
     os.replace(file.name, args.out)

@@ -107,6 +107,13 @@ def opencv():
               "stereo": {"R": ROTATION.tolist(), "T": T.tolist()}, "image_size": SIZE}  # fmt: skip
     Path("nested.json").write_text(json.dumps(nested))
     check("maps of cameras", TRUTH, "nested.json")
+    Path("units.yaml").write_text(yaml.dump({f"{side}_camera": {"camera_matrix": k.tolist(), "distortion_params": [d.tolist()]} for side, k, d in
+                                             (("left", K1, FIVE1), ("right", K2, FIVE2))} | {"rotation_matrix_cam1_to_cam2": ROTATION.tolist(),
+                                            "translation_mm": (1000 * T).tolist(), "image_size": list(SIZE), "k1": 0.1}))  # fmt: skip
+    check("unit in a name", TRUTH, "units.yaml")
+    Path("swapped.json").write_text(json.dumps(nested | {"stereo": {"R": ROTATION.T.tolist(), "T": (-ROTATION.T @ T).tolist()}}))
+    refused("swapped", "swapped: --cameras right,left swaps them", "swapped.json")
+    check("swapped back", (K2, FIVE2, K1, FIVE1, ROTATION, T), "swapped.json", "--cameras", "right,left")
     refused("no size", "give --size WIDTHxHEIGHT", "lists.json")
     refused("another size", "outside of an image", "lists.json", "--size", "640x480")
 
@@ -154,6 +161,9 @@ def kalibr():
     Path("openvins.yaml").write_text("%YAML:1.0\n\n" + yaml.dump({name: {key: value for key, value in chain[name].items() if key != "T_cn_cnm1"}
                                                                   | {"T_imu_cam": imu_of[name].tolist()} for name in imu_of}))  # fmt: skip
     check("OpenVINS", (K2, FIVE2[:4], K1, FIVE1[:4], ROTATION, T), "openvins.yaml")
+    rounded = {"cam0": chain["cam0"], "cam1": chain["cam1"] | {"T_cn_cnm1": np.round(step, 4).tolist()}}
+    Path("rounded.yaml").write_text(yaml.dump(rounded))
+    check("rounded rotation", (K2, FIVE2[:4], K1, FIVE1[:4], cv2.Rodrigues(cv2.Rodrigues(np.round(ROTATION, 4))[0])[0], np.round(T, 4)), "rounded.yaml")
     refused("Kalibr, swapped", "swapped", "camchain.yaml", "--cameras", "cam1,cam0")
     refused("Kalibr, no such camera", "has no camera cam7, only cam0, cam1, cam2", "camchain.yaml", "--cameras", "cam0,cam7")
     for names in ({"distortion_model": "equidistant"}, {"camera_model": "omni"}, {"camera_model": "ds"}):
@@ -174,6 +184,7 @@ def ros():
     Path("left.yaml").write_text(yaml.dump(info("left", K1, FIVE1, r1, p1)))
     Path("right.yaml").write_text(yaml.dump(info("right", K2, FIVE2, r2, p2)))
     check("ROS", TRUTH, "left.yaml", "right.yaml")
+    expect("ROS, warning of a wide baseline", run("left.yaml", "right.yaml", "--unit", "10")[1].count("the baseline is 1.2 m"), 1)
     refused("ROS, swapped", "swapped", "right.yaml", "left.yaml")
     refused("ROS, one camera", "only one camera", "left.yaml")
     messages = [{"header": {"frame_id": "left"}, "height": SIZE[1], "width": SIZE[0], "distortion_model": "plumb_bob", "D": d.tolist(), "K": k.ravel().tolist(),
@@ -200,11 +211,13 @@ def kitti():
         for name, values in (("S", SIZE), ("K", k), ("D", d), ("R", rotation), ("T", translation), ("S_rect", (1242, 700)), ("R_rect", np.eye(3)),
                              ("P_rect", p[camera])):  # fmt: skip
             text += line(f"{name}_0{camera}", values)
-    Path("calib_cam_to_cam.txt").write_text(text)
+    Path("calib_cam_to_cam.txt").write_text(text + line("P1", p[3]))  # as some add
     check("KITTI, rectified", (K1, NO, K1, NO, np.eye(3), np.array([-0.5371, 0, 0])), "calib_cam_to_cam.txt")
     check("KITTI, raw", TRUTH, "calib_cam_to_cam.txt", "--size", "1280x720")
     Path("calib.txt").write_text("".join(line(f"P{camera}", values) for camera, values in p.items()) + line("Tr", np.eye(3, 4)))
     check("KITTI odometry", (K1, NO, K1, NO, np.eye(3), np.array([-0.5371, 0, 0])), "calib.txt", "--size", "1280x720")
+    Path("matrices.txt").write_text("".join(line("", p[camera])[2:] for camera in (0, 1)))
+    check("KITTI without names", (K1, NO, K1, NO, np.eye(3), np.array([-0.5371, 0, 0])), "matrices.txt", "--size", "1280x720")
     between = np.linalg.solve(K1, p[3][:, 3]) - np.linalg.solve(K1, p[2][:, 3])
     check("KITTI colour", (K1, NO, K1, NO, np.eye(3), between), "calib.txt", "--size", "1280x720", "--cameras", "2,3")
 
@@ -234,10 +247,10 @@ def luxonis():
     fourteen = np.array([0.3, -0.1, 0.0004, -0.0007, 0.01, 0.5, -0.2, 0.02, 0, 0, 0, 0, 0, 0])
 
     def file(name, left, right, **more):
-        def cam(k, to, rotation, translation, kind=0):
+        def cam(k, to, rotation, translation, kind=0, unit=1):
             return {"cameraType": kind, "distortionCoeff": fourteen.tolist(), "width": SIZE[0], "height": SIZE[1], "intrinsicMatrix": k.tolist(),
-                    "extrinsics": {"rotationMatrix": np.asarray(rotation).tolist(), "toCameraSocket": to,
-                                   "translation": dict(zip("xyz", (np.asarray(translation) * 100).tolist()))}}  # fmt: skip
+                    "extrinsics": {"rotationMatrix": np.asarray(rotation).tolist(), "toCameraSocket": to, "lengthUnit": unit,
+                                   "translation": dict(zip("xyz", (np.asarray(translation) * (1, 100, 1000)[unit]).tolist()))}}  # fmt: skip
 
         data = [[0, cam(K1, -1, np.eye(3), np.zeros(3))], [1, cam(K1, *left, **more)], [2, cam(K2, *right)]]
         Path(name).write_text(json.dumps({"cameraData": data, "stereoRectificationData": {"leftCameraSocket": 1, "rightCameraSocket": 2}}))
@@ -246,6 +259,8 @@ def luxonis():
     truth = (K1, fourteen, K2, fourteen, ROTATION, T)
     file("oak.json", (2, ROTATION, T), root)
     check("Luxonis, left to right", truth, "oak.json")
+    file("oak.json", (2, ROTATION, T), root, unit=2)
+    check("Luxonis, millimetres", truth, "oak.json")
     file("oak.json", root, (1, ROTATION.T, -ROTATION.T @ T))
     check("Luxonis, right to left", truth, "oak.json")
     tilt, way = cv2.Rodrigues(np.array([0.01, -0.02, 0.03]))[0], np.array([0.0375, 0.001, -0.002])
@@ -266,6 +281,9 @@ def panoptic():
     check("CMU Panoptic", TRUTH, "calibration.json")
     view = yaml.safe_load(Path("rig.yaml").read_text().split("---")[1])["views"][0]["world_from_view"]
     expect("CMU Panoptic, position in a world with y up", np.array(view["translation"]), np.diag([1, -1, -1]) @ -turn.T @ way)
+    other = [one | {"type": "rgb", "t": (np.ravel(one["t"]) / 100).tolist()} for one in cameras]
+    Path("calibration.json").write_text(json.dumps({"cameras": other}))
+    check("CMU Panoptic's shape, other cameras, metres", TRUTH, "calibration.json", "--unit", "1")
     vga = {**cameras[0], "name": "01_01", "type": "vga", "K": [[700, 0.4, 320], [0, 700, 240], [0, 0, 1]], "resolution": [640, 480]}
     Path("calibration.json").write_text(json.dumps({"calibDataSource": "x", "cameras": [vga, *cameras]}))
     check("CMU Panoptic, HD cameras", TRUTH, "calibration.json")
@@ -276,9 +294,11 @@ def panoptic():
 
 def unknown():
     for name, text in (("cameraconfig.json", json.dumps({"type": "kinect", "camera": [{"serial": "1", "trafo": np.eye(4).tolist()}]})),
-                       ("calibration_1.txt", "0.1 0.2 0.3 \n100\n010\n001\n3\n1\n"), ("notes.txt", "hello\n")):  # fmt: skip
+                       ("calibration.txt", "0.1 0.2 0.3 \n-0.9976720.0259786-0.0630473\n010\n001\n3\n1\n")):  # fmt: skip
         Path(name).write_text(text)
-        refused(name, "docs/formats/rig.md", name)
+        refused(name, "poses of depth cameras", name)
+    Path("notes.txt").write_text("hello\n")
+    refused("notes.txt", "not a calibration that import reads", "notes.txt")
     Path("bent.json").write_text(json.dumps({"M1": K1.tolist(), "D1": [0] * 5, "M2": K2.tolist(), "D2": [0] * 5, "R": (ROTATION * 1.01).tolist(), "T": T.tolist()}))
     refused("no rotation", "rotation", "bent.json", "--size", "1280x720")
     Path("nan.json").write_text(json.dumps({"M1": K1.tolist(), "D1": [0, 0, 0, 0, float("nan")], "M2": K2.tolist(), "D2": [0] * 5, "R": ROTATION.tolist(), "T": T.tolist()}))

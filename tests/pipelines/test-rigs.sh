@@ -73,6 +73,7 @@ test_middlebury_pair_becomes_a_rig () {
   geometry_has "view 0 motorcycle .* right *0.1930 m"
   geometry_has "38.1 to 91.1 +px +23.15 mm at 2.11 m"
   geometry_has "741x500 +40.8 x 28.2 deg"
+  sed -i "s/$/\r/" calib.txt # as from Windows
   import calib.txt --scale 0.5
   geometry_has "371x250 +40.8 x 28.2 deg"
 }
