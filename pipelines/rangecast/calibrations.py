@@ -388,8 +388,11 @@ def opencv(documents, args):
         if camera is not None:
             lens([], camera, "camera model")
         size = size or (None if width is None or height is None else [width, height])
-        cameras[name] = Camera(size and need(size, 2, "image size"), pinhole(matrix, f"M{number} or K{number}"), lens(distortion, model, f"D{number}"),
-                               Pose(IDENTITY, [0, 0, 0]))  # fmt: skip
+        intrinsics = pinhole(matrix, f"M{number} or K{number}")
+        if size:  # NumPy's shape has the height first: that of which the principal point is nearer to the centre
+            width, height = need(size, 2, "image size")
+            size = min([width, height], [height, width], key=lambda one: math.dist(one, [2 * centre for centre in intrinsics[2:]]))
+        cameras[name] = Camera(size, intrinsics, lens(distortion, model, f"D{number}"), Pose(IDENTITY, [0, 0, 0]))
     unit = 1 if args.unit else {"mm": 0.001, "cm": 0.01}.get(values["name of translation", ""].rpartition("_")[2], 1)
     cameras["right"].pose = Pose(rotation(values["rotation", ""], "R"), metres(values["translation", ""], unit))
     return cameras

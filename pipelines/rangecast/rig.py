@@ -63,8 +63,11 @@ def choose(cameras, args):
         one.size = [float(side) for side in one.size or args.size]
         fail_unless(all(1 <= side <= 16384 for side in one.size), f"width and height must be 1 to 16384 pixels, got {one.size[0]:g} and {one.size[1]:g}")
         fail_unless(not args.size or one.size == list(args.size), f"the images that were calibrated have {one.size[0]:g}x{one.size[1]:g} pixels, unlike --size")
-        fail_unless(all(0 < centre < side for centre, side in zip(one.intrinsics[2:], one.size)),
-                    f"the principal point {one.intrinsics[2]:g}, {one.intrinsics[3]:g} lies outside of an image of {one.size[0]:g}x{one.size[1]:g}")  # fmt: skip
+        where = [centre / side for centre, side in zip(one.intrinsics[2:], one.size)]
+        point = "the principal point {2:g}, {3:g} lies {4} of an image of {0:g}x{1:g}; see --size"
+        fail_unless(min(where) > 0 and max(where) < 1, point.format(*one.size, *one.intrinsics[2:], "outside"))
+        if min(where) < 0.25 or max(where) > 0.75:
+            print("rangecast import: warning:", point.format(*one.size, *one.intrinsics[2:], "far from the centre"), file=sys.stderr)
     fail_unless(left.size == right.size, "the cameras have images of different sizes; scale them to one size with videoscale and calibrate again")
     baseline = math.hypot(*(right.pose * left.pose.inverse()).translation)
     if baseline > 1:  # rather in board squares or millimetres

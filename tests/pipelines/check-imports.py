@@ -111,11 +111,15 @@ def opencv():
                                              (("left", K1, FIVE1), ("right", K2, FIVE2))} | {"rotation_matrix_cam1_to_cam2": ROTATION.tolist(),
                                             "translation_mm": (1000 * T).tolist(), "image_size": list(SIZE), "k1": 0.1}))  # fmt: skip
     check("unit in a name", TRUTH, "units.yaml")
+    Path("shape.json").write_text(json.dumps(nested | {"image_size": SIZE[::-1]}))
+    check("image size as NumPy's shape", TRUTH, "shape.json")
+    expect("image size as NumPy's shape", np.array(yaml.safe_load(Path("rig.yaml").read_text().split("---")[1])["views"][0]["image_size"]), SIZE)
     Path("swapped.json").write_text(json.dumps(nested | {"stereo": {"R": ROTATION.T.tolist(), "T": (-ROTATION.T @ T).tolist()}}))
     refused("swapped", "swapped: --cameras right,left swaps them", "swapped.json")
     check("swapped back", (K2, FIVE2, K1, FIVE1, ROTATION, T), "swapped.json", "--cameras", "right,left")
     refused("no size", "give --size WIDTHxHEIGHT", "lists.json")
     refused("another size", "outside of an image", "lists.json", "--size", "640x480")
+    expect("a larger size", run("lists.json", "--size", "2600x1462")[1].count("far from the centre"), 2)
 
 
 def models():
