@@ -186,6 +186,11 @@ Client::handle (std::string_view text)
     return refuse (kCloseBadMessage, "not a JSON object with a string 'type'");
   if (!admitted_)
     return enter (*message);
+  if (*type == "call") {
+    if (Client *partner = server_.partner_of (*this))
+      partner->send_text (std::string (text));
+    return;
+  }
   if (*type == "ack")
     acknowledge (*message);
   else if (*type == "key")
@@ -214,12 +219,16 @@ Client::enter (const JsonMessage &message)
     return refuse (kCloseVersion, "this server has version " + std::to_string (kProtocolVersion));
   if (!server_.admit (hello->token, user))
     return refuse (kCloseUnauthorized, "wrong or missing token");
+  if (hello->room && server_.is_full (*hello->room))
+    return refuse (kCloseLimit, "two are in this call already");
   hello_ = *hello;
   hello_.token.clear ();
   label_ += user.empty () ? "" : " (" + user + ")";
   admitted_ = true;
   GST_INFO_OBJECT (log_, "%s entered", label_.c_str ());
   send_text (server_.welcome ());
+  if (Client *partner = server_.partner_of (*this))
+    partner->send_text (R"({"type":"joined"})");
 }
 
 void

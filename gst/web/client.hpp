@@ -68,6 +68,8 @@ public:
 
   [[nodiscard]] bool is_admitted () const { return admitted_; }
   [[nodiscard]] bool wants_stats () const { return admitted_ && hello_.stats; }
+  /** Of a call, if it is in one. */
+  [[nodiscard]] const std::optional<std::string> &room () const { return hello_.room; }
   [[nodiscard]] const std::string &label () const { return label_; }
 
 private:

@@ -105,6 +105,8 @@ parse_hello (const JsonMessage &message, std::string &error)
     return {};
   hello.version = static_cast<int> (*version);
   hello.token = token.value_or ("");
+  hello.room = message.text ("room");
+  hello.stream &= !hello.room;
   return hello;
 }
 

@@ -58,6 +58,7 @@ struct Hello {
   int version = 0;
   std::string token;
   bool stream = true, stats = false, audio = false; ///< what it wants
+  std::optional<std::string> room;                  ///< of a call, instead
 };
 /** @param[out] error  what is wrong with the message, if nothing is returned */
 std::optional<Hello> parse_hello (const JsonMessage &message, std::string &error);

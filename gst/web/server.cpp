@@ -441,7 +441,24 @@ void
 Server::remove (Client &client)
 {
   counters_.clients--;
+  if (Client *partner = partner_of (client))
+    partner->send_text (R"({"type":"left"})");
   std::erase_if (clients_, [&] (const auto &one) { return one.get () == &client; });
+}
+
+Client *
+Server::partner_of (const Client &client) const
+{
+  const auto partner = std::ranges::find_if (clients_, [&] (const auto &one) {
+    return one.get () != &client && client.room () && one->room () == client.room ();
+  });
+  return partner == clients_.end () ? nullptr : partner->get ();
+}
+
+bool
+Server::is_full (const std::string &room) const
+{
+  return std::ranges::count (clients_, std::optional (room), &Client::room) >= 2;
 }
 
 /* A client that is closed at once leaves the list. */

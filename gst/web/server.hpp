@@ -87,6 +87,9 @@ public:
   void request_key (Client &client);
   [[nodiscard]] std::string welcome () const; ///< the message
   void remove (Client &client);
+  /** The other end of a client's call, or nullptr. */
+  [[nodiscard]] Client *partner_of (const Client &client) const;
+  [[nodiscard]] bool is_full (const std::string &room) const;
   /** @} */
 
 private:

@@ -494,6 +494,43 @@ GST_START_TEST (test_reports_of_hosts_reach_those_who_want_them)
 }
 GST_END_TEST;
 
+/* ---- calls ---- */
+
+GST_START_TEST (test_two_clients_of_a_room_talk_to_each_other_only)
+{
+  WebSink sink;
+  WebClient anna (sink), viewer (sink);
+  anna.enter (R"("room":"a")");
+  viewer.enter ();
+  anna.send (R"({"type":"call","to":"nobody"})");
+  WebClient other (sink);
+  other.enter (R"("room":"b")");
+  auto otto = std::make_unique<WebClient> (sink);
+  otto->enter (R"("room":"a")");
+  fail_unless_happens (anna.texts.size () == 2);
+  fail_unless_equals_string (anna.texts[1].c_str (), R"({"type":"joined"})");
+  anna.send (R"({"type":"call","offer":"x \"y\""})");
+  otto->send (R"({"type":"call","answer":"z"})");
+  fail_unless_happens (anna.texts.size () == 3 && otto->texts.size () == 2);
+  fail_unless_equals_string (anna.texts[2].c_str (), R"({"type":"call","answer":"z"})");
+  fail_unless_equals_string (otto->texts[1].c_str (), R"({"type":"call","offer":"x \"y\""})");
+  fail_unless_equals_int (code_after (sink, R"({"type":"hello","version":1,"room":"a"})"), 4429);
+  otto.reset ();
+  fail_unless_happens (anna.texts.size () == 4);
+  fail_unless_equals_string (anna.texts[3].c_str (), R"({"type":"left"})");
+  WebClient third (sink);
+  third.enter (R"("room":"a")");
+  fail_unless_happens (anna.texts.size () == 5);
+  sink.push ("one");
+  viewer.wait_for ("one");
+  for (WebClient *client : {&anna, &other, &third}) {
+    client->round_trip ();
+    fail_unless_equals_int (client->frames.size (), 0);
+  }
+  fail_unless_equals_int (other.texts.size () + viewer.texts.size () + third.texts.size (), 3);
+}
+GST_END_TEST;
+
 static Suite *
 rangewebsinkclients_suite ()
 {
@@ -522,6 +559,7 @@ rangewebsinkclients_suite ()
   tcase_add_test (tc, test_server_that_stops_says_so);
   tcase_add_test (tc, test_server_starts_at_its_port_again_before_clients_have_left);
   tcase_add_test (tc, test_reports_of_hosts_reach_those_who_want_them);
+  tcase_add_test (tc, test_two_clients_of_a_room_talk_to_each_other_only);
   return suite;
 }
 
