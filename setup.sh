@@ -37,8 +37,8 @@ packages=(
   gstreamer1.0-libav glib-networking python3-yaml gstreamer1.0-gl libgl1-mesa-dri libegl1 libegl-mesa0 libgles2 libgl1
 )
 [[ "${1:-}" = --demo || "${1:-}" = --cameras ]] || packages+=(
-  # rangewebsink, and its page: rangecast.wasm
-  libsoup-3.0-dev libjson-glib-dev
+  # rangewebsink, and its page: rangecast.wasm; calls
+  libsoup-3.0-dev libjson-glib-dev libgstreamer-plugins-bad1.0-dev gstreamer1.0-nice
   clang-19 lld-19 wasi-libc libc++-19-dev-wasm32 libc++abi-19-dev-wasm32 libclang-rt-19-dev-wasm32
 )
 [ "${targets[0]}" = demo ] || packages+=(

@@ -69,12 +69,17 @@ def make_rig(args, rig, processes):
             time.sleep(0.1)
         raise Fail(f"fake-cameras failed: {log.read_text().strip()}")
     if kind in ("avatar", "range"):
-        launch = Launch("avatartestsrc", f"views={args.views}", "num-buffers=1", f"rig-export={rig}", *([f"location={model}"] if model else []))
-        launch.add("!", size_caps(args.size, media="video/x-range"), "!", "fakesink")
-        fail_unless(processes.spawn("rig", launch.spawn).wait() == 0, "no rig: see above")
-        del processes.running["rig"]
+        export_rig(args.views, args.size, model, rig, processes)
     else:
         Path(rig).write_bytes(Path(args.input, "rig.yaml").read_bytes())
+
+
+def export_rig(views, size, model, rig, processes):
+    """Writes that of the cameras of avatartestsrc."""
+    launch = Launch("avatartestsrc", f"views={views}", "num-buffers=1", f"rig-export={rig}", *([f"location={model}"] if model else []))
+    launch.add("!", size_caps(size, media="video/x-range"), "!", "fakesink")
+    fail_unless(processes.spawn("rig", launch.spawn).wait() == 0, "no rig: see above")
+    del processes.running["rig"]
 
 
 def demo(args, host):

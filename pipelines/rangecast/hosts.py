@@ -126,7 +126,7 @@ def build_camera(args):
     fail_unless(bool(args.microphone) == bool(args.audio_to), "--microphone and --audio-to need each other")
     if args.microphone:
         check_apart(args)
-        transport.send_audio(args, launch, args.microphone, args.audio_to, args.clock)
+        transport.send_audio(args, launch)
     return launch
 
 
@@ -186,21 +186,21 @@ def build_parent(args):
 
 
 def add_view(parser):
-    options.add(parser, "--video", "--window", "--orbit", "--render", "--speaker", "--microphone", "--output-size")
-    parser.add_argument("--talk-to", type=options.addresses, metavar="HOST:PORT", help="where the other end listens for --microphone (a call)")
-    options.add(parser, "--clock")
-    parser.add_argument("--echo-cancel", action="store_true", help="remove from the microphone what the speaker plays")
+    options.add(parser, "--video", "--window", "--orbit", "--render", "--speaker", "--output-size")
     options.add_receiver(parser)
-    parser.set_defaults(build=build_view, ttl=1)
+    parser.set_defaults(build=build_view)
 
 
 def build_view(args):
-    fail_unless(bool(args.microphone) == bool(args.talk_to), "--microphone and --talk-to need each other")
-    fail_unless(not args.echo_cancel or (args.microphone and args.audio_port), "--echo-cancel needs --microphone and --audio-port")
-    heard = args.speaker != ["none"]
     launch = Launch()
     transport.receive_stream(args, launch)
-    if args.audio_port:
+    present(args, launch, args.audio_port and transport.receive_audio)
+    return launch
+
+
+def present(args, launch, receive_audio, probe=()):
+    """Adds the elements that show what launch receives and, in sync, play what receive_audio(args, launch) does; probe: before the speaker."""
+    if receive_audio:
         launch.add(*"! sync.sink_0 capturesync name=sync sync.src_0".split())
     launch.add("!", "queue", "max-size-buffers=4", "leaky=downstream", "!", "neighbourcodedec", "name=decoder")
     launch.add("!", "queue", "max-size-buffers=1", "leaky=downstream", "!", "rangealign")
@@ -208,7 +208,7 @@ def build_view(args):
     launch.add("!", size_caps(args.output_size, media="video/x-raw(memory:GLMemory)"), "!", "gldownload")
     launch.add(*"! identity name=rendered ! tee name=frames".split())
     # Without audio, frames are shown as soon as they are drawn, else when they are due.
-    sync = f"sync={str(bool(args.audio_port)).lower()}"
+    sync = f"sync={str(bool(receive_audio)).lower()}"
     show = ["frames.", "!", *QUEUE, "leaky=downstream", "!"]
     launch.add(*show, "fakesink", "name=snapshot", sync, "async=false")
     if args.window:
@@ -218,21 +218,13 @@ def build_view(args):
         launch.add(*"frames. ! queue max-size-buffers=8 leaky=downstream ! videoconvert ! vp8enc deadline=1 cpu-used=8".split())
         launch.add(*"target-bitrate=2000000 keyframe-max-dist=60 ! webmmux name=video ! filesink".split(), f"location={args.video}")
         launch.option("--drop-empty", args.video)
-    if args.audio_port:
-        transport.receive_audio(args, launch)
+    if receive_audio:
+        receive_audio(args, launch)
         # Silence while no audio arrives, for which sinks and the muxer would wait.
         launch.add("!", "sync.sink_1", "sync.src_1", *transport.HEAR, "!", "mixer.")
         launch.add(*"audiotestsrc is-live=true wave=silence ! audio/x-raw,rate=48000 ! audiomixer name=mixer".split())
         launch.add("!", "tee", "name=said", "allow-not-linked=true")
-        if heard:
-            launch.add(*"said. ! queue ! audioconvert ! audioresample".split())
-            if args.echo_cancel:
-                launch.add(*"! audio/x-raw,format=S16LE,rate=48000,channels=1 ! webrtcechoprobe name=heard".split())
-            launch.add("!", *args.speaker)
+        if args.speaker != ["none"]:
+            launch.add(*"said. ! queue ! audioconvert ! audioresample".split(), *probe, "!", *args.speaker)
         if args.video:
             launch.add(*"said. ! queue ! audioconvert ! opusenc ! queue max-size-time=0 max-size-buffers=0 ! video.".split())
-    if args.microphone:
-        # The filter finds the delay between speaker and microphone itself.
-        filters = ["!", "webrtcdsp", "probe=heard"] if args.echo_cancel and heard else []
-        transport.send_audio(args, launch, args.microphone, args.talk_to, args.clock, [*filters, "!", "volume", "name=microphone"])
-    return launch

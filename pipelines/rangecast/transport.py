@@ -117,25 +117,30 @@ def udp_group(group, interface):
     return [f"address={group}", "reuse=true", *([f"multicast-iface={interface}"] if interface else [])]  # several viewers on a host
 
 
-def send_audio(args, launch, source, to, clock, filters=()):
-    """Adds the elements from a microphone to UDP. The pipeline's clock has to be that of the camera hosts."""
-    launch.option("--clock", clock)
+def speak(launch, source, filters=(), payloader=()):
+    """Adds the elements from a microphone to RTP. The pipeline's clock has to be that of the camera hosts."""
     launch.add(*source)
     if any(word == "filesrc" or word == "audiotestsrc" or word.startswith("uri") for word in source):
         launch.add("!", "identity", "sync=true")  # these would be read as fast as the disk allows; others are live
     launch.add(*"! queue max-size-time=200000000 max-size-buffers=0 leaky=downstream ! audioconvert ! audioresample".split())
     launch.add("!", "audio/x-raw,format=S16LE,rate=48000,channels=1", *filters)
-    launch.add(*"! opusenc audio-type=voice tolerance=5000000 bitrate=32000 ! rtpopuspay pt=111".split())
+    launch.add(*"! opusenc audio-type=voice tolerance=5000000 bitrate=32000 ! rtpopuspay pt=111".split(), *payloader)
     launch.add("!", f"application/x-rtp,{AUDIO}", "!", "audio.send_rtp_sink")
     launch.add(*"rtpsession name=audio ntp-time-source=clock-time rtcp-sync-send-time=false audio.send_rtp_src".split())
+
+
+def send_audio(args, launch):
+    """Adds the elements from args.microphone to args.audio_to."""
+    launch.option("--clock", args.clock)
+    speak(launch, args.microphone)
     if args.key:
         launch.add(*"! encrypt-audio.rtp_sink_0 srtpenc name=encrypt-audio encrypt-audio.rtp_src_0".split())
         launch.option("--srtp-key", args.key)
-    launch.add("!", *sink(to, args), "audio.send_rtcp_src")
+    launch.add("!", *sink(args.audio_to, args), "audio.send_rtcp_src")
     if args.key:
         launch.add("!", "encrypt-audio.rtcp_sink_0", "encrypt-audio.rtcp_src_0")
     # rtpsession ends its RTCP only if sending BYE takes longer than its handling of EOS (GStreamer 1.22).
-    launch.add("!", "identity", "sleep-time=5000", "!", *sink(to, args, 1))
+    launch.add("!", "identity", "sleep-time=5000", "!", *sink(args.audio_to, args, 1))
 
 
 def receive_audio(args, launch):

@@ -7,7 +7,7 @@
 
 RunOptions::~RunOptions ()
 {
-  for (gchar *text : {stats, report, snapshot, srtp_key, clock})
+  for (gchar *text : {stats, report, snapshot, srtp_key, clock, signal, certificate})
     g_free (text);
   g_strfreev (drop_empty);
   g_strfreev (launch);
@@ -47,6 +47,12 @@ RunOptions::parse (int *argc, char ***argv)
           "Clock of the pipeline: system (monotonic), or HOST:PORT, where rangemux publishes one "
           "(default: what its elements provide, such as a sound card's)",
           "CLOCK"},
+      {"signal", 0, 0, G_OPTION_ARG_STRING, &signal,
+          "Connect the webrtcbin named webrtc with that of another who gives the same link of a "
+          "rangewebsink; &room=NAME at its end makes a room",
+          "URL"},
+      {"certificate", 0, 0, G_OPTION_ARG_FILENAME, &certificate,
+          "Certificate of the server of --signal (default: one that the system trusts)", "PEM"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &launch, nullptr, nullptr}, {}};
   GOptionContext *context =
       g_option_context_new ("LAUNCH-STRING... - run a pipeline and measure it");

@@ -17,6 +17,8 @@ struct RunOptions {
   gchar *snapshot = nullptr;
   gchar *srtp_key = nullptr;
   gchar *clock = nullptr;
+  gchar *signal = nullptr;
+  gchar *certificate = nullptr;
   gchar **drop_empty = nullptr;
   gchar **launch = nullptr;
 

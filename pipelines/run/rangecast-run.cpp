@@ -18,6 +18,7 @@
 #include <string_view>
 #include <utility>
 
+#include "call.hpp"
 #include "common/dump-graph.hpp"
 #include "common/final-signal.hpp"
 #include "report.hpp"
@@ -32,10 +33,13 @@ struct Runner {
   GMainLoop *loop = nullptr;
   std::unique_ptr<RunMeasure> measure;
   std::unique_ptr<StatsSender> stats;
+  std::unique_ptr<Call> call;
   std::set<int> learning; /* view-ids whose background is being learnt */
   bool failed = false;
   bool ending = false;
   bool looping = false;
+  bool again = false; /* with another pipeline: the other end of a call left */
+  bool muted = false;
 };
 
 gboolean
@@ -61,8 +65,8 @@ on_interrupt (gpointer user_data)
   auto runner = static_cast<Runner *> (user_data);
   GstState state = GST_STATE_NULL;
   gst_element_get_state (runner->pipeline, &state, nullptr, 0);
-  if (state !=
-      GST_STATE_PLAYING) { /* sources hold locks that EOS needs until sinks are prerolled */
+  if (runner->call || state != GST_STATE_PLAYING) {
+    /* sources hold locks that EOS needs until sinks are prerolled */
     g_main_loop_quit (runner->loop);
   } else if (!std::exchange (runner->ending, true)) {
     gst_element_call_async (runner->pipeline, send_eos, nullptr, nullptr);
@@ -171,6 +175,12 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
       if (runner->stats)
         runner->stats->take (message);
       break;
+    case GST_MESSAGE_APPLICATION:
+      if (runner->call && runner->call->handle (message)) {
+        runner->again = gst_message_has_name (message, "call-left");
+        g_main_loop_quit (runner->loop);
+      }
+      break;
     case GST_MESSAGE_ASYNC_DONE: /* the pipeline can be asked to seek */
       if (runner->options.loop && !runner->looping)
         play_again (*runner);
@@ -214,28 +224,30 @@ on_timeout (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
-/* Mutes and unmutes the volume element named microphone. */
-gboolean
-toggle_microphone (gpointer user_data)
+/* Mutes or unmutes the volume element named microphone. */
+void
+set_microphone (Runner &runner, bool muted)
 {
-  auto runner = static_cast<Runner *> (user_data);
-  GstElement *microphone = gst_bin_get_by_name (GST_BIN (runner->pipeline), "microphone");
+  GstElement *microphone = gst_bin_get_by_name (GST_BIN (runner.pipeline), "microphone");
   if (!microphone || !g_object_class_find_property (G_OBJECT_GET_CLASS (microphone), "mute")) {
     g_printerr ("rangecast-run: no volume element named microphone to mute\n");
   } else {
-    gboolean mute = FALSE;
-    g_object_get (microphone, "mute", &mute, nullptr);
-    g_object_set (microphone, "mute", !mute, nullptr);
-    g_print ("the microphone is %s\n", mute ? "on" : "muted");
+    runner.muted = muted;
+    g_object_set (microphone, "mute", gboolean (muted), nullptr);
+    g_print ("the microphone is %s\n", muted ? "muted" : "on");
   }
   gst_clear_object (&microphone);
-  return G_SOURCE_CONTINUE;
 }
 
 /* Timers and signals of the main loop. */
 void
 add_sources (Runner &runner)
 {
+  const auto toggle_microphone = [] (gpointer data) -> gboolean {
+    auto runner = static_cast<Runner *> (data);
+    set_microphone (*runner, !runner->muted);
+    return G_SOURCE_CONTINUE;
+  };
   add_final_signals (on_interrupt, &runner);
   g_unix_signal_add (SIGUSR1, toggle_microphone, &runner);
   if (const int limit_s = runner.options.timeout_s; limit_s > 0) {
@@ -309,26 +321,31 @@ request_stats (GstElement *element)
 void
 play (Runner &runner)
 {
-  runner.loop = g_main_loop_new (nullptr, FALSE);
+  if (!runner.loop) {
+    runner.loop = g_main_loop_new (nullptr, FALSE);
+    add_sources (runner);
+  }
   GstBus *bus = gst_element_get_bus (runner.pipeline);
   gst_bus_add_watch (bus, on_message, &runner);
-  add_sources (runner);
   if (runner.options.base_time >= 0) {
     gst_element_set_start_time (runner.pipeline, GST_CLOCK_TIME_NONE);
     gst_element_set_base_time (runner.pipeline, GstClockTime (runner.options.base_time));
   }
   if (runner.stats)
     request_stats (runner.pipeline);
+  if (runner.muted)
+    set_microphone (runner, true);
   runner.measure->start ();
 
   if (gst_element_set_state (runner.pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
     report_failure (runner, bus);
+  else if (runner.call && !runner.call->join (runner.pipeline))
+    runner.failed = true;
   else
     g_main_loop_run (runner.loop);
   finish (runner);
   gst_bus_remove_watch (bus);
   gst_object_unref (bus);
-  g_main_loop_unref (runner.loop);
 }
 
 /* @return false after reporting a wrong address */
@@ -344,6 +361,19 @@ open_stats (Runner &runner)
   if (!runner.stats)
     g_printerr ("rangecast-run: statistics: %s\n", error.c_str ());
   return runner.stats != nullptr;
+}
+
+/* @return false after reporting what is wrong */
+bool
+make_call (Runner &runner)
+{
+  if (const char *url = runner.options.signal)
+#ifdef RANGECAST_CALLS
+    return (runner.call = Call::make (url, runner.options.certificate)) != nullptr;
+#else
+    return g_printerr ("rangecast-run: --signal %s: built without libsoup or webrtc\n", url), false;
+#endif
+  return true;
 }
 
 /* @return transfer full; nullptr after reporting what is wrong with it */
@@ -440,10 +470,12 @@ main (int argc, char **argv)
   Runner runner;
   if (!runner.options.parse (&argc, &argv) || !open_stats (runner))
     return 2;
-  runner.pipeline = parse_pipeline (runner.options.launch);
-  if (!runner.pipeline)
-    return 1;
-  const bool good = run (runner);
+  bool good = make_call (runner);
+  do {
+    runner.pipeline = good ? parse_pipeline (runner.options.launch) : nullptr;
+    good = runner.pipeline && run (runner);
+  } while (std::exchange (runner.again, false) && good);
+  runner.call.reset ();
   gst_deinit (); /* tracers write now what they found */
   return good ? 0 : 1;
 }

@@ -133,7 +133,7 @@ test_programs_end_at_signals_and_time_limits_whatever_an_element_blocks () {
     done
   done
   make_rig
-  rangecast call --peer 127.0.0.1 --rig rig.yaml --input "side-by-side=filesrc location=fifo ! pngdec" --no-window --microphone none >said.txt 2>&1 &
+  rangecast call --rig rig.yaml --input "side-by-side=filesrc location=fifo ! pngdec" --no-window --microphone none >said.txt 2>&1 &
   pid=$!
   all_take_interrupt () {
     local children child

@@ -171,11 +171,13 @@ test_speech_from_a_file_is_sent_at_its_own_pace () {
 }
 
 test_speech_is_sent_without_any_to_hear () {
-  local talk=(view --listen $((ports + 20)) --microphone "$silence" --talk-to 127.0.0.1:7000 --print)
-  rangecast "${talk[@]}" >launch.txt
-  [ "$(grep -o 'name=microphone' launch.txt | wc -l)" = 1 ] || fail "$(cat launch.txt)"
+  export_rig 1
+  rangecast call --rig rig.yaml --microphone "$silence" --speaker none --print >launch.txt
+  grep -q 'name=microphone' launch.txt || fail "$(cat launch.txt)"
+  ! grep -q 'webrtcdsp' launch.txt || fail "the echo of nothing is cancelled: $(cat launch.txt)"
   grep -q -e '--clock system' launch.txt || fail "$(cat launch.txt)"
-  rangecast "${talk[@]}" --clock 127.0.0.1:7100 >launch.txt
+  rangecast camera --view 0 --rig rig.yaml --to 127.0.0.1:5000 --microphone "$silence" --audio-to 127.0.0.1:5300 --clock 127.0.0.1:7100 --print \
+    >launch.txt
   grep -q -e '--clock 127.0.0.1:7100' launch.txt || fail "$(cat launch.txt)"
 }
 
@@ -198,14 +200,16 @@ test_wrong_options_are_named () {
   expect_error "--audio-port and --audio-to need each other" "${parent[@]}" --audio-port 5300
   expect_error "--audio-port: port 5001 is that of view 1" "${parent[@]}" --audio-port 5001 --audio-to 127.0.0.1:6002
   expect_error "--audio-port 5999, or the next one for RTCP, is that of --listen" rangecast view --listen 6000 --audio-port 5999
-  expect_error "--microphone and --talk-to need each other" rangecast view --listen 6000 --talk-to 127.0.0.1:7000
   expect_error "127.0.0.1:4999, or the next port" "${camera[@]}" --microphone pulsesrc --audio-to 127.0.0.1:4999
   expect_error "does not end in .opus" rangecast record x.opus --listen 6000 --audio-port 6002
   expect_error "--clock: 'wall' is neither system nor HOST:PORT" rangecast-run --clock wall fakesrc num-buffers=1 ! fakesink
   expect_error "no element \"nosuchsrc\"" "${camera[@]}" --input range --microphone nosuchsrc --audio-to 127.0.0.1:5300
   echo none >empty.yaml
-  expect_error "'empty.yaml' has no views" rangecast call --peer 127.0.0.1 --rig empty.yaml
-  expect_error "no host 'nosuchhost.invalid'" rangecast call --peer nosuchhost.invalid --rig rig.yaml
+  expect_error "'empty.yaml' has no views" rangecast call --rig empty.yaml
+  expect_error "--rig: needed" rangecast call
+  expect_error "'nonsense' is not https://HOST:PORT" rangecast call --signal nonsense --input range --no-window
+  expect_error "Cannot connect to the call's server http://127.0.0.1:7001" rangecast call --signal http://127.0.0.1:7001 --input range \
+    --no-window --microphone none --speaker fakesink
 }
 
 # ---- several hosts ----
@@ -243,14 +247,16 @@ open_two_hosts () {
   net_host anna
   net_host otto
 }
-start_end () { # name peer options...
+start_end () { # name options...
   mkdir -p "$1"
   net_on "$1" "${claps_env[@]}" CLAP_SEND=1 \
-    CLAP_LOG="$PWD/$1/seen.log" rangecast call --peer "$(net_address "$2")" --rig rig.yaml --input range --size 160x120 \
-    --learn 5 --microphone "$silence" --speaker "$heard" --no-window --key studio.key "${@:3}" <"$1.keys" >"$1.log" 2>&1 &
+    CLAP_LOG="$PWD/$1/seen.log" rangecast call --rig rig.yaml --input range --size 160x120 --learn 5 --microphone "$silence" \
+    --speaker "$heard" --no-window "${@:2}" <"$1.keys" >"$1.log" 2>&1 &
   ends[$1]=$!
 }
 claps_of () { claps "$1/seen.log" 2>/dev/null | wc -l; }
+has_link () { grep -q '#token=' "$1"; }
+link_of () { sed -n "s,\(https*://\).*\(:[0-9]*/#token=.*\),\1$2\2,p" "$1" | head -n 1; } # log host
 has_claps_of () { [ "$(claps_of "$1")" -ge "$2" ]; }
 
 test_call_has_picture_and_sound_both_ways () {
@@ -258,20 +264,24 @@ test_call_has_picture_and_sound_both_ways () {
   gst-inspect-1.0 --exists webrtcdsp || skip "no webrtcdsp (Debian package gstreamer1.0-plugins-bad)"
   open_two_hosts
   export_rig 1
-  (umask 077 && head -c 30 /dev/urandom | od -An -tx1 | tr -d ' \n' >studio.key)
+  openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj /CN=anna -keyout key.pem -out cert.pem 2>/dev/null
+  cat cert.pem key.pem >anna.pem
   declare -A ends
   local name before anna_keys otto_keys
   mkfifo anna.keys otto.keys
   exec {anna_keys}<>anna.keys {otto_keys}<>otto.keys # so that they do not end
-  start_end anna otto
-  start_end otto anna
+  start_end anna --certificate anna.pem
+  until_true 60 has_link anna.log
+  local otto=(otto --certificate cert.pem --signal "$(link_of anna.log "$(net_address anna)")")
+  start_end "${otto[@]}"
   net_faults anna --loss 0.05
   for name in anna otto; do until_true 90 has_claps_of $name 5; done
   # One end is gone for a moment.
   kill -TERM "${ends[otto]}"
   wait "${ends[otto]}" 2>/dev/null || true
   before=$(claps_of anna)
-  start_end otto anna
+  until_true 10 grep -q "the other end left" anna.log
+  start_end "${otto[@]}"
   until_true 90 has_claps_of anna $((before + 3))
   # Muted: the picture goes on, no clap is heard.
   echo m >&"$anna_keys"
@@ -284,13 +294,36 @@ test_call_has_picture_and_sound_both_ways () {
   until_true 30 has_claps_of otto $((before + 2))
   echo q >&"$anna_keys"
   until_true 20 has_ended "${ends[anna]}"
-  kill -TERM "${ends[otto]}"
-  wait "${ends[otto]}" 2>/dev/null || true
+  wait "${ends[otto]}" || fail "the end of the call is an error: $(cat otto.log)"
   for name in anna otto; do
     claps "$name/seen.log" | tail -n +2 >claps.txt
     expect_in_step claps.txt 4
   done
   exec {anna_keys}>&- {otto_keys}>&-
+  net_close
+}
+
+test_call_is_of_two_who_have_the_link_and_needs_no_rig_for_the_figure () {
+  gst-inspect-1.0 --exists --atleast-version=0.0.0 nicesrc || skip "no nicesrc (Debian package gstreamer1.0-nice)"
+  net_need # ICE leaves out the loopback interface
+  net_open
+  net_host anna
+  local call=(ip netns exec "${net_prefix}anna" rangecast call --input range --size 160x120 --learn 5 --microphone "$silence" --speaker fakesink --no-window)
+  local link anna otto other pid
+  "${call[@]}" --port 8085 </dev/null >anna.log 2>&1 &
+  anna=$!
+  until_true 60 has_link anna.log
+  link=$(link_of anna.log 127.0.0.1)
+  expect_error "wrong or missing token" "${call[@]}" --signal "${link%?}"
+  "${call[@]}" --signal "$link" </dev/null >otto.log 2>&1 &
+  otto=$!
+  until_true 60 grep -q "the other end is connected" anna.log
+  expect_error "two are in this call already" "${call[@]}" --signal "$link"
+  "${call[@]}" --signal "$link&room=other" </dev/null >other.log 2>&1 &
+  other=$!
+  until_true 60 grep -q "waiting for the other end" other.log
+  stop_all $anna
+  for pid in $otto $other; do wait "$pid" || fail "status $?: $(cat otto.log other.log)"; done
   net_close
 }
 has_ended () { ! kill -0 "$1" 2>/dev/null; }

@@ -1,0 +1,312 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+#include "call.hpp"
+
+#include <json-glib/json-glib.h>
+#include <libsoup/soup.h>
+#define GST_USE_UNSTABLE_API
+#include <gst/webrtc/webrtc.h>
+
+#include <initializer_list>
+#include <string>
+#include <utility>
+
+namespace {
+
+/* An object of strings and, if it is not negative, the number "media". */
+std::string
+json (std::initializer_list<std::pair<const char *, const char *>> fields, gint64 media = -1)
+{
+  g_autoptr (JsonNode) node = json_node_new (JSON_NODE_OBJECT);
+  JsonObject *object = json_object_new ();
+  for (const auto &[name, text] : fields)
+    json_object_set_string_member (object, name, text);
+  if (media >= 0)
+    json_object_set_int_member (object, "media", media);
+  json_node_take_object (node, object);
+  g_autofree gchar *text = json_to_string (node, FALSE);
+  return text;
+}
+
+/* Signals and promises of webrtcbin come on its own threads, and go through the bus to the main
+ * loop: as application messages "call-send", whose text the other end gets, "call-left" and
+ * "call-over", whose text the user gets. */
+
+void
+post (GstElement *webrtc, const char *name, const std::string &text)
+{
+  gst_element_post_message (
+      webrtc, gst_message_new_application (GST_OBJECT (webrtc),
+                  gst_structure_new (name, "text", G_TYPE_STRING, text.c_str (), nullptr)));
+}
+
+void
+on_candidate (GstElement *webrtc, guint media, const gchar *candidate, gpointer)
+{
+  post (webrtc, "call-send", json ({{"type", "call"}, {"candidate", candidate}}, media));
+}
+
+void
+on_state (GstElement *webrtc, GParamSpec *, gpointer)
+{
+  GstWebRTCPeerConnectionState state = GST_WEBRTC_PEER_CONNECTION_STATE_NEW;
+  g_object_get (webrtc, "connection-state", &state, nullptr);
+  if (state == GST_WEBRTC_PEER_CONNECTION_STATE_CONNECTED) {
+    const auto open = [] (const GValue *valve, gpointer) {
+      g_object_set (g_value_get_object (valve), "drop", FALSE, nullptr);
+    };
+    GstObject *pipeline = gst_object_get_parent (GST_OBJECT (webrtc));
+    GstIterator *valves = gst_bin_iterate_all_by_element_factory_name (GST_BIN (pipeline), "valve");
+    gst_iterator_foreach (valves, open, nullptr);
+    gst_iterator_free (valves);
+    gst_object_unref (pipeline);
+    g_print ("the other end is connected\n");
+  } else if (state == GST_WEBRTC_PEER_CONNECTION_STATE_FAILED)
+    GST_ELEMENT_ERROR (webrtc, RESOURCE, OPEN_READ_WRITE,
+        ("There is no way through both networks to the other end: use a STUN server, or a TURN "
+         "server "
+         "where that is not enough"),
+        (nullptr));
+}
+
+/* The first packet of a frame set that comes later than the one before is not lost. */
+void
+on_jitterbuffer (GstElement *, GstElement *jitterbuffer, guint, guint, gpointer)
+{
+  g_object_set (jitterbuffer, "rtx-next-seqnum", FALSE, nullptr);
+}
+
+/* An offer or answer has been made: sets it, and sends it. */
+void
+on_description (GstPromise *promise, gpointer data)
+{
+  auto webrtc = GST_ELEMENT (data);
+  GstWebRTCSessionDescription *description = nullptr;
+  g_autoptr (GError) error = nullptr;
+  const GstStructure *reply = gst_promise_get_reply (promise);
+  if (!reply) /* the pipeline stops */
+    return gst_promise_unref (promise);
+  for (const char *type : {"offer", "answer"})
+    gst_structure_get (reply, type, GST_TYPE_WEBRTC_SESSION_DESCRIPTION, &description, nullptr);
+  if (description) {
+    g_signal_emit_by_name (webrtc, "set-local-description", description, nullptr);
+    g_autofree gchar *text = gst_sdp_message_as_text (description->sdp);
+    post (webrtc, "call-send",
+        json ({{"type", "call"}, {gst_webrtc_sdp_type_to_string (description->type), text}}));
+    gst_webrtc_session_description_free (description);
+  } else {
+    gst_structure_get (reply, "error", G_TYPE_ERROR, &error, nullptr);
+    GST_ELEMENT_ERROR (webrtc, STREAM, FAILED, ("Cannot negotiate with the other end"),
+        ("%s", error ? error->message : ""));
+  }
+  gst_promise_unref (promise);
+}
+
+void
+describe (GstElement *webrtc, const char *action)
+{
+  g_signal_emit_by_name (webrtc, action, nullptr,
+      gst_promise_new_with_change_func (on_description, gst_object_ref (webrtc), gst_object_unref));
+}
+
+class WebrtcCall : public Call {
+public:
+  bool parse (const char *url, const char *certificate);
+  ~WebrtcCall () override;
+  bool join (GstElement *pipeline) override;
+  bool handle (GstMessage *message) override;
+
+private:
+  static void on_connected (GObject *session, GAsyncResult *result, gpointer self);
+  void connect ();
+  void receive (JsonObject *message);
+  void on_closed ();
+
+  GstElement *webrtc_ = nullptr;
+  GCancellable *cancellable_ = g_cancellable_new ();
+  SoupSession *session_ = nullptr;
+  SoupWebsocketConnection *socket_ = nullptr;
+  GTlsCertificate *certificate_ = nullptr;
+  std::string url_, hello_;
+};
+
+bool
+WebrtcCall::parse (const char *url, const char *certificate)
+{
+  g_autoptr (GError) error = nullptr;
+  g_autoptr (GUri) uri = g_uri_parse (url, G_URI_FLAGS_NONE, &error);
+  if (!uri || !g_uri_get_host (uri)) {
+    g_printerr ("rangecast-run: --signal: '%s' is not https://HOST:PORT/#token=TOKEN\n", url);
+    return false;
+  }
+  const char *fragment = g_uri_get_fragment (uri);
+  g_autoptr (GHashTable) fields =
+      g_uri_parse_params (fragment ? fragment : "", -1, "&", G_URI_PARAMS_NONE, nullptr);
+  const auto field = [&] (const char *name) {
+    auto value = fields ? static_cast<const char *> (g_hash_table_lookup (fields, name)) : nullptr;
+    return value ? value : "";
+  };
+  hello_ = json ({{"type", "hello"}, {"token", field ("token")}, {"room", field ("room")}});
+  hello_.insert (1, "\"version\":1,");
+  g_autofree gchar *page = g_uri_to_string_partial (uri, G_URI_HIDE_FRAGMENT);
+  g_autofree gchar *stream = g_uri_resolve_relative (page, "stream", G_URI_FLAGS_NONE, nullptr);
+  url_ = stream;
+  if (certificate && !(certificate_ = g_tls_certificate_new_from_file (certificate, &error))) {
+    g_printerr ("rangecast-run: --certificate: '%s': %s\n", certificate, error->message);
+    return false;
+  }
+  return true;
+}
+
+WebrtcCall::~WebrtcCall ()
+{
+  g_cancellable_cancel (cancellable_);
+  g_object_unref (cancellable_);
+  if (socket_)
+    g_signal_handlers_disconnect_by_data (socket_, this);
+  g_clear_object (&socket_);
+  g_clear_object (&session_);
+  g_clear_object (&certificate_);
+  gst_clear_object (&webrtc_);
+}
+
+bool
+WebrtcCall::join (GstElement *pipeline)
+{
+  gst_clear_object (&webrtc_);
+  webrtc_ = gst_bin_get_by_name (GST_BIN (pipeline), "webrtc");
+  if (!webrtc_ || !g_signal_lookup ("create-offer", G_OBJECT_TYPE (webrtc_))) {
+    g_printerr ("rangecast-run: --signal: there is no webrtcbin named webrtc\n");
+    return false;
+  }
+  g_signal_connect (webrtc_, "on-ice-candidate", G_CALLBACK (on_candidate), nullptr);
+  g_signal_connect (webrtc_, "notify::connection-state", G_CALLBACK (on_state), nullptr);
+  GstElement *rtpbin = gst_bin_get_by_name (GST_BIN (webrtc_), "rtpbin");
+  g_signal_connect (rtpbin, "new-jitterbuffer", G_CALLBACK (on_jitterbuffer), nullptr);
+  gst_object_unref (rtpbin);
+  g_autoptr (GArray) transceivers = nullptr;
+  g_signal_emit_by_name (webrtc_, "get-transceivers", &transceivers);
+  for (guint i = 0; i < transceivers->len; i++) /* lost packets are requested again */
+    g_object_set (g_array_index (transceivers, GObject *, i), "do-nack", TRUE, nullptr);
+  if (session_)
+    g_print ("waiting for the other end\n");
+  else
+    connect ();
+  return true;
+}
+
+/* ---- the server ---- */
+
+void
+WebrtcCall::connect ()
+{
+  session_ = soup_session_new ();
+  g_autoptr (SoupMessage) message = soup_message_new ("GET", url_.c_str ());
+  const auto accept = [] (SoupMessage *, GTlsCertificate *its, GTlsCertificateFlags,
+                          gpointer own) -> gboolean {
+    return own && g_tls_certificate_is_same (its, G_TLS_CERTIFICATE (own));
+  };
+  g_signal_connect (message, "accept-certificate", GCallback (+accept), certificate_);
+  const char *protocols[] = {"rangecast.v1", nullptr};
+  soup_session_websocket_connect_async (session_, message, nullptr, const_cast<char **> (protocols),
+      G_PRIORITY_DEFAULT, cancellable_, on_connected, this);
+}
+
+void
+WebrtcCall::on_connected (GObject *session, GAsyncResult *result, gpointer user_data)
+{
+  g_autoptr (GError) error = nullptr;
+  SoupWebsocketConnection *socket =
+      soup_session_websocket_connect_finish (SOUP_SESSION (session), result, &error);
+  if (g_error_matches (error, G_IO_ERROR, G_IO_ERROR_CANCELLED))
+    return;
+  auto self = static_cast<WebrtcCall *> (user_data);
+  if (!socket) {
+    GST_ELEMENT_ERROR (self->webrtc_, RESOURCE, OPEN_READ_WRITE,
+        ("Cannot connect to the call's server %s: %s%s", self->url_.c_str (), error->message,
+            error->domain == G_TLS_ERROR ? "; name the server's in --certificate" : ""),
+        (nullptr));
+    return;
+  }
+  self->socket_ = socket;
+  soup_websocket_connection_set_keepalive_interval (socket, 20);
+  const auto message = [] (SoupWebsocketConnection *, gint, GBytes *bytes, gpointer data) {
+    const auto text = static_cast<const char *> (g_bytes_get_data (bytes, nullptr));
+    g_autoptr (JsonNode) root = json_from_string (text, nullptr);
+    if (root && JSON_NODE_HOLDS_OBJECT (root))
+      static_cast<WebrtcCall *> (data)->receive (json_node_get_object (root));
+  };
+  const auto closed = [] (SoupWebsocketConnection *, gpointer data) {
+    static_cast<WebrtcCall *> (data)->on_closed ();
+  };
+  g_signal_connect (socket, "message", GCallback (+message), self);
+  g_signal_connect (socket, "closed", GCallback (+closed), self);
+  soup_websocket_connection_send_text (socket, self->hello_.c_str ());
+}
+
+void
+WebrtcCall::on_closed ()
+{
+  const char *reason = soup_websocket_connection_get_close_data (socket_);
+  if (soup_websocket_connection_get_close_code (socket_) == SOUP_WEBSOCKET_CLOSE_GOING_AWAY)
+    return post (webrtc_, "call-over", "the call's server has ended");
+  GST_ELEMENT_ERROR (webrtc_, RESOURCE, READ,
+      ("The call's server %s closed the connection: %s", url_.c_str (),
+          reason && *reason ? reason : "no reason given"),
+      (nullptr));
+}
+
+/* What the server and, through it, the other end have to say. */
+void
+WebrtcCall::receive (JsonObject *message)
+{
+  const auto field = [&] (const char *name) {
+    return json_object_get_string_member_with_default (message, name, nullptr);
+  };
+  const std::string type = field ("type") ? field ("type") : "";
+  if (type == "welcome")
+    g_print ("waiting for the other end\n");
+  else if (type == "joined")
+    describe (webrtc_, "create-offer");
+  else if (type == "left")
+    post (webrtc_, "call-left", "the other end left");
+  if (type != "call")
+    return;
+  if (const char *candidate = field ("candidate"))
+    g_signal_emit_by_name (webrtc_, "add-ice-candidate",
+        guint (json_object_get_int_member_with_default (message, "media", 0)), candidate);
+  for (const auto kind : {GST_WEBRTC_SDP_TYPE_OFFER, GST_WEBRTC_SDP_TYPE_ANSWER}) {
+    const char *text = field (gst_webrtc_sdp_type_to_string (kind));
+    GstSDPMessage *sdp = nullptr;
+    if (!text || gst_sdp_message_new_from_text (text, &sdp) != GST_SDP_OK)
+      continue;
+    GstWebRTCSessionDescription *remote = gst_webrtc_session_description_new (kind, sdp);
+    g_signal_emit_by_name (webrtc_, "set-remote-description", remote, nullptr);
+    gst_webrtc_session_description_free (remote);
+    if (kind == GST_WEBRTC_SDP_TYPE_OFFER)
+      describe (webrtc_, "create-answer");
+  }
+}
+
+bool
+WebrtcCall::handle (GstMessage *message)
+{
+  const char *text = gst_structure_get_string (gst_message_get_structure (message), "text");
+  const bool sends = gst_message_has_name (message, "call-send");
+  if (sends && soup_websocket_connection_get_state (socket_) == SOUP_WEBSOCKET_STATE_OPEN)
+    soup_websocket_connection_send_text (socket_, text);
+  if (GST_MESSAGE_SRC (message) != GST_OBJECT (webrtc_) || sends)
+    return false;
+  g_print ("%s\n", text);
+  return true;
+}
+
+} // namespace
+
+std::unique_ptr<Call>
+Call::make (const char *url, const char *certificate)
+{
+  auto call = std::make_unique<WebrtcCall> ();
+  if (!call->parse (url, certificate))
+    return nullptr;
+  return call;
+}
