@@ -136,7 +136,7 @@ def parse(path):
     if re.fullmatch(r"[-+.\deE\s]+", text):  # projection matrices as those of KITTI, without their names
         lines = [line for line in text.splitlines() if line.strip()]
         counts = [len(line.split()) for line in lines]
-        fail_unless(len(counts) != 6 or counts[0] != 3, POSES)
+        fail_unless(counts[:1] != [3] or set(counts) == {3}, POSES)
         if set(counts) == {12}:
             return [{f"P{i}": line for i, line in enumerate(lines[:4])}]
     try:
@@ -415,7 +415,7 @@ def read_cameras(files, args):
     """{name: Camera} of the files of one calibration, in their order; the first two are left and right."""
     try:
         documents = [document for file in dict.fromkeys(files) for document in parse(file)]
-    except (ElementTree.ParseError, configparser.Error, json.JSONDecodeError, RecursionError) as error:
+    except (ElementTree.ParseError, configparser.Error, ValueError, RecursionError) as error:
         raise Fail(f"cannot be read ({str(error).splitlines()[0]})") from None
     fail_unless(documents, UNKNOWN)
     for reader in FORMATS:

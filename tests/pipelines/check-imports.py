@@ -298,17 +298,21 @@ def panoptic():
 
 def unknown():
     for name, text in (("cameraconfig.json", json.dumps({"type": "kinect", "camera": [{"serial": "1", "trafo": np.eye(4).tolist()}]})),
+                       ("Extrinsics_Open3D.log", "0\t000123\t0\n" + "0.5\t" * 16 + "\n"),
                        ("calibration.txt", "0.1 0.2 0.3 \n-0.9976720.0259786-0.0630473\n010\n001\n3\n1\n")):  # fmt: skip
         Path(name).write_text(text)
         refused(name, "poses of depth cameras", name)
-    Path("notes.txt").write_text("hello\n")
-    refused("notes.txt", "not a calibration that import reads", "notes.txt")
+    for text in ("hello\n", "\n", ""):
+        Path("notes.txt").write_text(text)
+        refused(f"'{text}'", "not a calibration that import reads", "notes.txt")
     Path("bent.json").write_text(json.dumps({"M1": K1.tolist(), "D1": [0] * 5, "M2": K2.tolist(), "D2": [0] * 5, "R": (ROTATION * 1.01).tolist(), "T": T.tolist()}))
     refused("no rotation", "rotation", "bent.json", "--size", "1280x720")
     Path("nan.json").write_text(json.dumps({"M1": K1.tolist(), "D1": [0, 0, 0, 0, float("nan")], "M2": K2.tolist(), "D2": [0] * 5, "R": ROTATION.tolist(), "T": T.tolist()}))
     refused("not a number", "no finite number", "nan.json", "--size", "1280x720")
     Path("broken.yaml").write_text("M1: [1, 2\nM2: }\n")
     refused("broken", "as YAML it is broken in line 2", "broken.yaml")
+    Path("date.yaml").write_text("date: 2025-02-30\nM1: [1, 2]\n")
+    refused("no such day", "date.yaml: cannot be read (day is out of range for month)", "date.yaml")
     Path("binary.npz").write_bytes(b"PK\3\4\0\0")
     refused("binary", "not a calibration that import reads", "binary.npz")
     Path("broken.json").write_text('{"M1": [1, 2')
