@@ -241,8 +241,9 @@ def zed(documents, args):
         name = f"{side}_cam_{mode}"
         cam = file.get(name, {})
         disto = file.get(f"{side}_disto", cam)
-        # A lens with k4 and without p1 is a fisheye. Old files have k1 and k2 only, and then no others.
-        fail_unless("k4" not in disto or "p1" in disto, f"[{side.upper()}_DISTO] is that of a fisheye lens, which is not supported")
+        # A lens with k4 only beside k1 to k3 is a fisheye. Old files have k1 and k2 only, and then no others.
+        fail_unless(not float(disto.get("k4", 0)) or any(float(disto.get(one, 0)) for one in ("p1", "p2", "k5", "k6")),
+                    f"[{side.upper()}_DISTO] is that of a fisheye lens, which is not supported")  # fmt: skip
         names = "k1 k2 p1 p2 k3" + " k4 k5 k6" * ("k4" in disto)
         cameras[side] = Camera(size, [need(cam.get(one), 1, f"{one} in [{name.upper()}]")[0] for one in ("fx", "fy", "cx", "cy")],
                                lens([disto.get(one, 0) for one in names.split()], "opencv", name), pose)  # fmt: skip

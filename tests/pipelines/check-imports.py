@@ -243,8 +243,9 @@ def zed():
     disto = "".join(f"[{side}_DISTO]\n" + "".join(f"{name} = {value}\n" for name, value in zip("k1 k2 p1 p2 k3 k4 k5 k6".split(), eight)) for side in ("LEFT", "RIGHT"))
     Path("SN2.conf").write_text(text + disto + stereo)
     check("ZED, eight coefficients", (K1, np.array(eight), K2, np.array(eight), ROTATION, T), "SN2.conf", "--size", "1280x720")
-    Path("SN3.conf").write_text(text + "[LEFT_DISTO]\nk1 = 0.1\nk2 = 0.2\nk3 = 0.3\nk4 = 0.4\n" + stereo)
-    refused("ZED fisheye", "is that of a fisheye lens", "SN3.conf", "--size", "1280x720")
+    for more in ("", "k5 = 0\nk6 = 0\np1 = 0\np2 = 0\n"):
+        Path("SN3.conf").write_text(text + "[LEFT_DISTO]\nk1 = 0.1\nk2 = 0.2\nk3 = 0.3\nk4 = 0.4\n" + more + stereo)
+        refused("ZED fisheye", "is that of a fisheye lens", "SN3.conf", "--size", "1280x720")
 
 
 def luxonis():
