@@ -55,7 +55,7 @@ packages=(
   # tests of the page
   nodejs chromium
   # tests
-  libgtest-dev python3-opencv iproute2 openssl valgrind xvfb xauth xdotool
+  libgtest-dev python3-opencv iproute2 openssl curl valgrind xvfb xauth xdotool
 )
 
 installed= # "yes" once packages were

@@ -52,11 +52,8 @@ def caps_text(caps):
     if caps.is_any():
         return "any"
     structures = []
-    for i in range(caps.get_size()):
-        media, *fields = re.split(r", (?=[\w-]+=\()", caps.get_structure(i).to_string().rstrip(";"))
-        features = caps.get_features(i)
-        if features and not features.is_equal(Gst.CapsFeatures.from_string("memory:SystemMemory")):
-            media += f"({features.to_string()})"
+    for structure in caps.to_string().split("; "):
+        media, *fields = re.split(r", (?=[\w-]+=\()", structure)
         for field in fields:
             name, value = field.split("=", 1)
             value = value_text(re.sub(r"^\(\w+\)", "", value))

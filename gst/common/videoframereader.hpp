@@ -8,10 +8,17 @@
 #include <utility>
 
 /** propose_allocation() of an aggregator that reads its input with VideoFrameReader: any stride and
- *  plane offset. */
+ *  plane offset. The size is for bayer2rgb, which in GStreamer 1.24 to 1.26 has a wrong one of its
+ *  own. */
 inline gboolean
 propose_video_meta (GstAggregator *, GstAggregatorPad *, GstQuery *, GstQuery *query)
 {
+  GstCaps *caps = nullptr;
+  GstVideoInfo info;
+  gst_query_parse_allocation (query, &caps, nullptr);
+  if (!caps || !gst_video_info_from_caps (&info, caps))
+    return FALSE;
+  gst_query_add_allocation_pool (query, nullptr, guint (info.size), 0, 0);
   gst_query_add_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr);
   return TRUE;
 }

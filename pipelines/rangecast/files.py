@@ -9,7 +9,7 @@ from pathlib import Path
 
 from . import options, transport
 from .hosts import size_caps
-from .images import TYPES, is_pattern, list_images, make_folder, play_images, read_images
+from .images import TYPES, is_pattern, list_images, make_folder, play_images, read_image, read_images
 from .launch import Fail, Launch, fail_unless, has_display
 
 GL = "video/x-raw(memory:GLMemory)"
@@ -209,7 +209,7 @@ def add_output(args, launch, out, index=0):
 
 def is_depth_image(file):
     """Others than 16-bit grey would give wrong point clouds without an error."""
-    command = ["gst-launch-1.0", "-v", "multifilesrc", f"location={str(file).replace('%', '%%')}", *"num-buffers=1 ! decodebin ! fakesink".split()]
+    command = ["gst-launch-1.0", "-v", "multifilesrc", f"location={str(file).replace('%', '%%')}", "num-buffers=1", *read_image(file), "!", "fakesink"]
     said = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False).stdout
     return re.search(r"fakesink.*format=\(string\)GRAY16_", said) is not None
 

@@ -9,8 +9,10 @@ from pathlib import Path
 
 from .launch import fail_unless
 
-TYPES = {".jpg": "jpeg", ".jpeg": "jpeg", ".png": "png", ".bmp": "bmp", ".tif": "tiff", ".tiff": "tiff", ".webp": "webp", ".exr": "x-exr",
-         ".pgm": "x-portable-anymap", ".ppm": "x-portable-anymap", ".pnm": "x-portable-anymap"}  # fmt: skip
+# Caps and decoder; decodebin may choose gdkpixbufdec, which makes 8 bits of 16.
+JPEG, TIFF, PNM = ("image/jpeg", "jpegdec"), ("image/tiff", "avdec_tiff"), ("image/x-portable-anymap", "pnmdec")
+TYPES = {".jpg": JPEG, ".jpeg": JPEG, ".tif": TIFF, ".tiff": TIFF, ".pgm": PNM, ".ppm": PNM, ".pnm": PNM, ".png": ("image/png", "pngdec"),
+         ".bmp": ("image/bmp", "avdec_bmp"), ".webp": ("image/webp", "webpdec"), ".exr": ("image/x-exr", "avdec_exr")}  # fmt: skip
 
 
 def is_pattern(what):
@@ -63,9 +65,14 @@ def make_folder(keep):
 def play_images(folder, name, files):
     """The elements that play images. They get links in a folder: multifilesrc stops at a gap, and gst-launch-1.0 knows special characters."""
     files = [Path(file) for file in files]
-    kind = TYPES.get(files[0].suffix.lower())
-    fail_unless(kind, f"'{files[0]}' is none of the images {', '.join(TYPES)}")
+    read = read_image(files[0])
     for i, file in enumerate(files):
         (folder / f"{name}-{i:05d}").symlink_to(file.resolve())
-    # TIFF needs the whole file in one buffer, which filesrc does not give.
-    return ["multifilesrc", f"location={folder}/{name}-%05d", f"caps=image/{kind},framerate=1/1", "!", "decodebin"]
+    return ["multifilesrc", f"location={folder}/{name}-%05d", *read]
+
+
+def read_image(file):
+    """What follows multifilesrc. TIFF needs the whole file in one buffer, which filesrc does not give."""
+    found = TYPES.get(Path(file).suffix.lower())
+    fail_unless(found, f"'{file}' is none of the images {', '.join(TYPES)}")
+    return [f"caps={found[0]},framerate=1/1", "!", found[1]]

@@ -381,15 +381,19 @@ GstElement *
 parse_pipeline (gchar **launch)
 {
   GError *error = nullptr;
-  /* Of a number out of range GObject only warns, and the default stays. */
+  /* Of a number out of range GObject only warns (later GLib calls that critical), and
+   * the default stays. */
   const auto fail = [] (const gchar *, GLogLevelFlags, const gchar *message, gpointer error) {
     if (!*static_cast<GError **> (error))
       g_set_error_literal (static_cast<GError **> (error), GST_PARSE_ERROR,
           GST_PARSE_ERROR_COULD_NOT_SET_PROPERTY, message);
   };
   GError *warning = nullptr;
-  const guint handler = g_log_set_handler ("GLib-GObject", G_LOG_LEVEL_WARNING, fail, &warning);
+  const guint handler = g_log_set_handler (
+      "GLib-GObject", GLogLevelFlags (G_LOG_LEVEL_WARNING | G_LOG_LEVEL_CRITICAL), fail, &warning);
+  const GLogLevelFlags fatal = g_log_set_always_fatal (G_LOG_LEVEL_ERROR);
   GstElement *parsed = gst_parse_launchv (const_cast<const gchar **> (launch), &error);
+  g_log_set_always_fatal (fatal);
   g_log_remove_handler ("GLib-GObject", handler);
   if (error)
     g_clear_error (&warning);

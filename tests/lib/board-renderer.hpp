@@ -72,7 +72,7 @@ inline std::vector<BoardCorner>
 project_board (const TrueCamera &t, const Pose &camera_from_board, const BoardSpec &board,
     double noise_px, std::mt19937 &random)
 {
-  std::normal_distribution<double> noise (0, noise_px);
+  std::normal_distribution<double> noise; /* times noise_px, which may be 0 */
   std::vector<BoardCorner> corners;
   const Vec3 normal = camera_from_board.rotation * Vec3{0, 0, 1};
   const Vec3 middle = camera_from_board * (0.5 * board.corner (board.corner_count () - 1));
@@ -86,7 +86,8 @@ project_board (const TrueCamera &t, const Pose &camera_from_board, const BoardSp
     if (p.z <= 0 || pixel[0] < 10 || pixel[1] < 10 || pixel[0] > t.camera.width - 11 ||
         pixel[1] > t.camera.height - 11)
       return {};
-    corners.push_back ({id, pixel[0] + noise (random), pixel[1] + noise (random)});
+    corners.push_back (
+        {id, pixel[0] + noise_px * noise (random), pixel[1] + noise_px * noise (random)});
   }
   return corners;
 }
@@ -120,7 +121,7 @@ public:
   {
     const int width = true_.camera.width, height = true_.camera.height;
     std::vector<std::uint8_t> picture (std::size_t (width) * height);
-    std::normal_distribution<float> sensor (0, float (noise));
+    std::normal_distribution<float> sensor; /* times noise, which may be 0 */
     const Ray rays (camera_from_board.inverse (), board_.square_m);
     for (int y = 0; y < height; y++)
       for (int x = 0; x < width; x++) {
@@ -138,7 +139,7 @@ public:
               grey += look (rays, ray, wall, 0) / (kRays * kRays);
             }
         }
-        grey += noise > 0 ? sensor (random) : 0;
+        grey += float (noise) * sensor (random);
         picture[std::size_t (y) * width + x] = std::uint8_t (std::clamp (grey + 0.5F, 0.F, 255.F));
       }
     return picture;

@@ -14,6 +14,8 @@ import cv2
 import numpy as np
 import yaml
 
+np.set_printoptions(legacy="1.21")  # repr() of numbers as Python's, without np.float64()
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "pipelines"))
 from rangecast.main import main  # noqa: E402
 

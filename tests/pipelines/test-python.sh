@@ -59,7 +59,7 @@ made = GstRange.new_caps([GstRange.new_camera(2, 64, 48, k, pose, depth_unit=0.0
 camera = GstRange.map_views(GstRange.new_buffer(made, {2: (depth, colour)}), made)[0].camera
 assert (camera.intrinsics == k).all() and (camera.pose == pose + [[0, 0, 0, 1]]).all()
 assert (camera.view_id, camera.depth_unit, camera.min_depth, camera.max_depth) == (2, 0.002, 0.5, 2)
-assert made.get_structure(0).get_value("framerate") == Gst.Fraction(2997, 100), made.to_string()
+assert "framerate=(fraction)2997/100" in made.to_string(), made.to_string()
 assert GstRange.map_views(both(), caps)[1].camera.intrinsics[0, 0] == 113
 END
 }

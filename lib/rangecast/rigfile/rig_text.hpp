@@ -10,7 +10,7 @@ namespace rangecast {
 /** Of the layout that docs/formats/rig.md describes. */
 inline constexpr int kRigFileVersion = 1;
 
-/** The file form of a valid rig, byte for byte as cv::FileStorage (4.6) writes it. */
+/** The file form of a valid rig, as cv::FileStorage of OpenCV 4.6 writes it. */
 std::string rig_text (const Rig &rig, bool json);
 
 } // namespace rangecast

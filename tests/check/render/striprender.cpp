@@ -321,8 +321,6 @@ GST_END_TEST;
 /* Mesa's variables make an OpenGL that is too old. */
 GST_START_TEST (test_old_opengl_is_one_error_that_says_so)
 {
-  GstHarness *probe = render_harness (ring_rig (1));
-  gst_harness_teardown (probe);
   g_setenv ("GST_GL_API", "gles2", TRUE);
   g_setenv ("MESA_GLES_VERSION_OVERRIDE", "2.0", TRUE);
   GstElement *pipeline = gst_parse_launch (
@@ -333,7 +331,7 @@ GST_START_TEST (test_old_opengl_is_one_error_that_says_so)
   int ours = 0;
   for (bool waiting = true; waiting;) {
     GstMessage *message = gst_bus_timed_pop_filtered (
-        bus, 20 * GST_SECOND, GstMessageType (GST_MESSAGE_ERROR | GST_MESSAGE_EOS));
+        bus, (ours ? 1 : 20) * GST_SECOND, GstMessageType (GST_MESSAGE_ERROR | GST_MESSAGE_EOS));
     waiting = message && GST_MESSAGE_SRC (message) == GST_OBJECT (element);
     if (waiting) {
       GError *error = nullptr;

@@ -2,11 +2,15 @@
 /* The text of rig files against cv::FileStorage, which must be able to read and write the same. */
 #include "test-support.hpp"
 
+#include <cctype>
 #include <climits>
+#include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <opencv2/core/persistence.hpp>
 #include <rangecast/rigfile/rig_file.hpp>
 #include <rangecast/rigfile/rig_text.hpp>
+#include <regex>
 #include <span>
 
 using namespace rangecast;
@@ -92,11 +96,30 @@ text_of_opencv (const Rig &rig, bool json)
   return file.releaseAndGetString ();
 }
 
+/* Later versions of OpenCV write the same numbers with fewer digits, and break lines elsewhere. */
+std::string
+with_plain_numbers (const std::string &text)
+{
+  static const std::regex piece (R"(\s+|-?\d+(\.\d*)?(e[-+]\d+)?)");
+  std::string plain;
+  auto end = text.cbegin ();
+  for (auto i = std::sregex_iterator (text.begin (), text.end (), piece);
+       i != std::sregex_iterator (); ++i) {
+    char number[32] = " ";
+    if (!std::isspace (static_cast<unsigned char> (*(*i)[0].first)))
+      std::snprintf (number, sizeof number, "%.17g", std::strtod (i->str ().c_str (), nullptr));
+    plain.append (end, (*i)[0].first).append (number);
+    end = (*i)[0].second;
+  }
+  return plain.append (end, text.cend ());
+}
+
 void
 expect_same_text (const Rig &rig)
 {
   for (bool json : {false, true})
-    EXPECT_EQ (rig_text (rig, json), text_of_opencv (rig, json));
+    EXPECT_EQ (
+        with_plain_numbers (rig_text (rig, json)), with_plain_numbers (text_of_opencv (rig, json)));
 }
 
 std::string
@@ -145,9 +168,11 @@ TEST (RigText, what_opencv_writes_is_read_back_exactly)
     EXPECT_EQ (read.views[2].right->camera, rig.views[2].right->camera);
     EXPECT_EQ (encode_rig (read), encode_rig (rig));
     ASSERT_TRUE (save_rig (again, read).ok ());
-    std::ifstream a (path), b (again);
-    EXPECT_TRUE (std::equal (std::istreambuf_iterator<char> (a), {},
-        std::istreambuf_iterator<char> (b), std::istreambuf_iterator<char> ()));
+    const auto text = [] (const std::string &name) {
+      std::ifstream file (name);
+      return with_plain_numbers ({std::istreambuf_iterator<char> (file), {}});
+    };
+    EXPECT_EQ (text (path), text (again));
     std::filesystem::remove (path);
     std::filesystem::remove (again);
   }

@@ -88,7 +88,7 @@ def _view_ids(caps):
 def _check_raw(caps):
     if caps is not None and not isinstance(caps, Gst.Caps):
         raise TypeError(f"caps must be Gst.Caps, not {type(caps).__name__}; Gst.Caps.from_string() parses text")
-    name = caps.get_structure(0).get_name() if caps and caps.get_size() else None
+    name = caps.to_string().split(",")[0] if caps and caps.get_size() else None
     if name != "video/x-range":
         raise ValueError(f"expected video/x-range, got {name}; coded frame sets need neighbourcodedec")
 
