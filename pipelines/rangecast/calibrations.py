@@ -179,7 +179,7 @@ def kalibr(documents, args):
         model = cam.get("distortion_model", None if "distortion_coeffs" in cam else "none")
         cameras[name] = Camera(need(cam.get("resolution"), 2, "resolution"), need(cam["intrinsics"], 4, "intrinsics"),
                                lens(cam.get("distortion_coeffs"), model, f"{name}: distortion_coeffs"), pose)  # fmt: skip
-    return from_first(cameras)
+    return cameras
 
 
 def pose_of(value, what):
@@ -216,7 +216,7 @@ def luxonis(documents, args):
         cameras[str(socket)] = Camera((one["width"], one["height"]), pinhole(one["intrinsicMatrix"], "intrinsicMatrix"),
                                       lens(one["distortionCoeff"], model, "distortionCoeff"), pose.inverse(), 1, 6)  # fmt: skip
     fail_unless(len(roots) == 1, "the extrinsics do not connect the left camera with the right one")
-    return from_first(cameras)
+    return cameras
 
 
 def zed(documents, args):
@@ -328,7 +328,7 @@ def ros(documents, args):
     moved = [one.pose.translation for one in cameras.values()]
     fail_unless(moved[0] != moved[1], "the projection matrices have no baseline: the cameras were calibrated one by one; calibrate them as a pair, or "
                 "add a file with R and T of cv::stereoCalibrate")  # fmt: skip
-    return from_first(cameras)
+    return cameras
 
 
 TO = "(?:(?:left|(?:camera|cam)?[01])to(?:right|(?:camera|cam)?[12]))?"
@@ -343,7 +343,7 @@ KINDS = {
     "model": "(?:distortion|lens)(?:model|type)",
     "camera": "camera(?:model|type)",
 }
-NAME = "(?:calibration|stereo|extrinsics?|cameras?|cam)*(left|right|[012])?(?:cameras?|cam|intrinsics?)*(?:%s)(?:camera|cam)?(left|right|[lr012])?"
+NAME = "(?:calibration|stereo|extrinsics?|cameras?|cam)*(left|right|[012])?(?:cameras?|cam|intrinsics?)*(?:%s)(?:camera|cam)?(left|right|[lr012])?(?:fe)?"  # ZED's fisheye
 
 
 def opencv(documents, args):
@@ -399,14 +399,6 @@ def opencv(documents, args):
     return cameras
 
 
-def from_first(cameras):
-    """With the first camera as the world."""
-    first = next(iter(cameras.values())).pose.inverse()
-    for one in cameras.values():
-        one.pose = one.pose * first
-    return cameras
-
-
 FORMATS = [kalibr, luxonis, zed, kitti, panoptic, middlebury, ros, opencv]
 UNKNOWN = ("not a calibration that import reads, which are those of OpenCV (YAML, XML, JSON), ROS, Kalibr, KITTI, Luxonis, ZED, CMU Panoptic and "
            "Middlebury: see docs/formats/rig.md")  # fmt: skip
@@ -427,7 +419,10 @@ def read_cameras(files, args):
         if cameras is not None:
             fail_unless(len(documents) == 1 or reader in (ros, opencv), "one file of this kind holds all cameras: leave the others out")
             fail_unless(args.unit is None or reader not in (luxonis, zed, middlebury), "--unit: the unit of this calibration is known")
+            # Where the file has no world, it is the first camera.
+            world_from_first = Pose(IDENTITY, [0, 0, 0]) if reader is panoptic else next(iter(cameras.values())).pose.inverse()
             for one in cameras.values():
+                one.pose = one.pose * world_from_first
                 one.pose.translation = metres(one.pose.translation, args.unit or 1)
             return cameras
     raise Fail(POSES if "'trafo'" in str(documents) else UNKNOWN)

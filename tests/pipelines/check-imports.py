@@ -129,6 +129,9 @@ def models():
             "R": ROTATION.tolist(), "T": T.tolist(), "image_size": SIZE}  # fmt: skip
     Path("four.json").write_text(json.dumps(four))
     refused("four coefficients", "does not name their model", "four.json")
+    zed_names = json.dumps(four).replace("K1", "K_LEFT").replace("K2", "K_RIGHT").replace("D1", "D_LEFT_FE").replace("D2", "D_RIGHT_FE")
+    Path("fisheye.json").write_text(zed_names)
+    refused("four coefficients as ZED names them", "D1 has four coefficients", "fisheye.json")
     Path("four.json").write_text(json.dumps(four | {"D1": [0, 0, 0, 0], "D2": [0, 0, 0, 0]}))
     refused("four zeros", "does not name their model", "four.json")
     for model in ("equidistant", "fisheye", "kannala_brandt", "omnidirectional", "double_sphere", "fov"):
