@@ -375,8 +375,9 @@ check_range (const char *option, int value, int min, int max)
 bool
 parse_arguments (int argc, char **argv, Options &options)
 {
-  const GOptionEntry entries[] = {{"address", 0, 0, G_OPTION_ARG_STRING, &options.address,
-                                      "Address to listen at (default 0.0.0.0, all of IPv4)", "A"},
+  const GOptionEntry entries[] = {
+      {"address", 0, 0, G_OPTION_ARG_STRING, &options.address,
+          "Address or name to listen at (default 0.0.0.0, all of IPv4)", "HOST"},
       {"port", 0, 0, G_OPTION_ARG_INT, &options.port, "TCP port (default 8554; 0: any)", "N"},
       {"mount", 0, 0, G_OPTION_ARG_STRING, &options.mount, "Path of the URL (default /live)",
           "/PATH"},
@@ -431,11 +432,15 @@ listen (GstRTSPServer *server, const Options &options)
   g_autoptr (GError) error = nullptr;
   g_autoptr (GSource) source = gst_rtsp_server_create_source (server, nullptr, &error);
   if (!source)
-    return fail (std::string (options.address) + ", port " + std::to_string (options.port) + ": " +
-                 error->message);
+    return fail (std::string ("--address ") + options.address + " --port " +
+                 std::to_string (options.port) + ": " + error->message);
   g_source_attach (source, nullptr);
-  std::printf ("serving %s://%s:%d%s\n", options.certificate ? "rtsps" : "rtsp", options.address,
-      gst_rtsp_server_get_bound_port (server), options.mount);
+  g_autoptr (GInetAddress) numeric = g_inet_address_new_from_string (options.address);
+  const bool is_any = numeric && g_inet_address_get_is_any (numeric);
+  g_autofree gchar *url = g_uri_join (G_URI_FLAGS_NONE, options.certificate ? "rtsps" : "rtsp",
+      nullptr, is_any ? g_get_host_name () : options.address,
+      gst_rtsp_server_get_bound_port (server), options.mount, nullptr, nullptr);
+  std::printf ("serving %s\n", url);
   std::fflush (stdout);
   return true;
 }

@@ -21,21 +21,19 @@ parse_clock_server (const std::string &text, ClockServer &server)
 {
   const Status bad = {StatusCode::kBadValue,
       "clock-server " + text + " is neither HOST:PORT (port 1 to 65535) nor ptp:DOMAIN (0 to 255)"};
-  const auto colon = text.rfind (':');
-  if (colon == std::string::npos || colon == 0)
-    return bad;
-  server.host = text.substr (0, colon);
-  server.ptp = server.host == "ptp";
-  guint64 number = 0;
-  if (!g_ascii_string_to_unsigned (text.c_str () + colon + 1, 10, server.ptp ? 0 : 1,
-          server.ptp ? 255 : 65535, &number, nullptr))
-    return bad;
-  server.port = static_cast<int> (number);
-  if (server.host.front () == '[') {
-    if (server.host.size () < 3 || server.host.back () != ']')
+  server.ptp = text.starts_with ("ptp:");
+  if (server.ptp) {
+    guint64 domain = 0;
+    if (!g_ascii_string_to_unsigned (text.c_str () + 4, 10, 0, 255, &domain, nullptr))
       return bad;
-    server.host = server.host.substr (1, server.host.size () - 2);
+    server.port = static_cast<int> (domain);
+    return {};
   }
+  g_autoptr (GSocketConnectable) parsed = g_network_address_parse (text.c_str (), 0, nullptr);
+  if (!parsed || g_network_address_get_port (G_NETWORK_ADDRESS (parsed)) == 0)
+    return bad;
+  server.host = g_network_address_get_hostname (G_NETWORK_ADDRESS (parsed));
+  server.port = g_network_address_get_port (G_NETWORK_ADDRESS (parsed));
   return {};
 }
 

@@ -24,15 +24,16 @@ ClockPublisher::start (GstElement *element, int port)
   if (port == 0)
     return true;
   GError *error = nullptr;
-  GSocket *socket =
-      g_socket_new (G_SOCKET_FAMILY_IPV4, G_SOCKET_TYPE_DATAGRAM, G_SOCKET_PROTOCOL_UDP, &error);
-  if (socket) {
-    GInetAddress *any = g_inet_address_new_any (G_SOCKET_FAMILY_IPV4);
-    GSocketAddress *address = g_inet_socket_address_new (any, guint16 (port));
-    g_socket_bind (socket, address, FALSE, &error);
-    g_object_unref (address);
-    g_object_unref (any);
-    g_object_unref (socket);
+  for (const GSocketFamily family : {G_SOCKET_FAMILY_IPV6, G_SOCKET_FAMILY_IPV4}) {
+    g_clear_error (&error);
+    g_autoptr (GSocket) socket =
+        g_socket_new (family, G_SOCKET_TYPE_DATAGRAM, G_SOCKET_PROTOCOL_UDP, &error);
+    g_autoptr (GInetAddress) any = g_inet_address_new_any (family);
+    g_autoptr (GSocketAddress) address = g_inet_socket_address_new (any, guint16 (port));
+    address_ = family == G_SOCKET_FAMILY_IPV6 ? "::" : "0.0.0.0"; /* the first one is both */
+    if (socket && (g_socket_bind (socket, address, FALSE, &error) ||
+                      g_error_matches (error, G_IO_ERROR, G_IO_ERROR_ADDRESS_IN_USE)))
+      break;
   }
   if (!report (element, port, error))
     return false;
@@ -61,8 +62,8 @@ ClockPublisher::set_clock (GstElement *element, GstClock *clock)
       return;
     port = port_;
     const ScopedRealtimePriority priority; /* its thread inherits it; delays are clock error */
-    provider_ = GST_NET_TIME_PROVIDER (g_initable_new (
-        GST_TYPE_NET_TIME_PROVIDER, nullptr, &error, "clock", clock, "port", port, nullptr));
+    provider_ = GST_NET_TIME_PROVIDER (g_initable_new (GST_TYPE_NET_TIME_PROVIDER, nullptr, &error,
+        "clock", clock, "address", address_, "port", port, nullptr));
   }
   report (element, port, error);
 }

@@ -23,6 +23,7 @@ public:
 private:
   std::mutex lock_; /* guards what follows */
   int port_ = 0;
+  const char *address_ = nullptr; /* any of IPv6 and IPv4, or of IPv4 alone */
   GstNetTimeProvider *provider_ = nullptr;
   GstClock *clock_ = nullptr; /* of provider_ */
 };

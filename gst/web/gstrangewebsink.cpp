@@ -369,7 +369,7 @@ web_properties ()
   using P = PropertyTable<Settings>;
   static P table = {
       P::text<&Settings::address> ("address", "Address",
-          "IP address to listen at; one that other machines can reach needs token, token-file or "
+          "Address or name to listen at; one that other machines can reach needs token, token-file or "
           "anonymous",
           kMutableReady),
       P::number<&Settings::port> (

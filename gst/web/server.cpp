@@ -30,6 +30,17 @@ constexpr int kMaxWaitingFrameSets = 8, kMaxWaitingAudio = 100;
 constexpr gsize kMaxDatagram = 8192;
 constexpr guint kMaxReports = 100;
 
+/* An address, or the first one of a name. Returns: (transfer full) (nullable) */
+GSocketAddress *
+resolve (const char *host, guint port)
+{
+  if (std::strcmp (host, "localhost") == 0)
+    host = "127.0.0.1";
+  g_autoptr (GSocketConnectable) name = g_network_address_new (host, guint16 (port));
+  g_autoptr (GSocketAddressEnumerator) addresses = g_socket_connectable_enumerate (name);
+  return g_socket_address_enumerator_next (addresses, nullptr, nullptr);
+}
+
 /* HOST and PORT of udp://HOST:PORT; [HOST] for IPv6. Returns: (transfer full) (nullable) */
 GSocketAddress *
 parse_udp (const std::string &address)
@@ -39,7 +50,7 @@ parse_udp (const std::string &address)
   if (!g_uri_split_network (address.c_str (), G_URI_FLAGS_NONE, nullptr, &host, &port, nullptr) ||
       !address.starts_with ("udp://") || port < 0 || port > 65535)
     return nullptr;
-  return g_inet_socket_address_new_from_string (host && *host ? host : "0.0.0.0", guint (port));
+  return resolve (host && *host ? host : "0.0.0.0", guint (port));
 }
 
 /* What browsers send as Origin: scheme, host and port, without a path. */
@@ -147,11 +158,10 @@ Server::load_certificate ()
 Status
 Server::listen ()
 {
-  g_autoptr (GSocketAddress) address = g_inet_socket_address_new_from_string (
-      settings_.address == "localhost" ? "127.0.0.1" : settings_.address.c_str (), settings_.port);
+  g_autoptr (GSocketAddress) address = resolve (settings_.address.c_str (), settings_.port);
   if (!address)
     return {StatusCode::kBadValue,
-        "address: '" + settings_.address + "' is not an IP address of this machine"};
+        "address: '" + settings_.address + "' is neither an IP address nor a known name"};
   GInetAddress *host = g_inet_socket_address_get_address (G_INET_SOCKET_ADDRESS (address));
   if (!g_inet_address_get_is_loopback (host) && !settings_.has_token () && !settings_.anonymous)
     return {StatusCode::kBadValue, "address=" + settings_.address +
@@ -159,14 +169,20 @@ Server::listen ()
                                        "token-file, or anonymous=true for a stream that anybody "
                                        "may see"};
   g_autoptr (GError) error = nullptr;
-  const bool tls = !settings_.certificate.empty ();
-  if (!soup_server_listen (
-          soup_, address, tls ? SOUP_SERVER_LISTEN_HTTPS : SoupServerListenOptions (0), &error))
+  const bool is_any = g_inet_address_get_is_any (host);
+  const auto options =
+      settings_.certificate.empty () ? SoupServerListenOptions (0) : SOUP_SERVER_LISTEN_HTTPS;
+  if (is_any && g_inet_address_get_family (host) == G_SOCKET_FAMILY_IPV6
+          ? !soup_server_listen_all (soup_, settings_.port, options, &error)
+          : !soup_server_listen (soup_, address, options, &error))
     return {StatusCode::kNotFound, "address=" + settings_.address +
                                        " port=" + std::to_string (settings_.port) +
                                        ": cannot listen there: " + error->message};
   GSList *uris = soup_server_get_uris (soup_);
-  g_autofree gchar *url = g_uri_to_string (static_cast<GUri *> (uris->data));
+  auto uri = static_cast<GUri *> (uris->data);
+  g_autofree gchar *url = g_uri_join (G_URI_FLAGS_NONE, g_uri_get_scheme (uri), nullptr,
+      is_any ? g_get_host_name () : g_uri_get_host (uri), g_uri_get_port (uri), "/", nullptr,
+      nullptr);
   url_ = url;
   g_slist_free_full (uris, reinterpret_cast<GDestroyNotify> (g_uri_unref));
   return {};
@@ -328,7 +344,8 @@ Server::is_own_host (SoupServerMessage *message) const
   if (!g_uri_split_network (url.c_str (), G_URI_FLAGS_NONE, nullptr, &host, nullptr, nullptr))
     return false;
   return g_hostname_is_ip_address (host) || !std::strchr (host, '.') ||
-         g_str_has_suffix (host, ".local") || has_origin (settings_.origins, url);
+         std::strcmp (host, g_get_host_name ()) == 0 || g_str_has_suffix (host, ".local") ||
+         has_origin (settings_.origins, url);
 }
 
 bool

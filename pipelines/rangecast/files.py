@@ -58,6 +58,7 @@ def build_record(args):
         launch.add(*"! opusenc audio-type=voice bitrate=32000 ! oggmux ! filesink async=false".split(), f"location={audio}")
         launch.option("--drop-empty", audio)
     if not args.print:
+        launch.check_ports()
         keep_existing(args.file)
         if Path(audio).exists() and args.file != audio:
             os.replace(audio, audio + "~")

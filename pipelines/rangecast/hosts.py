@@ -40,7 +40,7 @@ def add_camera(parser):
     options.add(parser, "--views", "--threads")
     parser.add_argument("--trigger", choices=("free-run", "software", "hardware", "action"), default="software",
                         help="how cameras are triggered (default software)")  # fmt: skip
-    parser.add_argument("--clock-server", type=options.address, metavar="HOST:PORT",
+    parser.add_argument("--clock-server", type=options.endpoint, metavar="HOST:PORT",
                         help="trigger by the clock that 'rangecast parent --clock-port' publishes there (default: this machine's)")  # fmt: skip
     parser.add_argument("--reconnect", action="store_true", help="wait for missing or lost cameras instead of ending")
     options.add(parser, "--microphone", "--audio-to", "--clock")
@@ -66,7 +66,7 @@ def machine_vision(args):
     fail_unless(not names or (2 <= len(names) <= 3 and all(names)), "--input: cameras= needs LEFT,RIGHT or LEFT,RIGHT,THIRD")
     words = ["stereocamsrc", "name=cameras", f"trigger={args.trigger}", f"reconnect={str(args.reconnect).lower()}"]
     if args.clock_server:
-        words.append("clock-server={}:{}".format(*args.clock_server))
+        words.append(f"clock-server={args.clock_server}")
     sides = ("left", "right", "third")[: len(names) or 2]
     words += [f"{side}={name}" for side, name in zip(sides, names)] or [f"rig={args.rig}", f"view-id={args.view}"]
     media, convert = {
@@ -165,7 +165,7 @@ def build_parent(args):
             fail_unless(port not in taken, f"{name}: port {port} is that of {taken.get(port)}")
             taken[port] = name
     for host, port in args.to + (args.audio_to or []):
-        fail_unless(not (host == "localhost" or host.startswith("127.")) or port not in taken, f"'{host}:{port}' is a port of this parent itself")
+        fail_unless(port not in taken or not options.is_local(host), f"'{host}:{port}' is a port of this parent itself")
     launch = Launch("rangemux", "name=mux", f"latency={args.latency * 1000000}")
     if args.clock_port:
         launch.add(f"clock-port={args.clock_port}")

@@ -4,9 +4,13 @@
 import os
 import shlex
 import shutil
+import socket
 import subprocess
 import sys
 from pathlib import Path
+
+
+HAS_IPV6 = socket.has_dualstack_ipv6()  # sockets of :: receive IPv4, too
 
 
 class Fail(Exception):
@@ -54,6 +58,7 @@ class Launch:
         self.words = [str(word) for word in words]
         self.options = []
         self.environment = {}
+        self.ports = []  # UDP: (option, port)
         self.feed = []  # a program whose output fdsrc reads
 
     def add(self, *words):
@@ -73,8 +78,20 @@ class Launch:
         feed = [shlex.join(self.feed), "|"] if self.feed else []
         return " ".join([*feed, *setting, *("\\\n  !" if word == "!" else shlex.quote(word) for word in words)])
 
+    def check_ports(self):
+        """The element's error would not name the option."""
+        for option, port in self.ports:
+            with socket.socket(socket.AF_INET6 if HAS_IPV6 else socket.AF_INET, socket.SOCK_DGRAM) as probe:
+                try:
+                    if HAS_IPV6:
+                        probe.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
+                    probe.bind(("", port))
+                except OSError as error:
+                    raise Fail(f"{option}: UDP port {port}: {error.strerror}") from None
+
     def run(self):
         """Replaces this process, so that signals reach the pipeline."""
+        self.check_ports()
         os.environ.update(self.environment)
         if self.feed:
             os.dup2(self.open_feed().fileno(), 0)
@@ -85,6 +102,7 @@ class Launch:
         return subprocess.Popen(self.feed, stdout=subprocess.PIPE).stdout  # the program ends with its pipe
 
     def spawn(self, **options):
+        self.check_ports()
         if self.feed:
             options["stdin"] = self.open_feed()
         return subprocess.Popen(self.command(), env={**os.environ, **self.environment}, **options)

@@ -53,29 +53,48 @@ def metres(text):
 
 def address(text):
     """HOST:PORT as a pair."""
-    host, colon, number_text = text.rpartition(":")
-    if not colon or not host or ":" in host:
-        raise Wrong(f"'{text}' is not HOST:PORT with a name or an IPv4 address")
+    match = re.fullmatch(r"(\[[^\[\]]+\]|[^\[\]:]+):(.+)", text)
+    if not match:
+        raise Wrong(f"'{text}' is not HOST:PORT, or [ADDRESS]:PORT for IPv6")
+    return host(match[1].strip("[]")), port(match[2])
+
+
+def host(text):
+    """A name, or an address of IPv4 or IPv6."""
     try:
-        socket.getaddrinfo(host, None, socket.AF_INET)
-        if re.fullmatch(r"[\d.]+", host):
-            ipaddress.IPv4Address(host)
+        socket.getaddrinfo(text, None)
+        if re.fullmatch(r"[\d.]+", text):
+            ipaddress.IPv4Address(text)
     except (OSError, ValueError):
-        raise Wrong(f"no host '{host}'") from None
-    return host, port(number_text)
+        raise Wrong(f"no host '{text}'") from None
+    return text
+
+
+def is_local(name):
+    """Whether only this machine can reach it."""
+    return all(ipaddress.ip_address(one[4][0]).is_loopback for one in socket.getaddrinfo(name, None))
+
+
+def endpoint(text):
+    """HOST:PORT as it is."""
+    return address(text) and text
 
 
 def addresses(text):
     return [address(one) for one in text.split(",")]
 
 
-def group(text):
+def is_multicast(name):
     try:
-        if ipaddress.IPv4Address(text).is_multicast:
-            return text
+        return ipaddress.ip_address(name).is_multicast
     except ValueError:
-        pass
-    raise Wrong(f"'{text}' is not a group from 224.0.0.0 to 239.255.255.255")
+        return False
+
+
+def group(text):
+    if not is_multicast(text):
+        raise Wrong(f"'{text}' is not a group from 224.0.0.0 to 239.255.255.255, or of ff00::/8")
+    return text
 
 
 def interface(text):
@@ -179,7 +198,7 @@ SHARED = {
     "--microphone": dict(type=elements, metavar="SOURCE", help="send audio: a source in gst-launch-1.0 syntax, e.g. pulsesrc"),
     "--audio-to": dict(type=addresses, metavar="HOST:PORT[,...]", help="where audio goes; RTCP goes to PORT + 1"),
     "--audio-port": dict(type=even_port, metavar="PORT", help="receive audio at this UDP port; RTCP at PORT + 1"),
-    "--clock": dict(type=lambda text: text if text == "system" else ":".join(map(str, address(text))), metavar="CLOCK", default="system",
+    "--clock": dict(type=lambda text: text if text == "system" else endpoint(text), metavar="CLOCK", default="system",
                     help="HOST:PORT where 'rangecast parent --clock-port' publishes the camera hosts' clock (default: this machine's)"),
     "--video": dict(type=output_file, metavar="WEBM", help="write a video, with the audio if there is any"),
     "--out": dict(type=output_file, metavar="FILE", required=True, help="rig file to write: .yaml or .json"),

@@ -4,13 +4,12 @@
 import os
 import re
 import secrets
-import socket
 import ssl
 import subprocess
 import tempfile
 
 from . import options, transport
-from .launch import Fail, Launch, fail_unless, has_element
+from .launch import HAS_IPV6, Fail, Launch, fail_unless, has_element
 from .processes import Processes
 
 
@@ -18,7 +17,7 @@ def add_serve(parser):
     parser.add_argument("--file", type=options.existing_file, metavar="RECORDING", help="serve a recording")
     parser.add_argument("--repeat", action="store_true", help="with --file: again and again")
     options.add(parser, "--source", help="serve what ends with coded frame sets, e.g. '... ! neighbourcodeenc'")
-    parser.add_argument("--address", default="127.0.0.1", metavar="IP", help="address to listen at (default %(default)s: only this machine; 0.0.0.0: all)")
+    parser.add_argument("--address", type=options.host, default="127.0.0.1", metavar="HOST", help="where to listen (default %(default)s: only this machine; 0.0.0.0: all)")
     parser.add_argument("--port", type=options.number(0, 65535), default=8080, metavar="PORT", help="TCP port (default 8080; 0: any)")
     parser.add_argument("--token", metavar="TEXT", help="password, part of the link (default: random; none if only this machine is served)")
     parser.add_argument("--token-file", type=options.existing_file, metavar="FILE", help="lines 'name token', one for each user")
@@ -32,10 +31,6 @@ def add_serve(parser):
     options.add(parser, "--clock")
     options.add_receiver(parser, listen_required=False)
     parser.set_defaults(build=build_serve, run=run_serve, private_tokens=None)
-
-
-def is_local(address):
-    return address.startswith("127.") or address in ("::1", "localhost")
 
 
 def build_serve(args):
@@ -64,7 +59,7 @@ def build_serve(args):
         launch.add(*"avatartestsrc is-live=true views=4 range-person-only=true ! video/x-range,width=320,height=240,framerate=15/1".split())
         launch.add(*"! neighbourcodeenc profile=entropy temporal=true".split())
     fail_unless(args.print or has_element("rangewebsink"), "no element rangewebsink: run setup.sh")
-    if not (args.token or args.token_file or args.anonymous or is_local(args.address)):
+    if not (args.token or args.token_file or args.anonymous or options.is_local(args.address)):
         args.token = secrets.token_urlsafe(16)
         if not args.print:  # the printed string has the token itself
             descriptor, args.private_tokens = tempfile.mkstemp(prefix="rangecast-")  # others see command lines, but not this file
@@ -85,7 +80,7 @@ def build_serve(args):
     if args.stats:
         launch.environment["RANGECAST_STATS"] = os.environ.get("RANGECAST_STATS", f"udp://127.0.0.1:{args.stats}")
         launch.environment["RANGECAST_HOST"] = os.environ.get("RANGECAST_HOST", "web-server")
-        launch.add(f"stats-address=udp://{'127.0.0.1' if is_local(args.address) else '0.0.0.0'}:{args.stats}")
+        launch.add(f"stats-address=udp://{'127.0.0.1' if options.is_local(args.address) else '[::]' if HAS_IPV6 else '0.0.0.0'}:{args.stats}")
     if args.audio_port:
         transport.receive_audio(args, launch)
         launch.add("!", "web.audio")  # the page plays it when it shows what was captured at the same time
@@ -97,11 +92,10 @@ def print_links(args, url, rig):
     """The page's address, at all addresses of this machine where it listens there."""
     scheme, host, port = re.fullmatch(r"(https?)://(.*):(\d+)/?", url).groups()
     hosts = [host]
-    if host in ("0.0.0.0", "[::]"):
+    if args.address in ("0.0.0.0", "::"):
         found = subprocess.run(["hostname", "-I"], capture_output=True, text=True, check=False).stdout.split()
-        hosts = [socket.gethostname(), *(one for one in found if (":" in one) == (host == "[::]"))]
+        hosts += [f"[{one}]" if ":" in one else one for one in found if ":" not in one or args.address == "::"]
     for one in hosts:
-        one = f"[{one}]" if ":" in one and not one.startswith("[") else one
         for page in ("", "rig") if rig else ("",):
             print(f"{scheme}://{one}:{port}/{page}" + (f"#token={args.token}" if args.token else ""), flush=True)
     if args.token_file:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The parts of launch strings between coded frame sets or audio and UDP. docs/guide/streaming.md and speech.md explain them."""
 
-from .launch import fail_unless
+from . import options
+from .launch import HAS_IPV6, fail_unless
 
 FIELDS = "media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE"
 FEEDBACK = "rtcp-fb-nack-pli=(boolean)true,rtcp-fb-nack=(boolean)true"
@@ -16,12 +17,8 @@ AUDIO = (
 HEAR = "! queue max-size-time=2000000000 max-size-buffers=0 ! opusdec plc=true tolerance=5000000 ! audioconvert ! audioresample".split()
 
 
-def join(addresses, plus=0):
-    return ",".join(f"{host}:{port + plus}" for host, port in addresses)
-
-
 def is_multicast(addresses):
-    return any(host.split(".")[0].isdigit() and 224 <= int(host.split(".")[0]) < 240 for host, _ in addresses)
+    return any(options.is_multicast(host) for host, _ in addresses)
 
 
 def check_sender(args):
@@ -42,9 +39,19 @@ def check_receiver(args):
                 f"--audio-port {args.audio_port}, or the next one for RTCP, is that of --listen")  # fmt: skip
 
 
-def sink(addresses, args, plus=0):
-    words = ["multiudpsink", f"clients={join(addresses, plus)}", "sync=false", "async=false", f"ttl-mc={args.ttl}"]
-    return words + ([f"multicast-iface={args.interface}"] if args.interface else [])
+def send_to(launch, addresses, args, plus=0):
+    name = f"to{len(launch.words)}"
+    launch.add(*(["!", "tee", f"name={name}"] if len(addresses) > 1 else []))  # multiudpsink takes no address of IPv6
+    for host, port in addresses:
+        launch.add(*([f"{name}."] if len(addresses) > 1 else []), "!", "udpsink", f"host={host}", f"port={port + plus}")
+        launch.add("sync=false", "async=false", f"ttl-mc={args.ttl}", *([f"multicast-iface={args.interface}"] if args.interface else []))
+
+
+def listen(launch, option, port, group=None, interface=None):
+    if group:  # several viewers on a host
+        return launch.add("udpsrc", f"port={port}", f"address={group}", "reuse=true", *([f"multicast-iface={interface}"] if interface else []))
+    launch.ports.append((option, port))
+    launch.add("udpsrc", f"port={port}", "reuse=false", *(["address=::"] if HAS_IPV6 else []))
 
 
 def send(args, launch, adaptive=False):
@@ -64,9 +71,10 @@ def send(args, launch, adaptive=False):
     if args.key:
         launch.add("!", "encrypt.rtp_sink_0", "srtpenc", "name=encrypt", "encrypt.rtp_src_0")
         launch.option("--srtp-key", args.key)
-    launch.add("!", *sink(args.to, args))
+    send_to(launch, args.to, args)
     if args.feedback_port:
-        launch.add("rtpsession", "name=session", "rtp-profile=avpf", "udpsrc", f"port={args.feedback_port}", "reuse=false")
+        launch.add("rtpsession", "name=session", "rtp-profile=avpf")
+        listen(launch, "--feedback-port", args.feedback_port)
         if args.key:
             launch.add("caps=application/x-srtcp", "!", "decrypt.rtcp_sink", "srtpdec", "name=decrypt", "decrypt.rtcp_src")
         else:
@@ -77,8 +85,8 @@ def send(args, launch, adaptive=False):
 def receive(launch, port, *, number=0, jitter, buffer=4194304, group=None, interface=None, key=None, fec=False, feedback=None, rtx=False):
     """Adds the elements that receive coded frame sets from a port. `number` makes names unique among several receivers."""
     kind = "application/x-srtp" if key else "application/x-rtp"
-    launch.add("udpsrc", f"port={port}", f"buffer-size={buffer}", f"caps={kind},{FIELDS},payload=96,{FEEDBACK},{TWCC}")
-    launch.add(*udp_group(group, interface))
+    listen(launch, "--listen", port, group, interface)
+    launch.add(f"buffer-size={buffer}", f"caps={kind},{FIELDS},payload=96,{FEEDBACK},{TWCC}")
     if key:
         launch.add("!", f"decrypt{number}.rtp_sink", "srtpdec", f"name=decrypt{number}", f"decrypt{number}.rtp_src")
         launch.option("--srtp-key", key)
@@ -111,12 +119,6 @@ def receive_stream(args, launch):
             feedback=args.feedback_to, rtx=args.rtx)  # fmt: skip
 
 
-def udp_group(group, interface):
-    if not group:
-        return ["reuse=false"]
-    return [f"address={group}", "reuse=true", *([f"multicast-iface={interface}"] if interface else [])]  # several viewers on a host
-
-
 def speak(launch, source, filters=(), payloader=()):
     """Adds the elements from a microphone to RTP. The pipeline's clock has to be that of the camera hosts."""
     launch.add(*source)
@@ -136,17 +138,20 @@ def send_audio(args, launch):
     if args.key:
         launch.add(*"! encrypt-audio.rtp_sink_0 srtpenc name=encrypt-audio encrypt-audio.rtp_src_0".split())
         launch.option("--srtp-key", args.key)
-    launch.add("!", *sink(args.audio_to, args), "audio.send_rtcp_src")
+    send_to(launch, args.audio_to, args)
+    launch.add("audio.send_rtcp_src")
     if args.key:
         launch.add("!", "encrypt-audio.rtcp_sink_0", "encrypt-audio.rtcp_src_0")
     # rtpsession ends its RTCP only if sending BYE takes longer than its handling of EOS (GStreamer 1.22).
-    launch.add("!", "identity", "sleep-time=5000", "!", *sink(args.audio_to, args, 1))
+    launch.add("!", "identity", "sleep-time=5000")
+    send_to(launch, args.audio_to, args, 1)
 
 
 def receive_audio(args, launch):
     """Adds the elements that receive Opus packets from args.audio_port."""
     kind = "application/x-srtp" if args.key else "application/x-rtp"
-    launch.add("udpsrc", f"port={args.audio_port}", f"caps={kind},{AUDIO}", *udp_group(args.multicast, args.interface))
+    listen(launch, "--audio-port", args.audio_port, args.multicast, args.interface)
+    launch.add(f"caps={kind},{AUDIO}")
     if args.key:
         launch.add(*"! decrypt-audio.rtp_sink srtpdec name=decrypt-audio decrypt-audio.rtp_src".split())
         launch.option("--srtp-key", args.key)
@@ -156,6 +161,9 @@ def receive_audio(args, launch):
 
 def forward_audio(args, launch):
     """Adds the elements that send the packets of both ports on as they are."""
-    launch.add("udpsrc", f"port={args.audio_port}", "reuse=false", f"caps=application/x-rtp,{AUDIO}", "!", "rtpneighbourcodeguard")
-    launch.add("!", *sink(args.audio_to, args), "udpsrc", f"port={args.audio_port + 1}", "reuse=false", "caps=application/x-rtcp")
-    launch.add("!", *sink(args.audio_to, args, 1))
+    listen(launch, "--audio-port", args.audio_port)
+    launch.add(f"caps=application/x-rtp,{AUDIO}", "!", "rtpneighbourcodeguard")
+    send_to(launch, args.audio_to, args)
+    listen(launch, "--audio-port", args.audio_port + 1)
+    launch.add("caps=application/x-rtcp")
+    send_to(launch, args.audio_to, args, 1)

@@ -135,6 +135,22 @@ play_again (Runner &runner)
   g_main_loop_quit (runner.loop);
 }
 
+/* The file or port of an element, which GStreamer's errors do not always name. */
+std::string
+subject_of (GstObject *element)
+{
+  std::string subject;
+  for (const char *name : {"location", "port"})
+    if (g_object_class_find_property (G_OBJECT_GET_CLASS (element), name)) {
+      GValue value = G_VALUE_INIT;
+      g_object_get_property (G_OBJECT (element), name, g_value_init (&value, G_TYPE_STRING));
+      if (const gchar *text = g_value_get_string (&value))
+        subject += std::string (" ") + name + "=" + text;
+      g_value_unset (&value);
+    }
+  return subject;
+}
+
 gboolean
 on_message (GstBus *, GstMessage *message, gpointer user_data)
 {
@@ -145,8 +161,8 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
   switch (GST_MESSAGE_TYPE (message)) {
     case GST_MESSAGE_ERROR:
       gst_message_parse_error (message, &error, &details);
-      g_printerr ("ERROR: %s: %s\n%s\n", GST_OBJECT_NAME (message->src), error->message,
-          details ? details : "");
+      g_printerr ("ERROR: %s%s: %s\n%s\n", GST_OBJECT_NAME (message->src),
+          subject_of (message->src).c_str (), error->message, details ? details : "");
       if (runner->stats)
         runner->stats->take_warning (message, error->message);
       g_free (details);
@@ -418,15 +434,14 @@ parse_pipeline (gchar **launch)
 GstClock *
 open_net_clock (const std::string &name)
 {
-  const auto colon = name.rfind (':');
-  guint64 port = 0;
-  if (colon == name.npos || colon == 0 ||
-      !g_ascii_string_to_unsigned (name.c_str () + colon + 1, 10, 1, 65535, &port, nullptr)) {
+  g_autoptr (GSocketConnectable) parsed = g_network_address_parse (name.c_str (), 0, nullptr);
+  auto address = parsed ? G_NETWORK_ADDRESS (parsed) : nullptr;
+  if (!address || g_network_address_get_port (address) == 0) {
     g_printerr ("rangecast-run: --clock: '%s' is neither system nor HOST:PORT\n", name.c_str ());
     return nullptr;
   }
-  GstClock *clock =
-      gst_net_client_clock_new (nullptr, name.substr (0, colon).c_str (), int (port), 0);
+  GstClock *clock = gst_net_client_clock_new (
+      nullptr, g_network_address_get_hostname (address), g_network_address_get_port (address), 0);
   bool told = false;
   while (!gst_clock_wait_for_sync (clock, 2 * GST_SECOND))
     if (!std::exchange (told, true))

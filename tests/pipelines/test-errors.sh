@@ -150,6 +150,10 @@ test_frames_end_a_source_that_is_not_live () {
 }
 
 # A muxer writes its index at the end of the stream.
+test_a_full_disk_names_the_file () {
+  expect_error "location=/dev/full: No space left" run avatartestsrc num-buffers=5 ! neighbourcodeenc ! filesink location=/dev/full
+}
+
 test_a_signal_finishes_files () {
   rangecast-run videotestsrc is-live=true ! identity name=rendered ! jpegenc ! qtmux ! filesink location=film.mov &
   until_true 20 test -s film.mov

@@ -152,10 +152,32 @@ test_ports_in_use_are_named () {
   python3 -c 'import socket, time
 s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", 20200)); print("bound", flush=True); time.sleep(100)' >blocker.txt &
   until_true 20 grep -q bound blocker.txt
-  refuses 20200 view --listen 20200
-  refuses 20200 parent --views 1 --listen 20200 --to 127.0.0.1:20201
-  refuses 20200 record none.rcnc --listen 20200
+  make_rig
+  refuses "--listen: UDP port 20200: Address already in use" view --listen 20200
+  refuses "--listen: UDP port 20200: Address already in use" parent --views 2 --listen 20199 --to 127.0.0.1:20201
+  refuses "--feedback-port: UDP port 20200: " camera --view 0 --rig rig.yaml --to 127.0.0.1:20201 --feedback-port 20200
+  refuses "--listen: UDP port 20200: " record none.rcnc --listen 20200
   [ ! -e none.rcnc ] || fail "an empty file is left"
+}
+
+test_addresses_are_names_or_of_either_ip_version () {
+  grep -qs . /proc/net/if_inet6 || skip "no IPv6"
+  local to n=0
+  make_rig
+  for to in '[::1]:20600' localhost:20600 '[::1]:20601,127.0.0.1:20600'; do
+    n=$((n + 1))
+    rangecast record "got$n.rcnc" --listen 20600 >record.log 2>&1 &
+    local recording=$!
+    rangecast camera --view 0 --rig rig.yaml --input range --learn 2 --to "$to" >camera.log 2>&1 &
+    until_true 60 test -s "got$n.rcnc"
+    kill -INT $recording
+    wait $recording
+    kill $!
+  done
+  rangecast parent --views 1 --listen 20610 --to '[::1]:20611' --clock-port 20612 >parent.log 2>&1 &
+  for to in '[::1]' 127.0.0.1; do
+    rangecast-run --clock "$to:20612" --timeout 60 videotestsrc num-buffers=1 ! fakesink || fail "no clock at $to"
+  done
 }
 
 test_recordings_are_kept () {

@@ -181,8 +181,9 @@ GST_START_TEST (test_offset_beyond_the_last_view_id_names_the_pad)
 {
   Mux mux (2);
   gst_child_proxy_set (GST_CHILD_PROXY (mux.out->element), "sink_1::view-id-offset", 63, nullptr);
-  gst_harness_push_event (mux.in[1],
-      gst_event_new_caps (gstrange::make_range_caps (gstrange::make_info (mux.one (1), 30, 1))));
+  GstCaps *caps = gstrange::make_range_caps (gstrange::make_info (mux.one (1), 30, 1));
+  gst_harness_push_event (mux.in[1], gst_event_new_caps (caps));
+  gst_caps_unref (caps);
   fail_unless_contains (
       next_message_text (mux.bus, GST_MESSAGE_ERROR), "sink_1: view-id 64: must be 0 to 63");
 }

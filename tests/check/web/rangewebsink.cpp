@@ -117,8 +117,8 @@ GST_START_TEST (test_wrong_settings_are_named)
   const std::string garbage = folder.write ("garbage.pem", "garbage");
   const struct {
     std::string properties, error;
-  } cases[] = {{"address=nonsense", "is not an IP address"},
-      {"address=127.0.0.1:80", "is not an IP address"},
+  } cases[] = {{"address=nonsense", "is neither an IP address nor a known name"},
+      {"address=127.0.0.1:80", "is neither an IP address nor a known name"},
       {"anonymous=true address=192.0.2.1", "address=192.0.2.1 port=0"},
       {"certificate=/nonexistent.pem", "/nonexistent.pem"}, {"certificate=" + garbage, garbage},
       {"certificate=" + garbage + " private-key=/nonexistent.pem", "private-key"},
