@@ -12,6 +12,9 @@
 
 namespace {
 
+/** STUN and TURN servers may be slower than the checks of candidates without them. */
+constexpr guint kMaxCandidateWait_ms = 15000;
+
 /* An object of strings and, if it is not negative, the number "media". */
 std::string
 json (std::initializer_list<std::pair<const char *, const char *>> fields, gint64 media = -1)
@@ -45,27 +48,43 @@ on_candidate (GstElement *webrtc, guint media, const gchar *candidate, gpointer)
   post (webrtc, "call-send", json ({{"type", "call"}, {"candidate", candidate}}, media));
 }
 
-void
-on_state (GstElement *webrtc, GParamSpec *, gpointer)
+GstWebRTCPeerConnectionState
+state_of (GstElement *webrtc)
 {
   GstWebRTCPeerConnectionState state = GST_WEBRTC_PEER_CONNECTION_STATE_NEW;
   g_object_get (webrtc, "connection-state", &state, nullptr);
-  if (state == GST_WEBRTC_PEER_CONNECTION_STATE_CONNECTED) {
-    const auto open = [] (const GValue *valve, gpointer) {
-      g_object_set (g_value_get_object (valve), "drop", FALSE, nullptr);
-    };
-    GstObject *pipeline = gst_object_get_parent (GST_OBJECT (webrtc));
-    GstIterator *valves = gst_bin_iterate_all_by_element_factory_name (GST_BIN (pipeline), "valve");
-    gst_iterator_foreach (valves, open, nullptr);
-    gst_iterator_free (valves);
-    gst_object_unref (pipeline);
-    g_print ("the other end is connected\n");
-  } else if (state == GST_WEBRTC_PEER_CONNECTION_STATE_FAILED)
+  return state;
+}
+
+gboolean
+on_no_way (gpointer webrtc)
+{
+  if (state_of (GST_ELEMENT (webrtc)) == GST_WEBRTC_PEER_CONNECTION_STATE_FAILED)
     GST_ELEMENT_ERROR (webrtc, RESOURCE, OPEN_READ_WRITE,
-        ("There is no way through both networks to the other end: use a STUN server, or a TURN "
-         "server "
-         "where that is not enough"),
+        ("There is no way through both networks to the other end: use a STUN server, or where that "
+         "is not enough a TURN server"),
         (nullptr));
+  return G_SOURCE_REMOVE;
+}
+
+void
+on_state (GstElement *webrtc, GParamSpec *, gpointer)
+{
+  const auto state = state_of (webrtc);
+  if (state == GST_WEBRTC_PEER_CONNECTION_STATE_FAILED) /* of the candidates so far */
+    g_timeout_add_full (G_PRIORITY_DEFAULT, kMaxCandidateWait_ms, on_no_way,
+        gst_object_ref (webrtc), gst_object_unref);
+  if (state != GST_WEBRTC_PEER_CONNECTION_STATE_CONNECTED)
+    return;
+  const auto open = [] (const GValue *valve, gpointer) {
+    g_object_set (g_value_get_object (valve), "drop", FALSE, nullptr);
+  };
+  GstObject *pipeline = gst_object_get_parent (GST_OBJECT (webrtc));
+  GstIterator *valves = gst_bin_iterate_all_by_element_factory_name (GST_BIN (pipeline), "valve");
+  gst_iterator_foreach (valves, open, nullptr);
+  gst_iterator_free (valves);
+  gst_object_unref (pipeline);
+  g_print ("the other end is connected\n");
 }
 
 /* The first packet of a frame set that comes later than the one before is not lost. */
