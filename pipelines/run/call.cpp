@@ -6,6 +6,7 @@
 #define GST_USE_UNSTABLE_API
 #include <gst/webrtc/webrtc.h>
 
+#include <cstdlib>
 #include <initializer_list>
 #include <string>
 #include <utility>
@@ -15,16 +16,13 @@ namespace {
 /** STUN and TURN servers may be slower than the checks of candidates without them. */
 constexpr guint kMaxCandidateWait_ms = 15000;
 
-/* An object of strings and, if it is not negative, the number "media". */
 std::string
-json (std::initializer_list<std::pair<const char *, const char *>> fields, gint64 media = -1)
+json (std::initializer_list<std::pair<const char *, const char *>> fields)
 {
   g_autoptr (JsonNode) node = json_node_new (JSON_NODE_OBJECT);
   JsonObject *object = json_object_new ();
   for (const auto &[name, text] : fields)
     json_object_set_string_member (object, name, text);
-  if (media >= 0)
-    json_object_set_int_member (object, "media", media);
   json_node_take_object (node, object);
   g_autofree gchar *text = json_to_string (node, FALSE);
   return text;
@@ -45,7 +43,9 @@ post (GstElement *webrtc, const char *name, const std::string &text)
 void
 on_candidate (GstElement *webrtc, guint media, const gchar *candidate, gpointer)
 {
-  post (webrtc, "call-send", json ({{"type", "call"}, {"candidate", candidate}}, media));
+  const std::string index = std::to_string (media);
+  post (webrtc, "call-send",
+      json ({{"type", "call"}, {"media", index.c_str ()}, {"candidate", candidate}}));
 }
 
 GstWebRTCPeerConnectionState
@@ -127,6 +127,7 @@ describe (GstElement *webrtc, const char *action)
       gst_promise_new_with_change_func (on_description, gst_object_ref (webrtc), gst_object_unref));
 }
 
+/* No loop runs when it ends. */
 class WebrtcCall : public Call {
 public:
   bool parse (const char *url, const char *certificate);
@@ -141,7 +142,6 @@ private:
   void on_closed ();
 
   GstElement *webrtc_ = nullptr;
-  GCancellable *cancellable_ = g_cancellable_new ();
   SoupSession *session_ = nullptr;
   SoupWebsocketConnection *socket_ = nullptr;
   GTlsCertificate *certificate_ = nullptr;
@@ -178,8 +178,6 @@ WebrtcCall::parse (const char *url, const char *certificate)
 
 WebrtcCall::~WebrtcCall ()
 {
-  g_cancellable_cancel (cancellable_);
-  g_object_unref (cancellable_);
   if (socket_)
     g_signal_handlers_disconnect_by_data (socket_, this);
   g_clear_object (&socket_);
@@ -227,7 +225,7 @@ WebrtcCall::connect ()
   g_signal_connect (message, "accept-certificate", GCallback (+accept), certificate_);
   const char *protocols[] = {"rangecast.v1", nullptr};
   soup_session_websocket_connect_async (session_, message, nullptr, const_cast<char **> (protocols),
-      G_PRIORITY_DEFAULT, cancellable_, on_connected, this);
+      G_PRIORITY_DEFAULT, nullptr, on_connected, this);
 }
 
 void
@@ -236,8 +234,6 @@ WebrtcCall::on_connected (GObject *session, GAsyncResult *result, gpointer user_
   g_autoptr (GError) error = nullptr;
   SoupWebsocketConnection *socket =
       soup_session_websocket_connect_finish (SOUP_SESSION (session), result, &error);
-  if (g_error_matches (error, G_IO_ERROR, G_IO_ERROR_CANCELLED))
-    return;
   auto self = static_cast<WebrtcCall *> (user_data);
   if (!socket) {
     GST_ELEMENT_ERROR (self->webrtc_, RESOURCE, OPEN_READ_WRITE,
@@ -290,9 +286,9 @@ WebrtcCall::receive (JsonObject *message)
     post (webrtc_, "call-left", "the other end left");
   if (type != "call")
     return;
-  if (const char *candidate = field ("candidate"))
-    g_signal_emit_by_name (webrtc_, "add-ice-candidate",
-        guint (json_object_get_int_member_with_default (message, "media", 0)), candidate);
+  if (field ("candidate") && field ("media"))
+    g_signal_emit_by_name (
+        webrtc_, "add-ice-candidate", guint (std::atoi (field ("media"))), field ("candidate"));
   for (const auto kind : {GST_WEBRTC_SDP_TYPE_OFFER, GST_WEBRTC_SDP_TYPE_ANSWER}) {
     const char *text = field (gst_webrtc_sdp_type_to_string (kind));
     GstSDPMessage *sdp = nullptr;

@@ -495,6 +495,7 @@ main (int argc, char **argv)
     good = runner.pipeline && run (runner);
   } while (std::exchange (runner.again, false) && good);
   runner.call.reset ();
+  g_clear_pointer (&runner.loop, g_main_loop_unref);
   gst_deinit (); /* tracers write now what they found */
   return good ? 0 : 1;
 }
