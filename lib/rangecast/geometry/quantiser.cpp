@@ -16,7 +16,6 @@ DepthQuantiser::set (std::uint16_t near, std::uint16_t far, int bits)
   near_ = near;
   far_ = far;
   step_ = double (range) / last;
-  is_offset_ = last == range;
   codes_.assign (65536, 0);
   depths_.resize (last + 1);
   for (std::uint32_t code = 0; code <= last; code++)

@@ -26,10 +26,6 @@ public:
   [[nodiscard]] std::uint16_t code (std::uint16_t depth) const { return codes_[depth]; }
   /** The depth of a code below codes(), depth units. */
   [[nodiscard]] std::uint16_t depth (std::uint16_t code) const { return depths_[code]; }
-  /** Depths of all codes. */
-  [[nodiscard]] const std::uint16_t *depths () const { return depths_.data (); }
-  /** Whether codes are depths less a constant, depth (0): there is a code for each depth unit. */
-  [[nodiscard]] bool is_offset () const { return is_offset_; }
   /** Number of codes; decoders refuse others. */
   [[nodiscard]] int codes () const { return static_cast<int> (depths_.size ()); }
   /** Greatest change of a depth, depth units, by quantisation and a change of its code by up to
@@ -41,7 +37,6 @@ public:
 private:
   std::uint16_t near_ = 0, far_ = 0;
   double step_ = 1;
-  bool is_offset_ = false;
   std::vector<std::uint16_t> codes_, depths_;
 };
 

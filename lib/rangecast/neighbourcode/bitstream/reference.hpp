@@ -43,17 +43,6 @@ public:
       return kNone;
     return ~row (line)[column];
   }
-  /** The inverted pixels of a row from column x on, of rows of stride() numbers; nullptr if not all
-   * of width x height pixels from there lie in the ROI. */
-  [[nodiscard]] const std::uint64_t *inverted (int x, int y, int width, int height) const
-  {
-    const int column = x - header_.roi.x, line = y - header_.roi.y;
-    if (!held_ || column < 0 || line < 0 || column + width > header_.roi.width ||
-        line + height > header_.roi.height)
-      return nullptr;
-    return row (line) + column;
-  }
-  [[nodiscard]] std::ptrdiff_t stride () const { return header_.roi.width; }
   /** Pixels of a row from column x on; `outside` outside the ROI. */
   void fetch (int x, int y, std::span<std::uint64_t> to, std::uint64_t outside = kNone) const;
 

@@ -24,57 +24,6 @@ shown_as (PixelCode code, const CompactQuantisers &quantisers, const PixelLimits
   return rgb | depth << 32;
 }
 
-/* A run of valid pixels as it goes into the image. Some more of the row, which has so many columns,
- * may be written, too: invalid ones as 0. */
-inline void
-show (const PixelCode *codes, std::size_t begin, std::size_t end, std::size_t columns,
-    const CompactQuantisers &quantisers, const PixelLimits &limits, std::uint16_t *depth,
-    Rgbx *colour)
-{
-  const std::uint16_t *const depths = quantisers.depth.depths (), near = depths[0];
-  if (quantisers.depth.is_offset ())
-    for (std::size_t x = begin; x < end; x++)
-      depth[x] = static_cast<std::uint16_t> (near + codes[x]);
-  else
-    for (std::size_t x = begin; x < end; x++)
-      depth[x] = depths[codes[x] & 0xffff];
-  std::size_t x = begin;
-  if (std::endian::native == std::endian::little && quantisers.colour.bits () == 8) {
-    /* Four pixels at once, see to_rgb(). */
-    typedef std::int16_t Four __attribute__ ((vector_size (32)));
-    typedef std::uint64_t Codes __attribute__ ((vector_size (32)));
-    typedef std::uint8_t Shown __attribute__ ((vector_size (16)));
-    constexpr std::size_t step = sizeof (Four) / sizeof (PixelCode);
-    const Four zero = {}, most = zero + 255;
-    for (; x < end && x + step <= columns; x += step) {
-      Four c;
-      std::memcpy (&c, codes + x, sizeof c);
-      const auto valid = reinterpret_cast<Four> (reinterpret_cast<Codes> (c) != kNoPixel);
-      const Four half = c >> 1;
-      /* From depth, Y, Co, Cg to R, G, B, 0. */
-      const Four y =
-          __builtin_shufflevector (c, zero, 1, 1, 1, 16, 5, 5, 5, 16, 9, 9, 9, 16, 13, 13, 13, 16);
-      const Four plus = __builtin_shufflevector (
-          c, zero, 2, 3, 16, 16, 6, 7, 16, 16, 10, 11, 16, 16, 14, 15, 16, 16);
-      const Four cg = __builtin_shufflevector (
-          half, zero, 3, 3, 3, 16, 7, 7, 7, 16, 11, 11, 11, 16, 15, 15, 15, 16);
-      const Four co = __builtin_shufflevector (
-          half, zero, 2, 16, 2, 16, 6, 16, 6, 16, 10, 16, 10, 16, 14, 16, 14, 16);
-      Four rgb = y - cg + (plus - co);
-      rgb = (rgb > 0 ? rgb : zero) & valid;
-      rgb = rgb < most ? rgb : most;
-      const Shown shown = __builtin_convertvector(rgb, Shown);
-      std::memcpy (static_cast<void *> (colour + x), &shown, sizeof shown);
-    }
-  }
-  for (; x < end; x++) {
-    auto rgbx = static_cast<std::uint32_t> (shown_as (codes[x], quantisers, limits));
-    if constexpr (std::endian::native == std::endian::big)
-      rgbx = __builtin_bswap32 (rgbx);
-    std::memcpy (static_cast<void *> (colour + x), &rgbx, sizeof rgbx);
-  }
-}
-
 inline void
 write_pixel (std::uint64_t shown, std::uint16_t &depth, Rgbx &colour)
 {
@@ -163,17 +112,6 @@ CompactDecoder::decode_run (PackedReader &slice_code, const CompactQuantisers &q
   return true;
 }
 
-/* predict() where all neighbours are valid, which is likely. */
-[[gnu::always_inline]] inline Components
-predict_between (PixelCode left, const PixelCode *upper, Components max)
-{
-  const Components l = components_of (left), u = components_of (upper[0]);
-  const Components mean = (2 * l + u + components_of (upper[1]) + 2) >> 2;
-  const Components plane = clamped (l + u - components_of (upper[-1]), Components{}, max);
-  const Components depth_only = {-1, 0, 0, 0};
-  return (mean & ~depth_only) | (plane & depth_only);
-}
-
 /* Reads the ends of alternating runs from begin to end, as rule R21 has it; the first may be empty.
  * @param expected  expected (x, value) is where the run from x on is expected to end
  * @param use       use (x, end, value) is called for each run */
@@ -195,23 +133,19 @@ decode_runs (Code &code, int begin, int end, const Expected &expected, const Use
   return true;
 }
 
-/* Reads which pixels of a row are valid as bits, and the ends of its runs. */
+/* Reads which pixels of a row are valid, and the ends of its runs. */
 template <class Code>
 bool
 CompactDecoder::decode_valid (Code &slice_code, int columns)
 {
   Code code = slice_code;
-  std::ranges::fill (valid_, std::uint32_t{0});
   runs_.clear ();
   const bool good = decode_runs (
-      code, 0, columns,
-      [&] (int x, bool value) { return bits_end (upper_valid_, x, value, columns); },
+      code, 0, columns, [&] (int x, bool value) { return run_end (upper_.valid (), x, value); },
       [&] (int x, int end, bool value) {
-        if (value)
-          set_bits (valid_, x, end);
+        std::fill_n (row_.valid ().begin () + x, end - x, std::uint8_t{value});
         runs_.push_back (end);
       });
-  std::swap (valid_, upper_valid_);
   slice_code = code;
   return good;
 }
@@ -283,11 +217,9 @@ CompactDecoder::make_run (
     } else {
       bad |= now > kCorrectedClass;
       const PixelClass *const around = upper_classes + x;
-      const bool all = (left_class != 0) & (around[-1] != 0) & (around[0] != 0) & (around[1] != 0);
       const PixelState states[] = {around[-1], around[0], around[1]};
       const Neighbours n = {{left, left_class}, upper + x, states + 1};
-      Components made =
-          all ? predict_between (left, upper + x, limits.max) : predict (n, last_, limits.max);
+      Components made = predict (n, last_, limits.max);
       const bool known = !Delta || can_predict (n, last_);
       if (now == kCorrectedClass)
         made = correct (made, *residuals++, steps, limits);
@@ -298,7 +230,6 @@ CompactDecoder::make_run (
     left_class = now;
   }
   last_ = left;
-  has_unknown_ |= unknown;
   return !bad && (Delta || !unknown);
 }
 
@@ -310,7 +241,6 @@ CompactDecoder::decode_entropy_row (EntropyReader &code, const CompactQuantisers
   if (!decode_valid (code, columns))
     return false;
   const EntropyRow row = entropy_.row (runs_);
-  has_unknown_ = false;
   return for_this_cpu ([&, width = static_cast<std::size_t> (columns)] {
     std::fill_n (row_.codes (), width, kNoPixel);
     std::fill_n (row.classes, width, PixelClass{0});
@@ -327,12 +257,9 @@ CompactDecoder::decode_entropy_row (EntropyReader &code, const CompactQuantisers
       if (!sound)
         return;
       points += end - begin;
-      if (!Delta || !has_unknown_)
-        show (row_.codes (), begin, end, width, quantisers, limits_, depth, colour);
-      else
-        for (std::size_t x = begin; x < end; x++)
-          if (row_.codes ()[x] != kNoPixel)
-            write_pixel (shown_as (row_.codes ()[x], quantisers, limits_), depth[x], colour[x]);
+      for (std::size_t x = begin; x < end; x++)
+        if (!Delta || row_.codes ()[x] != kNoPixel)
+          write_pixel (shown_as (row_.codes ()[x], quantisers, limits_), depth[x], colour[x]);
     });
     return sound;
   });
@@ -379,10 +306,6 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
   row_.reset (columns, 0);
   upper_.reset (columns, 0);
   runs_.reserve (most + 1);
-  for (auto *valid : {&valid_, &upper_valid_}) {
-    valid->reserve (bit_words (most));
-    valid->assign (bit_words (columns), 0);
-  }
   if constexpr (Delta) {
     earlier_codes_.reserve (most);
     motions_.reserve (most / kMotionBlock + 2);
@@ -409,20 +332,17 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
         return false;
       write_row (row_.shown (), columns, depth, colour);
     }
-    const auto is_valid = [&] (std::size_t x) {
-      return kIsEntropy ? entropy_.now.classes[x + 1] != 0 : row_.states ()[x] != 0;
-    };
     if constexpr (Delta)
       for (int x = 0; x < header.columns; x++)
-        if (is_valid (static_cast<std::size_t> (x)) && row_.codes ()[x] == kNoPixel) {
+        if (row_.valid ()[static_cast<std::size_t> (x)] && row_.codes ()[x] == kNoPixel) {
           show_older (reference, image, header.first_column + x, image_row);
           unknown++;
         }
     decoded.points += points - unknown;
     decoded.unknown += unknown;
     if (reference.now)
-      reference.now->keep (header.roi.x + header.first_column, header.roi.y + image_row,
-          Delta ? row_.as_reference (columns, is_valid) : row_.as_key_reference (columns));
+      reference.now->keep (
+          header.roi.x + header.first_column, header.roi.y + image_row, row_.as_reference ());
     std::swap (row_, upper_);
     if constexpr (kIsEntropy)
       std::swap (entropy_.now, entropy_.upper);

@@ -49,14 +49,12 @@ private:
       PackedReader &code, const Neighbours &n, bool corrected, CodedPixel &pixel);
 
   CompactRow row_, upper_;
-  PixelBits valid_, upper_valid_;        /* of the row and of the one above */
   std::vector<int> runs_;                /* ends of the row's runs */
   std::vector<PixelCode> earlier_codes_; /* pixels of the earlier frame set for the row */
   std::vector<BlockMotion> motions_;     /* of the blocks that the row touches */
   std::vector<std::uint8_t> bytes_;      /* of the slice, and padding */
   EntropyModel model_{};
   EntropyRowMemory entropy_;
-  bool has_unknown_ = false; /* the row, pixels that depend on data that was not received */
   Components steps_{};
   PixelLimits limits_;
   PixelCode last_ = kNoPixel;

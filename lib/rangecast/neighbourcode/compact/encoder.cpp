@@ -138,37 +138,6 @@ CompactEncoder::load_earlier (int y)
   }
 }
 
-/* Finds for each pixel of a run the first of the three above that is near enough, or kPredict. */
-inline void
-CompactEncoder::find_upper (std::size_t begin, std::size_t end)
-{
-  /* Two keys, compared as four halves: available on every processor. */
-  typedef std::uint64_t Keys __attribute__ ((vector_size (16)));
-  typedef std::int32_t Halves __attribute__ ((vector_size (16)));
-  constexpr std::size_t step = sizeof (Keys) / sizeof (PixelKey);
-  const auto load = [] (const std::uint64_t *from) {
-    Keys keys;
-    std::memcpy (&keys, from, sizeof keys);
-    return keys;
-  };
-  const PixelKey *const upper = upper_.shown (), *const pixels = own_.data ();
-  std::uint64_t *const others = others_.data ();
-  const PixelKey bias = bias_;
-  for (std::size_t x = begin; x < end; x += step) {
-    const Keys own = load (pixels + x);
-    const auto first = [&] (const PixelKey *other, std::uint64_t choice, Keys next) {
-      const auto halves =
-          reinterpret_cast<Halves> (near_bits (own, load (other), bias) ^ kNearMask) == 0;
-      const auto both = halves & __builtin_shufflevector (halves, halves, 1, 0, 3, 2);
-      const auto mask = reinterpret_cast<Keys> (both);
-      return (mask & choice) | (~mask & next);
-    };
-    const Keys right = first (upper + x + 1, kTakeUpperRight, Keys{} + std::uint64_t{kPredict});
-    const Keys choice = first (upper + x - 1, kTakeUpperLeft, first (upper + x, kTakeUpper, right));
-    std::memcpy (others + x, &choice, sizeof choice);
-  }
-}
-
 /* Prediction, rounded residual and the decoder's result. */
 inline CompactEncoder::FullPixel
 CompactEncoder::make_full (PixelKey own, const Neighbours &n) const
@@ -295,14 +264,11 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
   const PixelCode *const upper_codes = upper_.codes ();
   const PixelState *const upper_states = upper_.states ();
   const PixelKey *const upper_keys = upper_.shown (), *const own = own_.data ();
-  const std::uint64_t *const others = others_.data ();
   [[maybe_unused]] const std::uint8_t *const earlier = row_.earlier ().data ();
   const PixelKey bias = bias_;
   CodedPixel left;
   PixelKey left_key = kInvalidKey;
   Code code = slice_code;
-  if constexpr (!Best)
-    find_upper (begin, end);
   for (std::size_t x = begin; x < end; x++) {
     const Neighbours n = {left, upper_codes + x, upper_states + x};
     FullPixel full{};
@@ -325,8 +291,14 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
       other = static_cast<std::uint64_t> (best);
       take_left = zero_mask (other);
     } else {
-      take_left = zero_mask (near_bits (own[x], left_key, bias) ^ kNearMask);
-      other = others[x];
+      const auto near = [&] (PixelKey key) {
+        return zero_mask (near_bits (own[x], key, bias) ^ kNearMask);
+      };
+      take_left = near (left_key);
+      other = select (near (upper_keys[x + 1]), kTakeUpperRight, kPredict);
+      other = select (near (upper_keys[x]), kTakeUpper, other);
+      other =
+          select (near (upper_keys[static_cast<std::ptrdiff_t> (x) - 1]), kTakeUpperLeft, other);
     }
     const std::uint64_t chosen = select (take_left, kTakeLeft, other);
     /* Write the choice, or the pixel in full. */
@@ -510,8 +482,7 @@ CompactEncoder::resize (int columns)
   upper_.reserve (most);
   row_.reset (n, kInvalidKey);
   upper_.reset (n, kInvalidKey);
-  own_.resize (std::max (own_.size (), most + CompactRow::kMargin));
-  others_.resize (own_.size ());
+  own_.resize (std::max (own_.size (), most));
   earlier_codes_.resize (own_.size ());
   earlier_keys_.resize (own_.size ());
   runs_.reserve (most + 1);
@@ -564,9 +535,8 @@ CompactEncoder::code_rows (
         return false;
     }
     if (reference_.now)
-      reference_.now->keep (header_.roi.x + header_.first_column, header_.roi.y + y,
-          row_.as_reference (static_cast<std::size_t> (columns_),
-              [states = row_.states ()] (std::size_t x) { return states[x] != 0; }));
+      reference_.now->keep (
+          header_.roi.x + header_.first_column, header_.roi.y + y, row_.as_reference ());
     header_.rows++;
     std::swap (row_, upper_);
     if constexpr (Code::kByRow)

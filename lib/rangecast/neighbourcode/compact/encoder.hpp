@@ -81,7 +81,6 @@ private:
       const Code &code, std::size_t x, const Neighbours &n, bool earlier, FullPixel &full);
   [[nodiscard, gnu::always_inline]] FullPixel make_full (PixelKey own, const Neighbours &n) const;
   [[gnu::always_inline]] void load_row (const ConstRangeImage &image, int y);
-  [[gnu::always_inline]] void find_upper (std::size_t begin, std::size_t end);
   void load_earlier (int y);
   void find_motions (const ConstRangeImage &image, int y, const RowBand &band);
   void resize (int columns);
@@ -105,7 +104,6 @@ private:
 
   CompactRow row_, upper_;
   std::vector<PixelKey> own_;            /* the quantised row */
-  std::vector<std::uint64_t> others_;    /* for each pixel, the first near one of those above */
   std::vector<PixelCode> earlier_codes_; /* the row in the earlier frame set */
   std::vector<PixelKey> earlier_keys_;
   std::vector<BlockMotion> motions_; /* of the blocks that the row touches */

@@ -123,7 +123,6 @@ struct EntropyRow {
   const PixelClass *upper_classes;
   Activity *activities; ///< kNoActivity of invalid pixels; of valid ones, 0 before the residuals
   const Activity *upper_activities;
-  std::uint8_t *contexts;    ///< memory, see upper_context()
   int *corrected;            ///< memory: columns of the pixels that have residuals
   Components *residuals;     ///< theirs, in that order
   std::span<const int> runs; ///< ends of runs of invalid and valid pixels by turns
@@ -147,7 +146,6 @@ struct EntropyRowMemory {
     }
   };
   Pixels now, upper;
-  std::vector<std::uint8_t> contexts;
   std::vector<int> corrected;
   std::vector<Components> residuals;
 
@@ -159,13 +157,12 @@ struct EntropyRowMemory {
       pixels->reset (columns);
     }
     corrected.resize (std::max (corrected.size (), most_columns + 1));
-    contexts.resize (corrected.size ());
     residuals.resize (corrected.size ());
   }
   [[nodiscard]] EntropyRow row (std::span<const int> runs)
   {
     return {now.classes.data () + 1, upper.classes.data () + 1, now.activities.data () + 1,
-        upper.activities.data () + 1, contexts.data (), corrected.data (), residuals.data (), runs};
+        upper.activities.data () + 1, corrected.data (), residuals.data (), runs};
   }
 };
 
@@ -176,17 +173,6 @@ for_valid_runs (std::span<const int> runs, const Work &work)
 {
   for (std::size_t i = 1; i < runs.size (); i += 2)
     work (runs[i - 1], runs[i]);
-}
-
-/** Makes contexts. */
-[[gnu::always_inline]] inline void
-find_contexts (const EntropyRow &row)
-{
-  const PixelClass *const upper = row.upper_classes;
-  std::uint8_t *const contexts = row.contexts;
-  const int end = row.runs.back ();
-  for (int x = 0; x < end; x++)
-    contexts[x] = upper_context (upper[x], upper[x + 1]);
 }
 
 /** Whether a pixel that begins a run has no neighbour, so that its choice is not coded in slices
@@ -245,22 +231,16 @@ public:
     EntropyModel *const model = model_;
     std::size_t count = 0;
     unsigned place = 0;
-    find_contexts (row);
     for_valid_runs (row.runs, [&] (int begin, int end) {
       PixelClass left = 0;
-      int x = begin;
-      const auto move_on = [&] {
+      for (int x = begin; x < end; x++) {
+        if (Delta || x > begin || !is_alone (row.upper_classes + x))
+          coder.code (place++ % kRansStates,
+              model->choices[left + upper_context (row.upper_classes[x], row.upper_classes[x + 1])],
+              row.classes[x] - std::size_t{1});
         left = row.classes[x];
         row.corrected[count] = x;
         count += left == kCorrectedClass;
-        x++;
-      };
-      if (!Delta && is_alone (row.upper_classes + x))
-        move_on ();
-      while (x < end) {
-        coder.code (place++ % kRansStates, model->choices[left + row.contexts[x]],
-            row.classes[x] - std::size_t{1});
-        move_on ();
       }
     });
     for (std::size_t i = 0; i < count; i++)
@@ -407,27 +387,19 @@ public:
     EntropyModel *const model = model_;
     std::size_t count = 0;
     unsigned place = 0;
-    find_contexts (row);
     for_valid_runs (row.runs, [&] (int begin, int end) {
       std::fill (row.activities + begin, row.activities + end, Activity{0});
-      std::size_t twice_left = 0;
-      int x = begin;
-      const auto move_on = [&] {
-        row.classes[x] = static_cast<PixelClass> (twice_left / 2);
+      std::size_t left = 0;
+      for (int x = begin; x < end; x++) {
+        if (!Delta && x == begin && is_alone (row.upper_classes + x))
+          left = kCorrectedClass;
+        else
+          left = 1 + coder.code (place++ % kRansStates,
+                         model->choices[left + upper_context (row.upper_classes[x],
+                                                   row.upper_classes[x + 1])]);
+        row.classes[x] = static_cast<PixelClass> (left);
         row.corrected[count] = x;
-        count += twice_left == 2 * kCorrectedClass;
-        x++;
-      };
-      if (!Delta && is_alone (row.upper_classes + x)) {
-        twice_left = 2 * kCorrectedClass;
-        move_on ();
-      }
-      while (x < end) {
-        auto *const first = reinterpret_cast<char *> (model->choices + row.contexts[x]);
-        auto &choices =
-            *reinterpret_cast<ChoiceModel *> (first + twice_left * (sizeof (ChoiceModel) / 2));
-        twice_left = coder.code (place++ % kRansStates, choices);
-        move_on ();
+        count += left == kCorrectedClass;
       }
     });
     bool good = true;
@@ -448,10 +420,8 @@ private:
         row.activities[x - 1], row.upper_activities[x], row.upper_activities[x + 1]);
     std::size_t symbols[kComponents], largest = 0;
     for (unsigned i = 0; i < kComponents; i++) {
-      symbols[i] = coder.code (i % kRansStates,
-                       model.residuals[i][kResidualContexts[context >> 8 * i & 0xff]]) /
-                       2 -
-                   1;
+      symbols[i] = coder.code (
+          i % kRansStates, model.residuals[i][kResidualContexts[context >> 8 * i & 0xff]]);
       largest = std::max (largest, symbols[i]);
     }
     Components made = {kSmallNumbers[symbols[0]], kSmallNumbers[symbols[1]],
@@ -489,7 +459,7 @@ private:
   }
   bool number (NumberModel &model, std::int32_t &number)
   {
-    const std::size_t symbol = coder_.code (0, model) / 2 - 1;
+    const std::size_t symbol = coder_.code (0, model);
     if (symbol >= kFirstEscape)
       return escape (coder_, 0, symbol, number);
     number = kSmallNumbers[symbol];

@@ -10,64 +10,18 @@
 namespace rangecast {
 namespace {
 
-/* Two pixels side by side. */
-typedef std::int16_t PixelHalves __attribute__ ((vector_size (16)));
-typedef std::uint16_t PixelCodes __attribute__ ((vector_size (16)));
-
-PixelHalves
-load_two (const PixelCode *from)
+/* A pixel between four, upper left, upper right, lower left and lower right, at so many quarters to
+ * the right and down: mixes them if all are valid and their depths are close to the first one's,
+ * and else takes the nearest. */
+[[gnu::always_inline]] inline Components
+mix (const Components (&taps)[4], int right, int down, std::int32_t max_gap)
 {
-  PixelHalves pixels;
-  std::memcpy (&pixels, from, sizeof pixels);
-  return pixels;
-}
-
-/* One number of each of two pixels in all their four. */
-template <int kAt>
-PixelHalves
-spread (PixelHalves v)
-{
-  if constexpr (std::endian::native == std::endian::big)
-    return __builtin_shufflevector (
-        v, v, 3 - kAt, 3 - kAt, 3 - kAt, 3 - kAt, 7 - kAt, 7 - kAt, 7 - kAt, 7 - kAt);
-  return __builtin_shufflevector (v, v, kAt, kAt, kAt, kAt, kAt + 4, kAt + 4, kAt + 4, kAt + 4);
-}
-
-/* Where a row lies between the pixels of an earlier frame set: the four around each of its pixels,
- * which may be the same, and their weights. */
-struct Taps {
-  const PixelCode *pixels[4]; /* upper left, upper right, lower left, lower right */
-  const PixelCode *nearest;
-  std::int16_t weights[4]; /* sixteenths */
-};
-
-/* Mixes the four pixels if all are valid and their depths are close to the first one's, and else
- * takes the nearest. */
-[[gnu::always_inline]] inline void
-mix (const Taps &taps, std::int16_t max_gap, std::span<PixelCode> to)
-{
-  const PixelHalves none = PixelHalves{} - 1;
-  const PixelCodes gap = PixelCodes{} + static_cast<std::uint16_t> (max_gap);
-  for (std::size_t i = 0; i < to.size (); i += 2) {
-    const PixelHalves first = load_two (taps.pixels[0] + i);
-    PixelHalves sum = PixelHalves{} + 8, far = {}, negative = first, unknown = {};
-    unknown |= spread<1> (first) == none;
-    for (int t = 1; t < 4; t++) {
-      const PixelHalves other = load_two (taps.pixels[t] + i), difference = other - first;
-      sum += difference * taps.weights[t];
-      const auto a = reinterpret_cast<PixelCodes> (first), b = reinterpret_cast<PixelCodes> (other);
-      far |= (a > b ? a - b : b - a) > gap; /* only that of depth counts */
-      negative |= other;
-      unknown |= spread<1> (other) == none;
-    }
-    const PixelHalves mixed = first + (sum >> 4);
-    const PixelHalves apart = spread<0> (far) | (spread<1> (negative) < 0);
-    const PixelHalves nearest = load_two (taps.nearest + i);
-    const PixelHalves empty = unknown | (spread<1> (nearest) < 0);
-    const PixelHalves result =
-        (((mixed & ~apart) | (nearest & apart)) & ~(empty & apart)) | (empty & apart);
-    std::memcpy (&to[i], &result, std::min<std::size_t> (2, to.size () - i) * sizeof (PixelCode));
-  }
+  const auto near = [&] (int i) { return std::abs (taps[i][0] - taps[0][0]) <= max_gap; };
+  if (!((taps[0] | taps[1] | taps[2] | taps[3])[1] >= 0 && near (1) && near (2) && near (3)))
+    return taps[(right >= 2) + 2 * (down >= 2)];
+  const Components upper = 4 * taps[0] + right * (taps[1] - taps[0]);
+  const Components lower = 4 * taps[2] + right * (taps[3] - taps[2]);
+  return (4 * upper + down * (lower - upper) + 8) >> 4;
 }
 
 /* Pixels of a block's row. */
@@ -81,13 +35,15 @@ fetch_part (const ReferencePlane &plane, int x, int y, const BlockMotion &m,
   for (int i = 0; i < 1 + (down > 0); i++)
     plane.fetch (left, top + i, std::span (rows[i]).first (to.size () + 1), kEmptyPixel);
   const PixelCode *const upper = rows[0], *const lower = rows[down > 0];
-  const int next = right > 0;
-  const auto weight = [] (int a, int b) { return static_cast<std::int16_t> (a * b); };
-  const Taps taps = {{upper, upper + next, lower, lower + next},
-      (down >= 2 ? lower : upper) + (right >= 2),
-      {weight (4 - right, 4 - down), weight (right, 4 - down), weight (4 - right, down),
-          weight (right, down)}};
-  mix (taps, static_cast<std::int16_t> (scale.max_gap), to);
+  const std::size_t next = right > 0;
+  for (std::size_t i = 0; i < to.size (); i++) {
+    const PixelCode codes[] = {upper[i], upper[i + next], lower[i], lower[i + next]};
+    Components taps[4];
+    std::ranges::transform (codes, taps, components_of);
+    const Components mixed = mix (taps, right, down, scale.max_gap);
+    const bool unknown = std::ranges::find (codes, kNoPixel) != std::end (codes);
+    to[i] = unknown || mixed[1] < 0 ? kNoPixel : pack_components (mixed);
+  }
 }
 
 } // namespace
@@ -170,38 +126,16 @@ MotionSearch::pair_up (const Pictures &pictures, const Area &area, const BlockMo
   const ReferencePlane &before = pictures.before;
   const int right = m.dx & 3, down = m.dy & 3, next = right > 0, below = down > 0;
   const int left = m.dx >> 2, top = m.dy >> 2;
-  const std::uint64_t *const inside =
-      before.inverted (area.x + left, area.y + top, area.width + next, area.height + below);
-  const std::ptrdiff_t stride = before.stride ();
-  const int nearest = (right >= 2) + 2 * (down >= 2);
   for (const Sample &s : samples_) {
     const int x = s.x + left, y = s.y + top;
     if (y < area.first_y || y + below >= area.end_y)
       continue;
     Components taps[4];
-    if (inside) {
-      const std::uint64_t *const at = inside + (s.y - area.y) * stride + (s.x - area.x);
-      const std::uint64_t *const lower = at + below * stride;
-      taps[0] = components_of (~at[0]);
-      taps[1] = components_of (~at[next]);
-      taps[2] = components_of (~lower[0]);
-      taps[3] = components_of (~lower[next]);
-    } else {
-      for (int t = 0; t < 4; t++)
-        taps[t] = components_of (before.at (x + (t & 1 & next), y + (t >> 1 & below)));
-    }
-    const Components upper = 4 * taps[0] + right * (taps[1] - taps[0]);
-    const Components lower = 4 * taps[2] + right * (taps[3] - taps[2]);
-    Components mixed = (4 * upper + down * (lower - upper) + 8) >> 4;
-    const std::int32_t first = taps[0][0], gap = pictures.scale.max_gap;
-    const bool is_one =
-        ((taps[0] | taps[1] | taps[2] | taps[3])[1] >= 0) & (std::abs (taps[1][0] - first) <= gap) &
-        (std::abs (taps[2][0] - first) <= gap) & (std::abs (taps[3][0] - first) <= gap);
-    if (!is_one) {
-      mixed = taps[nearest];
-      if (mixed[1] < 0)
-        continue;
-    }
+    for (int t = 0; t < 4; t++)
+      taps[t] = components_of (before.at (x + (t & 1 & next), y + (t >> 1 & below)));
+    const Components mixed = mix (taps, right, down, pictures.scale.max_gap);
+    if (mixed[1] < 0)
+      continue;
     const Components difference = s.own - mixed;
     const FloatComponents error = __builtin_convertvector(difference, FloatComponents);
     const FloatComponents squares = error * error * colour_weights_;

@@ -56,11 +56,9 @@ near_bias (std::uint32_t depth_threshold, std::uint32_t colour_threshold)
   return kNearMask + key_of (depth_threshold, colour_threshold * 0x010101u);
 }
 
-/** kNearMask if a valid pixel is near another one, which may be invalid.
- *  @tparam Keys  numbers or vectors of them */
-template <class Keys>
-constexpr Keys
-near_bits (Keys own, Keys other, PixelKey bias)
+/** kNearMask if a valid pixel is near another one, which may be invalid. */
+constexpr PixelKey
+near_bits (PixelKey own, PixelKey other, PixelKey bias)
 {
   return (own + bias - other) & (other + bias - own) & kNearMask;
 }

@@ -137,18 +137,18 @@ public:
       refill (state);
   }
 
-  /** @return twice the symbol plus 2 */
+  /** @return the symbol */
   template <int kSymbols>
   [[gnu::always_inline]] std::size_t code (unsigned state, SymbolModel<kSymbols> &model)
   {
     std::uint64_t &x = states_[state];
     const auto number = static_cast<std::uint32_t> (x & (kFrequencySum - 1));
-    const std::size_t twice = model.find (number), symbol = twice / 2 - 1;
+    const std::size_t symbol = model.find (number);
     const SymbolInterval interval = model.interval (symbol);
     model.learn (symbol);
     x = interval.frequency * (x >> kFrequencyBits) + number - interval.start;
     refill (x);
-    return twice;
+    return symbol;
   }
   std::uint32_t raw (unsigned state, int bits)
   {
