@@ -63,22 +63,31 @@ def main():
         source.set_property(name, value)
     failed = pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE
     duration = int(Gst.SECOND / options.fps) if options.fps else Gst.CLOCK_TIME_NONE
-    message = None
-    for number in range(options.frames):
-        while not (failed or message) and source.get_property("current-level-buffers") >= 2:
-            message = bus.timed_pop_filtered(Gst.SECOND // 100, Gst.MessageType.ERROR)  # waits for room, or an error
-        if failed or message:
-            break
-        pts = Gst.CLOCK_TIME_NONE if options.live else int(number * Gst.SECOND / options.fps)
-        buffer = GstRange.new_buffer(caps, capture(number), pts, duration)
-        if source.emit("push-buffer", buffer) != Gst.FlowReturn.OK:
-            break  # the error is on the bus
-    source.emit("end-of-stream")
-    message = message or bus.timed_pop_filtered(Gst.CLOCK_TIME_NONE, Gst.MessageType.EOS | Gst.MessageType.ERROR)
-    pipeline.set_state(Gst.State.NULL)
+    message, status = None, 0
+    try:
+        for number in range(options.frames):
+            while not (failed or message) and source.get_property("current-level-buffers") >= 2:
+                message = bus.timed_pop_filtered(Gst.SECOND // 100, Gst.MessageType.ERROR)  # waits for room, or an error
+            if failed or message:
+                break
+            pts = Gst.CLOCK_TIME_NONE if options.live else int(number * Gst.SECOND / options.fps)
+            buffer = GstRange.new_buffer(caps, capture(number), pts, duration)
+            if source.emit("push-buffer", buffer) != Gst.FlowReturn.OK:
+                break  # the error is on the bus
+    except KeyboardInterrupt:
+        status = 130
+    try:
+        source.emit("end-of-stream")
+        while not message:  # in steps, between which Ctrl-C counts
+            message = bus.timed_pop_filtered(Gst.SECOND // 10, Gst.MessageType.EOS | Gst.MessageType.ERROR)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    finally:
+        pipeline.set_state(Gst.State.NULL)
     if message.type == Gst.MessageType.ERROR:
         error, details = message.parse_error()
         sys.exit(f"frame_source.py: {error.message} {details or ''}")
+    sys.exit(status)
 
 
 if __name__ == "__main__":

@@ -62,25 +62,29 @@ def main():
     pipeline = Gst.parse_launch(f"{options.source} ! video/x-range ! appsink name=frames sync=false max-buffers=2")
     sink, bus = pipeline.get_by_name("frames"), pipeline.get_bus()
     started = pipeline.set_state(Gst.State.PLAYING) != Gst.StateChangeReturn.FAILURE
-    count, message = 0, None
-    while started and count < options.frames and not message and not sink.get_property("eos"):
-        if not (sample := sink.emit("try-pull-sample", Gst.SECOND // 10)):
-            message = bus.pop_filtered(Gst.MessageType.ERROR)
-            continue
-        views = GstRange.map_views(sample)
-        points, colours = (np.concatenate(parts) for parts in zip(*map(world_points, views)))
-        middle = "centre {:.3f} {:.3f} {:.3f} m".format(*points.mean(axis=0)) if len(points) else "empty"
-        print(f"{Gst.TIME_ARGS(sample.get_buffer().pts)}: {len(views)} views, {len(points)} points, {middle}")
-        count += 1
+    count, message, status = 0, None, 0
+    try:
+        while started and count < options.frames and not message and not sink.get_property("eos"):
+            if not (sample := sink.emit("try-pull-sample", Gst.SECOND // 10)):
+                message = bus.pop_filtered(Gst.MessageType.ERROR)
+                continue
+            views = GstRange.map_views(sample)
+            points, colours = (np.concatenate(parts) for parts in zip(*map(world_points, views)))
+            middle = "centre {:.3f} {:.3f} {:.3f} m".format(*points.mean(axis=0)) if len(points) else "empty"
+            print(f"{Gst.TIME_ARGS(sample.get_buffer().pts)}: {len(views)} views, {len(points)} points, {middle}")
+            count += 1
+    except KeyboardInterrupt:
+        status = 130
     message = message or bus.pop_filtered(Gst.MessageType.ERROR)
     pipeline.set_state(Gst.State.NULL)
     if message:
         error, details = message.parse_error()
         sys.exit(f"frames.py: {error.message} {details or ''}")
     if not count:
-        sys.exit("frames.py: --source: no frame set came")
+        sys.exit(status or "frames.py: --source: no frame set came")
     if options.save:
         save(options.save, points, colours)
+    sys.exit(status)
 
 
 if __name__ == "__main__":

@@ -181,3 +181,23 @@ test_frame_source_is_drawn () {
   $python "$examples/frame_source.py" --frames 5 --live --sink "rangealign ! striprender ! video/x-raw(memory:GLMemory),width=160,height=120 ! gldownload ! videoconvert ! video/x-raw,format=RGB ! filesink location=$PWD/pictures.rgb"
   expect_file pictures.rgb $((160 * 120 * 3))
 }
+
+# usage: interrupt FILE program...: Ctrl-C once FILE has bytes
+interrupt () {
+  set -m # else bash starts it with SIGINT ignored
+  $python -u "${@:2}" >interrupted.txt 2>&1 &
+  set +m
+  until_true 60 test -s "$1"
+  kill -INT $!
+  local status=0
+  wait $! || status=$?
+  [ $status = 130 ] && ! grep -qE "Traceback|CRITICAL|WARN" interrupted.txt || fail "$status: $(cat interrupted.txt)"
+}
+
+test_examples_end_at_an_interrupt_and_keep_what_they_have () {
+  need_python
+  interrupt wave.rcnc "$examples/frame_source.py" --frames 1000000 --sink "neighbourcodeenc ! filesink buffer-mode=unbuffered location=$PWD/wave.rcnc"
+  gst-launch-1.0 -q filesrc location=wave.rcnc ! neighbourcodeparse ! neighbourcodedec ! fakesink
+  interrupt interrupted.txt "$examples/frames.py" --frames 1000000 --save "$PWD/points.npy"
+  expect_file points.npy 1000
+}
