@@ -369,7 +369,8 @@ web_properties ()
   using P = PropertyTable<Settings>;
   static P table = {
       P::text<&Settings::address> ("address", "Address",
-          "Address or name to listen at; one that other machines can reach needs token, token-file or "
+          "Address or name to listen at; one that other machines can reach needs token, token-file "
+          "or "
           "anonymous",
           kMutableReady),
       P::number<&Settings::port> (
@@ -395,6 +396,10 @@ web_properties ()
       P::text<&Settings::origins> ("origins", "Origins",
           "Origins (https://HOST:PORT) of other servers' pages that may connect, separated by "
           "spaces",
+          kMutableReady),
+      P::text<&Settings::frame_ancestors> ("frame-ancestors", "Frame ancestors",
+          "Origins (https://HOST:PORT) whose pages may show this one in a frame, separated by "
+          "spaces; *: all; null: none",
           kMutableReady),
       P::number<&Settings::max_clients> (
           "max-clients", "Max clients", "Maximum number of clients", 1, 10000, kMutableReady),

@@ -60,7 +60,8 @@ is_origin (std::string_view text)
   const auto slashes = text.find ("://");
   const std::string_view scheme = text.substr (0, slashes);
   return slashes != text.npos && (scheme == "http" || scheme == "https") &&
-         slashes + 3 < text.size () && text.find_first_of ("/@?#", slashes + 3) == text.npos;
+         slashes + 3 < text.size () &&
+         text.find_first_of ("/@?#;,\t\r\n", slashes + 3) == text.npos;
 }
 
 /* Whether the list, separated by spaces, has the origin. */
@@ -126,11 +127,15 @@ Server::check_settings () const
     return {StatusCode::kBadValue, "private-key: set certificate, too"};
   if (settings_.anonymous && settings_.has_token ())
     return {StatusCode::kBadValue, "anonymous: set it without token and token-file"};
-  g_auto (GStrv) origins = g_strsplit (settings_.origins.c_str (), " ", -1);
-  for (gchar **origin = origins; *origin; origin++)
-    if (**origin && !is_origin (*origin))
-      return {StatusCode::kBadValue, "origins: '" + std::string (*origin) +
-                                         "' is not https://HOST[:PORT] or http://HOST[:PORT]"};
+  for (const bool frames : {false, true}) {
+    const std::string &list = frames ? settings_.frame_ancestors : settings_.origins;
+    g_auto (GStrv) origins = g_strsplit (list.c_str (), " ", -1);
+    for (gchar **origin = origins; *origin && !(frames && list == "*"); origin++)
+      if (**origin && !is_origin (*origin))
+        return {StatusCode::kBadValue, std::string (frames ? "frame-ancestors" : "origins") +
+                                           ": '" + *origin +
+                                           "' is not https://HOST[:PORT] or http://HOST[:PORT]"};
+  }
   const std::string index = settings_.root + "/index.html";
   if (!g_file_test (index.c_str (), G_FILE_TEST_IS_REGULAR))
     return {
@@ -366,10 +371,13 @@ Server::answer (SoupServerMessage *message, const std::string &path)
   soup_message_headers_append (headers, "Cache-Control", "no-cache");
   soup_message_headers_append (headers, "X-Content-Type-Options", "nosniff");
   soup_message_headers_append (headers, "Referrer-Policy", "no-referrer");
+  const std::string &ancestors = settings_.frame_ancestors;
   soup_message_headers_append (headers, "Content-Security-Policy",
-      "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; "
-      "img-src 'self' data: blob:; media-src blob:; connect-src *; object-src 'none'; base-uri "
-      "'none'; frame-ancestors 'none'");
+      ("default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' "
+       "'unsafe-inline'; img-src 'self' data: blob:; media-src blob:; connect-src *; object-src "
+       "'none'; base-uri 'none'; frame-ancestors " +
+          (ancestors.empty () ? "'none'" : ancestors))
+          .c_str ());
   const char *method = soup_server_message_get_method (message);
   if (method != SOUP_METHOD_GET && method != SOUP_METHOD_HEAD)
     return soup_server_message_set_status (message, SOUP_STATUS_METHOD_NOT_ALLOWED, nullptr);

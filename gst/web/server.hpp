@@ -25,7 +25,7 @@ struct Settings {
   std::string certificate, private_key; ///< PEM files; empty: no TLS
   std::string token, token_file;
   bool anonymous = false;
-  std::string origins; ///< separated by spaces
+  std::string origins, frame_ancestors; ///< separated by spaces
   guint max_clients = 64;
   guint window = 3;          ///< frame sets
   std::string stats_address; ///< udp://HOST:PORT; empty: none

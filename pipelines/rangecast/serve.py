@@ -26,6 +26,7 @@ def add_serve(parser):
     parser.add_argument("--private-key", type=options.existing_file, metavar="PEM", help="of the certificate (default: in the same file)")
     parser.add_argument("--title", metavar="TEXT", help="title of the page")
     parser.add_argument("--origins", metavar="LIST", help="origins of other servers' pages that may connect, e.g. https://example.org")
+    parser.add_argument("--frame-ancestors", metavar="LIST", help="origins whose pages may show this one in a frame (iframe), or *")
     parser.add_argument("--stats", type=options.port, metavar="PORT", help="UDP port for statistics of all hosts, for the page /rig: run them with "
                         "RANGECAST_STATS=udp://THIS-MACHINE:PORT")  # fmt: skip
     options.add(parser, "--clock")
@@ -72,7 +73,8 @@ def build_serve(args):
     if args.certificate:
         launch.add(f"certificate={args.certificate}", f"private-key={args.private_key or args.certificate}")
     given = None if args.private_tokens else args.token
-    for name, value in (("token", given), ("token-file", args.private_tokens or args.token_file), ("origins", args.origins)):
+    for name, value in (("token", given), ("token-file", args.private_tokens or args.token_file), ("origins", args.origins),
+                        ("frame-ancestors", args.frame_ancestors)):  # fmt: skip
         if value:
             launch.add(f"{name}={value}")
     if args.title:

@@ -126,7 +126,8 @@ GST_START_TEST (test_wrong_settings_are_named)
       {"token-file=/nonexistent", "token-file: there is no file"},
       {"token=abc anonymous=true", "anonymous: set it without token"},
       {"origins=\"https://b.example:8443 foo\"", "'foo' is not"},
-      {"origins=ftp://a.example", "'ftp://a.example' is not"},
+      {"origins=ftp://a.example", "'ftp://a.example' is not"}, {"origins=*", "'*' is not"},
+      {"frame-ancestors=\"https://a.example;script-src *\"", "frame-ancestors: 'https://a.exam"},
       {"origins=https://a.example/page", "'https://a.example/page' is not"},
       {"root=/nonexistent", "root: name the folder"}, {"root=" + folder.path, folder.path}};
   for (const auto &[properties, error] : cases)
@@ -174,6 +175,19 @@ GST_START_TEST (test_page_files_are_served_with_their_types)
     const std::string head = get (sink.port (), one.path, "HEAD");
     fail_unless_contains (head, "HTTP/1.1 200");
     fail_if (head.find (contents) != head.npos, "%s", head.c_str ());
+  }
+}
+GST_END_TEST;
+
+GST_START_TEST (test_page_is_framed_only_where_the_server_allows_it)
+{
+  static const char *const cases[][2] = {{"", "'none'"}, {"frame-ancestors=*", "*"},
+      {"frame-ancestors=\"https://a.example http://b.example:80\"",
+          "https://a.example http://b.example:80"}};
+  for (const auto &[settings, expected] : cases) {
+    WebSink sink (settings);
+    fail_unless_contains (
+        get (sink.port (), "/"), "; frame-ancestors " + std::string (expected) + "\r\n");
   }
 }
 GST_END_TEST;
@@ -271,6 +285,7 @@ rangewebsink_suite ()
   tcase_add_test (tc, test_wrong_settings_are_named);
   tcase_add_test (tc, test_stats_address_must_be_a_free_udp_port);
   tcase_add_test (tc, test_page_files_are_served_with_their_types);
+  tcase_add_test (tc, test_page_is_framed_only_where_the_server_allows_it);
   tcase_add_test (tc, test_nothing_but_files_of_the_page_is_served);
   tcase_add_test (tc, test_methods_that_change_things_are_refused);
   tcase_add_test (tc, test_garbage_instead_of_requests_harms_nobody);
