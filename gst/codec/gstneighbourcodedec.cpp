@@ -196,8 +196,8 @@ gst_neighbour_code_dec_src_event (GstBaseTransform *base, GstEvent *event)
 /* Adds the views of `units` to `output` and decodes them. Views of the rig that did not come are
  * left out, or repeated from `older`, which may be nullptr. */
 static Status
-decode_into (GstNeighbourCodeDecPrivate *priv, std::span<const Bytes> units, GstBuffer *output,
-    GstBuffer *older, int n_threads, DecoderResult &result)
+decode_into (GstNeighbourCodeDecPrivate *priv, Bytes units, GstBuffer *output, GstBuffer *older,
+    int n_threads, DecoderResult &result)
 {
   priv->decoder.plan (units, result, older);
   std::optional<gstrange::RangeFrameMap> last;
@@ -283,8 +283,7 @@ copy_metadata (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer *output)
 
 /* Times and flags are those of `input`; the units are its own, or also those of later slices. */
 static GstFlowReturn
-decode_frame_set (
-    GstNeighbourCodeDec *self, GstBuffer *input, std::span<const Bytes> units, GstBuffer **output)
+decode_frame_set (GstNeighbourCodeDec *self, GstBuffer *input, Bytes units, GstBuffer **output)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
   Settings settings;
@@ -308,8 +307,7 @@ decode_frame_set (
   {
     std::lock_guard guard (priv->lock);
     priv->frames++;
-    for (const Bytes piece : units)
-      priv->coded_bytes += piece.size ();
+    priv->coded_bytes += units.size ();
     priv->totals += result;
   }
   update_is_temporal (priv);
@@ -338,8 +336,7 @@ static GstFlowReturn
 decode_slices (GstNeighbourCodeDec *self, GstBuffer **output)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
-  const Bytes units (priv->slices);
-  const GstFlowReturn flow = decode_frame_set (self, priv->first, std::span (&units, 1), output);
+  const GstFlowReturn flow = decode_frame_set (self, priv->first, priv->slices, output);
   reset_slices (priv);
   return flow;
 }
@@ -355,16 +352,15 @@ is_same_frame_set (GstBuffer *a, GstBuffer *b)
 }
 
 static void
-append_slice (GstNeighbourCodeDec *self, GstBuffer *input, std::span<const Bytes> units)
+append_slice (GstNeighbourCodeDec *self, GstBuffer *input, Bytes units)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
   if (!priv->first)
     priv->first = gst_buffer_ref (input);
-  for (const Bytes piece : units)
-    if (priv->slices.size () + piece.size () <= rangecast::kMaxAccessUnitSize)
-      priv->slices.insert (priv->slices.end (), piece.begin (), piece.end ());
-    else
-      GST_DEBUG_OBJECT (self, "dropping a slice: the access unit is too long");
+  if (priv->slices.size () + units.size () <= rangecast::kMaxAccessUnitSize)
+    priv->slices.insert (priv->slices.end (), units.begin (), units.end ());
+  else
+    GST_DEBUG_OBJECT (self, "dropping a slice: the access unit is too long");
   priv->complete = GST_BUFFER_FLAG_IS_SET (input, GST_BUFFER_FLAG_MARKER);
 }
 
@@ -373,16 +369,16 @@ handle_input (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **output)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
   const CodedUnitsMap map (input);
-  if (map.pieces ().empty ()) {
+  if (!map) {
     GST_ELEMENT_ERROR (self, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
     return GST_FLOW_ERROR;
   }
   if (!priv->by_slices)
-    return decode_frame_set (self, input, map.pieces (), output);
+    return decode_frame_set (self, input, map.bytes (), output);
   GstFlowReturn flow = GST_FLOW_OK;
   if (priv->first && !is_same_frame_set (priv->first, input))
     flow = decode_slices (self, output);
-  append_slice (self, input, map.pieces ());
+  append_slice (self, input, map.bytes ());
   return flow;
 }
 

@@ -108,14 +108,7 @@ public:
    *  @param whole_rois  false: a ROI of which nearly nothing arrived shrinks to the bounding box of
    *  its slices, as all other pixels would be invalid, so that a few bytes do not claim a large
    *  image; pass true with older images to decode() */
-  void plan (std::span<const std::uint8_t> bytes, DecoderResult &result, bool whole_rois = true)
-  {
-    plan (std::span (&bytes, 1), result, whole_rois);
-  }
-  /** The same for an access unit in several pieces of whole units. Nothing after damage is read, in
-   *  later pieces neither. */
-  void plan (std::span<const std::span<const std::uint8_t>> pieces, DecoderResult &result,
-      bool whole_rois = true);
+  void plan (std::span<const std::uint8_t> bytes, DecoderResult &result, bool whole_rois = true);
   [[nodiscard]] std::span<const PlannedView> views () const { return {planned_.data (), count_}; }
   /** Pixels of a view's coded ROI that no slice holds. */
   [[nodiscard]] std::uint64_t missing_pixels (std::size_t view) const

@@ -55,15 +55,12 @@ AccessUnitDecoder::read_slices (std::span<const std::uint8_t> bytes, DecoderResu
 
 void
 AccessUnitDecoder::plan (
-    std::span<const std::span<const std::uint8_t>> pieces, DecoderResult &result, bool whole_rois)
+    std::span<const std::uint8_t> bytes, DecoderResult &result, bool whole_rois)
 {
   slices_.clear ();
   count_ = 0;
-  for (const auto piece : pieces)
-    if (!read_slices (piece, result)) {
-      result.bad_slices++;
-      break;
-    }
+  if (!read_slices (bytes, result))
+    result.bad_slices++;
   std::ranges::sort (slices_, {}, [] (const PlannedSlice &s) {
     return std::pair{sort_key (s.header), s.arrival};
   });
