@@ -85,7 +85,7 @@ def start_server(args, host, processes):
     port = args.port
     if server:
         line = server.stdout.readline()
-        fail_unless(line, "the call's server failed: see above")
+        fail_unless(line, "the call's server failed: see above; --port chooses another port")
         print("the other end runs: rangecast call --signal LINK, where LINK is one of", flush=True)
         print_links(parsed, line.split()[1], False)
         port = line.rstrip("/\n").rpartition(":")[2]

@@ -28,6 +28,7 @@ ELEMENTS = {
     "srtpenc": "encryption",
     "opusenc": "audio",
     "webrtcdsp": "echo cancellation",
+    "nicesrc": "calls (libnice)",
 }
 SOCKET_BUFFER = 4194304
 
