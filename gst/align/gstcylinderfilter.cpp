@@ -22,8 +22,8 @@
 #include <mutex>
 #include <rangecast/overlap/cylinder_filter.hpp>
 
+#include "common/basetransform.hpp"
 #include "common/elementproperties.hpp"
-#include "common/streamlock.hpp"
 
 using rangecast::Status;
 
@@ -205,7 +205,7 @@ gst_cylinder_filter_stop (GstBaseTransform *base)
 {
   auto priv = GST_CYLINDER_FILTER (base)->priv;
   priv->reporter.stop ();
-  const StreamLock lock (base);
+  g_autoptr (GRecMutexLocker) lock = lock_stream (base);
   priv->rig = {};
   priv->core = {};
   return TRUE;

@@ -23,8 +23,8 @@
 #include <mutex>
 #include <rangecast/alignment/view_alignment.hpp>
 
+#include "common/basetransform.hpp"
 #include "common/elementproperties.hpp"
-#include "common/streamlock.hpp"
 
 using rangecast::Status;
 
@@ -279,7 +279,7 @@ gst_range_align_stop (GstBaseTransform *base)
 {
   auto priv = GST_RANGE_ALIGN (base)->priv;
   priv->reporter.stop ();
-  const StreamLock lock (base);
+  g_autoptr (GRecMutexLocker) lock = lock_stream (base);
   priv->has_rig = false;
   priv->alignment = {};
   return TRUE;

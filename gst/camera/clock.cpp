@@ -8,37 +8,6 @@
 using rangecast::Status;
 using rangecast::StatusCode;
 
-namespace {
-
-struct ClockServer {
-  bool ptp = false;
-  std::string host;
-  int port = 0; ///< or the PTP domain
-};
-
-Status
-parse_clock_server (const std::string &text, ClockServer &server)
-{
-  const Status bad = {StatusCode::kBadValue,
-      "clock-server " + text + " is neither HOST:PORT (port 1 to 65535) nor ptp:DOMAIN (0 to 255)"};
-  server.ptp = text.starts_with ("ptp:");
-  if (server.ptp) {
-    guint64 domain = 0;
-    if (!g_ascii_string_to_unsigned (text.c_str () + 4, 10, 0, 255, &domain, nullptr))
-      return bad;
-    server.port = static_cast<int> (domain);
-    return {};
-  }
-  g_autoptr (GSocketConnectable) parsed = g_network_address_parse (text.c_str (), 0, nullptr);
-  if (!parsed || g_network_address_get_port (G_NETWORK_ADDRESS (parsed)) == 0)
-    return bad;
-  server.host = g_network_address_get_hostname (G_NETWORK_ADDRESS (parsed));
-  server.port = g_network_address_get_port (G_NETWORK_ADDRESS (parsed));
-  return {};
-}
-
-} // namespace
-
 /* A net clock starts at 0, before any other, so that it only jumps forward when it is synchronised.
  * The clock stays until another one is wanted: it is synchronised already then, and GStreamer 1.22
  * must not release it at the moment when that happens. */
@@ -51,18 +20,25 @@ NetworkClock::open (const std::string &text)
   server_ = text;
   if (text.empty ())
     return {};
-  ClockServer server;
-  if (Status s = parse_clock_server (text, server); !s.ok ())
-    return s;
-  if (!server.ptp) {
-    const ScopedRealtimePriority priority; /* its thread inherits it; delays are clock error */
-    clock_ = gst_net_client_clock_new ("stereocamsrc-clock", server.host.c_str (), server.port, 0);
-  } else {
+  const Status bad = {StatusCode::kBadValue,
+      "clock-server " + text + " is neither HOST:PORT (port 1 to 65535) nor ptp:DOMAIN (0 to 255)"};
+  if (text.starts_with ("ptp:")) {
+    guint64 domain = 0;
+    if (!g_ascii_string_to_unsigned (text.c_str () + 4, 10, 0, 255, &domain, nullptr))
+      return bad;
     if (!gst_ptp_init (GST_PTP_CLOCK_ID_NONE, nullptr))
       return {StatusCode::kNotFound, "clock-server " + text +
                                          ": PTP is not available: gst-ptp-helper needs the "
                                          "right to bind ports 319 and 320"};
-    clock_ = gst_ptp_clock_new ("stereocamsrc-clock", static_cast<guint> (server.port));
+    clock_ = gst_ptp_clock_new ("stereocamsrc-clock", guint (domain));
+  } else {
+    g_autoptr (GSocketConnectable) parsed = g_network_address_parse (text.c_str (), 0, nullptr);
+    auto server = parsed ? G_NETWORK_ADDRESS (parsed) : nullptr;
+    if (!server || g_network_address_get_port (server) == 0)
+      return bad;
+    const ScopedRealtimePriority priority; /* its thread inherits it; delays are clock error */
+    clock_ = gst_net_client_clock_new ("stereocamsrc-clock",
+        g_network_address_get_hostname (server), g_network_address_get_port (server), 0);
   }
   if (!clock_)
     return {StatusCode::kNotFound, "clock-server " + text + ": no such clock"};

@@ -39,11 +39,11 @@
 #include <span>
 #include <vector>
 
+#include "common/basetransform.hpp"
 #include "common/bufferpools.hpp"
 #include "common/capsadvice.hpp"
 #include "common/codedunits.hpp"
 #include "common/elementproperties.hpp"
-#include "common/streamlock.hpp"
 #include "concealment.hpp"
 
 using rangecast::DecoderResult;
@@ -483,7 +483,7 @@ gst_neighbour_code_dec_stop (GstBaseTransform *base)
 {
   GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (base)->priv;
   priv->reporter.stop ();
-  const StreamLock lock (base);
+  g_autoptr (GRecMutexLocker) lock = lock_stream (base);
   reset_stream (priv);
   drop_pool (priv->pool);
   return TRUE;

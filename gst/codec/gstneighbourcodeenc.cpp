@@ -40,9 +40,8 @@
 
 #include "bitrate.hpp"
 #include "common/accessunitwriter.hpp"
-#include "common/controlledvalues.hpp"
+#include "common/basetransform.hpp"
 #include "common/elementproperties.hpp"
-#include "common/streamlock.hpp"
 #include "encsettings.hpp"
 #include "keyunitrequests.hpp"
 
@@ -442,7 +441,7 @@ gst_neighbour_code_enc_stop (GstBaseTransform *base)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
   priv->reporter.stop ();
-  const StreamLock lock (base);
+  g_autoptr (GRecMutexLocker) lock = lock_stream (base);
   priv->is_configured = false;
   gst_clear_buffer (&priv->input);
   priv->writer.drop ();

@@ -15,8 +15,8 @@
  */
 #include <gst/base/gstbasetransform.h>
 
+#include "common/basetransform.hpp"
 #include "common/elementproperties.hpp"
-#include "common/streamlock.hpp"
 
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
@@ -179,7 +179,7 @@ gst_ply_enc_sink_event (GstBaseTransform *base, GstEvent *event)
 static gboolean
 gst_ply_enc_stop (GstBaseTransform *base)
 {
-  const StreamLock lock (base);
+  g_autoptr (GRecMutexLocker) lock = lock_stream (base);
   GST_PLY_ENC (base)->priv->info = {};
   return TRUE;
 }

@@ -19,9 +19,8 @@
  *
  * Since: 0.1
  */
-#include "common/controlledvalues.hpp"
+#include "common/basetransform.hpp"
 #include "common/elementproperties.hpp"
-#include "common/streamlock.hpp"
 
 #include <array>
 #include <atomic>
@@ -553,7 +552,7 @@ gst_roi_extract_stop (GstBaseTransform *base)
 {
   GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (base)->priv;
   priv->reporter.stop ();
-  const StreamLock lock (base);
+  g_autoptr (GRecMutexLocker) lock = lock_stream (base);
   priv->info = {};
   priv->relearn = false;
   for (auto &state : priv->views)

@@ -48,39 +48,17 @@ GST_DEBUG_CATEGORY_STATIC (gst_range_demux_debug);
 
 namespace {
 
+/* A view and its pad. */
 struct DemuxPad {
   GstPad *pad = nullptr; /* owned by the element; nullptr: the rig has no such view */
   GstCaps *caps = nullptr;
-  bool fresh = true;       /* no buffer was pushed yet */
-  AccessUnitWriter writer; /* coded */
-};
+  bool fresh = true; /* no buffer was pushed yet */
 
-/* Finds the slices of each view in a coded frame set; keeps its memory from one to the next. */
-class CodedViews {
-public:
-  /* Reads the headers of all units.
-   * @return kBadData if the buffer cannot be mapped; damaged units are counted, see dropped() */
-  Status read (GstBuffer *frame_set);
-
-  /* Slices with a damaged header. */
-  [[nodiscard]] int dropped () const { return dropped_; }
-  /* Whether view `id`, 0 to 63, has slices in the frame set. */
-  [[nodiscard]] bool has (int id) const { return !views_[id].slices.empty (); }
-  [[nodiscard]] std::span<const guint8> slices (int id) const { return views_[id].slices; }
-  /* Of the view's first slice, ns. */
-  [[nodiscard]] GstClockTime capture_time (int id) const { return views_[id].capture_time; }
-  /* Whether a decoder can begin with the view's slices. */
-  [[nodiscard]] bool is_key (int id) { return views_[id].check.is_key (); }
-
-private:
-  struct OneView {
-    std::vector<guint8> slices;
-    GstClockTime capture_time = GST_CLOCK_TIME_NONE;
-    rangecast::KeyCheck check;
-  };
-
-  std::array<OneView, kMaxViews> views_; /* by view-id */
-  int dropped_ = 0;
+  /* coded: of the current frame set */
+  AccessUnitWriter writer;
+  std::vector<guint8> slices;
+  GstClockTime capture_time = GST_CLOCK_TIME_NONE; /* of the first slice */
+  rangecast::KeyCheck check;
 };
 
 } // namespace
@@ -96,7 +74,6 @@ struct GstRangeDemuxPrivate {
   bool coded = false;
   bool had_pads = false; /* since start */
   GstSegment segment{};
-  CodedViews units; /* of the current frame set, if coded */
   guint group_id = GST_GROUP_ID_INVALID;
 
   ~GstRangeDemuxPrivate () { gst_flow_combiner_free (combiner); }
@@ -123,25 +100,27 @@ GST_ELEMENT_REGISTER_DEFINE (rangedemux, "rangedemux", GST_RANK_NONE, gst_range_
 
 /* ---- data ---- */
 
-Status
-CodedViews::read (GstBuffer *frame_set)
+/* Finds the slices of each view in a coded frame set. */
+static Status
+read_slices (GstRangeDemux *self, GstBuffer *frame_set)
 {
-  for (OneView &view : views_) {
+  auto &pads = self->priv->pads;
+  for (DemuxPad &view : pads) {
     view.slices.clear ();
     view.check.reset ();
   }
-  dropped_ = 0;
+  int dropped = 0;
   Status end;
-  const auto handle = [this] (gsize, std::span<const guint8> unit,
+  const auto handle = [&] (gsize, std::span<const guint8> unit,
                           const rangecast::UnitHeader &header) {
     rangecast::SliceHeader slice;
     if (header.type != guint8 (rangecast::UnitType::kSlice))
       return true;
     if (!rangecast::read_slice_header (unit, slice).ok ()) {
-      dropped_++;
+      dropped++;
       return true;
     }
-    OneView &view = views_[slice.view_id];
+    DemuxPad &view = pads[slice.view_id];
     if (view.slices.empty ())
       view.capture_time = slice.capture_time_ns;
     view.check.add (slice);
@@ -150,7 +129,8 @@ CodedViews::read (GstBuffer *frame_set)
   };
   if (!for_each_unit (frame_set, handle, end))
     return {StatusCode::kBadData, "cannot map a coded frame set"};
-  dropped_ += !end.ok ();
+  if (dropped > 0 || !end.ok ())
+    GST_DEBUG_OBJECT (self, "dropping %d damaged units", dropped + !end.ok ());
   return {};
 }
 
@@ -175,17 +155,17 @@ copy_metadata (GstBuffer *view, GstBuffer *frame_set, GstClockTime capture)
 static GstBuffer *
 make_coded_view (GstRangeDemuxPrivate *priv, GstBuffer *frame_set, int id)
 {
-  AccessUnitWriter &writer = priv->pads[id].writer;
-  if (!priv->units.has (id))
+  DemuxPad &entry = priv->pads[id];
+  if (entry.slices.empty ())
     return nullptr;
   const bool key =
-      priv->units.is_key (id) || !GST_BUFFER_FLAG_IS_SET (frame_set, GST_BUFFER_FLAG_DELTA_UNIT);
-  const auto slices = priv->units.slices (id);
-  if (!writer.begin (key, slices.size ()).ok ())
+      entry.check.is_key () || !GST_BUFFER_FLAG_IS_SET (frame_set, GST_BUFFER_FLAG_DELTA_UNIT);
+  if (!entry.writer.begin (key, entry.slices.size ()).ok ())
     return nullptr;
-  writer.add (slices);
-  GstBuffer *view = writer.finish (byte_stream_time (priv->segment, GST_BUFFER_PTS (frame_set)));
-  copy_metadata (view, frame_set, priv->units.capture_time (id));
+  entry.writer.add (entry.slices);
+  GstBuffer *view =
+      entry.writer.finish (byte_stream_time (priv->segment, GST_BUFFER_PTS (frame_set)));
+  copy_metadata (view, frame_set, entry.capture_time);
   set_key (view, key);
   return view;
 }
@@ -264,11 +244,8 @@ gst_range_demux_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
   auto self = GST_RANGE_DEMUX (parent);
   GstRangeDemuxPrivate *priv = self->priv;
   GstFlowReturn flow = priv->info.views () > 0 ? GST_FLOW_OK : GST_FLOW_NOT_NEGOTIATED;
-  if (flow == GST_FLOW_OK && priv->coded) {
-    flow = gst_range_flow_return (GST_ELEMENT (self), priv->units.read (buffer));
-    if (priv->units.dropped () > 0)
-      GST_DEBUG_OBJECT (self, "dropping %d damaged units", priv->units.dropped ());
-  }
+  if (flow == GST_FLOW_OK && priv->coded)
+    flow = gst_range_flow_return (GST_ELEMENT (self), read_slices (self, buffer));
   if (flow == GST_FLOW_OK)
     flow = push_views (self, buffer);
   gst_buffer_unref (buffer);

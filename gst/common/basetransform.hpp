@@ -16,3 +16,12 @@ sync_controlled_values (GstBaseTransform *base, GstBuffer *buffer)
   if (GST_CLOCK_TIME_IS_VALID (time))
     gst_object_sync_values (GST_OBJECT (base), time);
 }
+
+/** The stream lock of the sink pad, for stop(). GstBaseTransform has stopped buffers and events by
+ *  then, but GStreamer 1.22 still passes serialized queries to flushing pads, and an ALLOCATION
+ *  query may call set_caps(). */
+[[nodiscard]] inline GRecMutexLocker *
+lock_stream (GstBaseTransform *base)
+{
+  return g_rec_mutex_locker_new (GST_PAD_GET_STREAM_LOCK (GST_BASE_TRANSFORM_SINK_PAD (base)));
+}
