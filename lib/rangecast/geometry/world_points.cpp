@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "world_points.hpp"
 
-#include <cstring>
-
 #include "../base/simd.hpp"
 
 namespace rangecast {
@@ -16,92 +14,39 @@ store (float *out, Vec3 v)
   out[2] = static_cast<float> (v.z);
 }
 
-/* Makes points of an image's valid pixels. */
-template <typename L> struct FillLoop {
-  using F = typename L::F;
-  using I = typename L::I;
-
-  const ConstRangeImage &image;
-  const PixelRays &rays;
-  float *x, *y, *z;
-  std::uint32_t *pixel;
-
-  static constexpr int kBlock = 16;
-  typedef std::uint16_t Block __attribute__ ((vector_size (2 * kBlock), aligned (2), may_alias));
-  typedef std::int16_t Mask __attribute__ ((vector_size (2 * kBlock)));
-
-  /* Shortcuts for blocks: a person mostly fills a small part of a picture, with few holes. */
-  static bool all_are (const Mask &mask)
-  {
-    std::uint64_t four[4];
-    std::memcpy (four, &mask, sizeof four);
-    return (four[0] & four[1] & four[2] & four[3]) == ~std::uint64_t{0};
+/* Writes place and depth of the valid pixels of a row. @return how many */
+std::size_t
+compact_row (const std::uint16_t *depth, int width, int row, std::uint32_t *to, float *depths)
+{
+  std::size_t n = 0;
+  for (int u = 0; u < width; u++) {
+    /* Always written, kept only if valid: a branch would be unpredictable at edges. At most `width`
+     * elements are written, so this never leaves the part. */
+    to[n] = static_cast<std::uint32_t> (row) << 16 | static_cast<std::uint32_t> (u);
+    depths[n] = depth[u];
+    n += depth[u] != kInvalidDepth;
   }
+  return n;
+}
 
-  /* Writes place and depth of the valid pixels of a row. @return how many */
-  std::size_t compact_row (const std::uint16_t *depth, int width, std::uint32_t row,
-      std::uint32_t *to, float *depths) const
-  {
-    std::size_t n = 0;
-    const auto take = [&] (int u) {
-      /* Always written, kept only if valid: a branch would be unpredictable at edges. At most
-       * `width` elements are written, so this never leaves the part. */
-      to[n] = row << 16 | static_cast<std::uint32_t> (u);
-      depths[n] = depth[u];
-      n += depth[u] != kInvalidDepth;
-    };
-    int u = 0;
-    for (; u + kBlock <= width; u += kBlock) {
-      const Mask invalid = *reinterpret_cast<const Block *> (depth + u) == kInvalidDepth;
-      if (all_are (invalid))
-        continue;
-      if (all_are (~invalid)) {
-        for (int k = 0; k < kBlock; k++) {
-          to[n + k] = row << 16 | static_cast<std::uint32_t> (u + k);
-          depths[n + k] = depth[u + k];
-        }
-        n += kBlock;
-      } else {
-        for (int k = 0; k < kBlock; k++)
-          take (u + k);
-      }
-    }
-    for (; u < width; u++)
-      take (u);
-    return n;
+/* Makes points of a row's valid pixels, whose depths are in `x`. */
+void
+make_points (const PixelRays &pixel_rays, int column, int row, std::size_t n,
+    const std::uint32_t *__restrict place, float *__restrict x, float *__restrict y,
+    float *__restrict z)
+{
+  const PixelRays rays = pixel_rays; /* so that no store changes it */
+  float base[3];
+  for (int k = 0; k < 3; k++)
+    base[k] = rays.corner[k] + static_cast<float> (row) * rays.down[k] +
+              static_cast<float> (column) * rays.right[k];
+  for (std::size_t i = 0; i < n; i++) {
+    const float d = x[i], u = static_cast<float> (static_cast<int> (place[i] & 0xffff));
+    x[i] = rays.origin[0] + d * (base[0] + u * rays.right[0]);
+    y[i] = rays.origin[1] + d * (base[1] + u * rays.right[1]);
+    z[i] = rays.origin[2] + d * (base[2] + u * rays.right[2]);
   }
-
-  std::size_t run () const
-  {
-    std::size_t end = 0;
-    for (int row = 0; row < image.depth.height && !image.depth.empty (); row++) {
-      float *__restrict px = x + end, *__restrict py = y + end, *__restrict pz = z + end;
-      const std::uint32_t *__restrict place = pixel + end;
-      const std::size_t n = compact_row (image.depth.row (row), image.depth.width,
-          static_cast<std::uint32_t> (row), pixel + end, px);
-      const float v = static_cast<float> (image.roi.y + row), u0 = static_cast<float> (image.roi.x);
-      float base[3];
-      for (int k = 0; k < 3; k++)
-        base[k] = rays.corner[k] + v * rays.down[k] + u0 * rays.right[k];
-      std::size_t i = 0;
-      for (; i + L::kLanes <= n; i += L::kLanes) {
-        const F d = L::at (px + i);
-        const F u = __builtin_convertvector((I)(L::at (place + i) & 0xffff), F);
-        L::at (px + i) = rays.origin[0] + d * (base[0] + u * rays.right[0]);
-        L::at (py + i) = rays.origin[1] + d * (base[1] + u * rays.right[1]);
-        L::at (pz + i) = rays.origin[2] + d * (base[2] + u * rays.right[2]);
-      }
-      for (; i < n; i++) {
-        const float d = px[i], u = static_cast<float> (static_cast<int> (place[i] & 0xffff));
-        px[i] = rays.origin[0] + d * (base[0] + u * rays.right[0]);
-        py[i] = rays.origin[1] + d * (base[1] + u * rays.right[1]);
-        pz[i] = rays.origin[2] + d * (base[2] + u * rays.right[2]);
-      }
-      end += n;
-    }
-    return end;
-  }
-};
+}
 
 } // namespace
 
@@ -159,11 +104,18 @@ void
 WorldPoints::fill (std::size_t index, const ConstRangeImage &image, const PixelRays &rays)
 {
   Part &part = parts_[index];
-  const std::size_t begin = part.begin;
-  float *px = x.data () + begin, *py = y.data () + begin, *pz = z.data () + begin;
-  std::uint32_t *place = pixel.data () + begin;
-  part.end = begin + for_this_cpu ([&]<typename L> (L) {
-    return FillLoop<L>{image, rays, px, py, pz, place}.run ();
+  part.end = part.begin;
+  if (image.depth.empty ())
+    return;
+  for_this_cpu ([&] {
+    for (int row = 0; row < image.depth.height; row++) {
+      float *const px = x.data () + part.end;
+      std::uint32_t *const place = pixel.data () + part.end;
+      const std::size_t n = compact_row (image.depth.row (row), image.depth.width, row, place, px);
+      make_points (rays, image.roi.x, image.roi.y + row, n, place, px, y.data () + part.end,
+          z.data () + part.end);
+      part.end += n;
+    }
   });
 }
 

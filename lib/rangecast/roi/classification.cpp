@@ -55,45 +55,12 @@ template <typename Lanes>
 inline void
 load_fields (const BackgroundPixel *pixels, typename Lanes::F (&fields)[kFields])
 {
-  using F = typename Lanes::F;
-  constexpr int n = Lanes::kLanes;
   const auto from = reinterpret_cast<const float *> (pixels);
-  if constexpr (n == 8) {
-    F rows[8], pairs[8], fours[8];
-#pragma GCC unroll 8
-    for (int i = 0; i < 8; i++)
-      rows[i] = Lanes::at (from + 8 * i);
-#pragma GCC unroll 4
-    for (int i = 0; i < 8; i += 2) {
-      pairs[i] = __builtin_shufflevector (rows[i], rows[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
-      pairs[i + 1] = __builtin_shufflevector (rows[i], rows[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
-    }
-#pragma GCC unroll 4
-    for (int i = 0; i < 8; i += i % 4 == 1 ? 3 : 1) {
-      const int to = i / 4 * 4 + 2 * (i % 4);
-      fours[to] = __builtin_shufflevector (pairs[i], pairs[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
-      fours[to + 1] = __builtin_shufflevector (pairs[i], pairs[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
-    }
-#pragma GCC unroll 4
-    for (int i = 0; i < 4; i++) {
-      fields[i] = __builtin_shufflevector (fours[i], fours[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-      fields[i + 4] = __builtin_shufflevector (fours[i], fours[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
-    }
-  } else {
-    static_assert (n == 4);
-    for (int half = 0; half < kFields; half += 4) {
-      F rows[4];
-      for (int i = 0; i < 4; i++)
-        rows[i] = Lanes::at (from + kFields * i + half);
-      const F a = __builtin_shufflevector (rows[0], rows[1], 0, 4, 1, 5),
-              b = __builtin_shufflevector (rows[0], rows[1], 2, 6, 3, 7),
-              c = __builtin_shufflevector (rows[2], rows[3], 0, 4, 1, 5),
-              d = __builtin_shufflevector (rows[2], rows[3], 2, 6, 3, 7);
-      fields[half] = __builtin_shufflevector (a, c, 0, 1, 4, 5);
-      fields[half + 1] = __builtin_shufflevector (a, c, 2, 3, 6, 7);
-      fields[half + 2] = __builtin_shufflevector (b, d, 0, 1, 4, 5);
-      fields[half + 3] = __builtin_shufflevector (b, d, 2, 3, 6, 7);
-    }
+  for (int field = 0; field < kFields; field++) {
+    typename Lanes::F values{};
+    for (int i = 0; i < Lanes::kLanes; i++)
+      values[i] = from[kFields * i + field];
+    fields[field] = values;
   }
 }
 
