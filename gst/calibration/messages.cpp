@@ -24,15 +24,17 @@ new_camera_structure (const char *name, const CalibrationCamera &camera)
       std::string (rangecast::role_name (camera.role)).c_str (), nullptr);
 }
 
+/* @param take  void (GValue *, const Item &): sets the value */
+template <typename Item, typename Take>
 void
-set_array (GstStructure *structure, const char *field, std::vector<GstStructure *> items)
+set_array (GstStructure *structure, const char *field, const std::vector<Item> &items, GType type,
+    Take take)
 {
   GValue array = G_VALUE_INIT;
   gst_value_array_init (&array, guint (items.size ()));
-  for (GstStructure *item : items) {
+  for (const Item &item : items) {
     GValue value = G_VALUE_INIT;
-    g_value_init (&value, GST_TYPE_STRUCTURE);
-    g_value_take_boxed (&value, item);
+    take (g_value_init (&value, type), item);
     gst_value_array_append_and_take_value (&array, &value);
   }
   gst_structure_take_value (structure, field, &array);
@@ -41,15 +43,8 @@ set_array (GstStructure *structure, const char *field, std::vector<GstStructure 
 void
 set_strings (GstStructure *structure, const char *field, const std::vector<std::string> &texts)
 {
-  GValue array = G_VALUE_INIT;
-  gst_value_array_init (&array, guint (texts.size ()));
-  for (const std::string &text : texts) {
-    GValue value = G_VALUE_INIT;
-    g_value_init (&value, G_TYPE_STRING);
-    g_value_set_string (&value, text.c_str ());
-    gst_value_array_append_and_take_value (&array, &value);
-  }
-  gst_structure_take_value (structure, field, &array);
+  set_array (structure, field, texts, G_TYPE_STRING,
+      [] (GValue *value, const std::string &text) { g_value_set_string (value, text.c_str ()); });
 }
 
 GstStructure *
@@ -112,18 +107,18 @@ post_result (GstElement *element, const CalibrationSession &session,
       "frames", G_TYPE_UINT, guint (result.frames), nullptr);
   if (location)
     gst_structure_set (s, "location", G_TYPE_STRING, location, nullptr);
-  std::vector<GstStructure *> cameras, pairs, dropped;
-  for (const auto &camera : result.cameras)
-    cameras.push_back (camera_structure (session, camera));
-  for (const auto &pair : result.pairs)
-    pairs.push_back (pair_structure (session, pair));
-  for (const auto &board : result.dropped)
-    dropped.push_back (gst_structure_new ("dropped", "pad", G_TYPE_STRING,
-        session.cameras ()[board.camera].name.c_str (), "frame", G_TYPE_UINT64,
-        guint64 (board.frame), "rms", G_TYPE_DOUBLE, board.rms_px, nullptr));
-  set_array (s, "cameras", cameras);
-  set_array (s, "pairs", pairs);
-  set_array (s, "dropped", dropped);
+  set_array (s, "cameras", result.cameras, GST_TYPE_STRUCTURE, [&] (GValue *to, const auto &one) {
+    g_value_take_boxed (to, camera_structure (session, one));
+  });
+  set_array (s, "pairs", result.pairs, GST_TYPE_STRUCTURE, [&] (GValue *to, const auto &one) {
+    g_value_take_boxed (to, pair_structure (session, one));
+  });
+  set_array (s, "dropped", result.dropped, GST_TYPE_STRUCTURE, [&] (GValue *to, const auto &one) {
+    g_value_take_boxed (
+        to, gst_structure_new ("dropped", "pad", G_TYPE_STRING,
+                session.cameras ()[one.camera].name.c_str (), "frame", G_TYPE_UINT64,
+                guint64 (one.frame), "rms", G_TYPE_DOUBLE, one.rms_px, nullptr));
+  });
   set_strings (s, "warnings", result.warnings);
   const auto blob = rangecast::encode_rig (result.rig);
   GstBuffer *rig = gst_buffer_new_memdup (blob.data (), blob.size ());

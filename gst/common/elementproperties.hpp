@@ -59,19 +59,17 @@ get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
 
 } // namespace properties
 
-/** Sets set_property and get_property of an element's class and installs its
- * properties; for class_init. `Element` has a pointer `priv` to a struct with
+/** Sets set_property and get_property of an element's class and installs its properties; for
+ *  class_init. `Element` has a pointer `priv` to a struct with
  *  - `std::mutex lock`, which guards `settings` and what `kMakeStats` reads,
  *  - `settings`, if there is a table,
- *  - optionally `StatsReporter reporter`: then there is a property
- * `stats-interval`.
- *  @tparam kTable      function that returns the PropertyTable of `settings` by
- * reference; nullptr: there are no settings
- *  @tparam kMakeStats  function that returns the value of `stats` (transfer
- * full) from `priv`; called with `lock` held; nullptr: no property `stats`
+ *  - optionally `StatsReporter reporter`: then there is a property `stats-interval`.
+ *  @tparam kTable      function that returns the PropertyTable of `settings` by reference; nullptr:
+ *  there are no settings
+ *  @tparam kMakeStats  function that returns the value of `stats` (transfer full) from `priv`;
+ *  called with `lock` held; nullptr: no property `stats`
  *  @param stats_blurb  names the fields of `stats`
- *  @param stats_name   another name, where the base class has a property
- * `stats` */
+ *  @param stats_name   another name, where the base class has a property `stats` */
 template <typename Element, auto kTable, auto kMakeStats = nullptr>
 void
 install_properties (

@@ -52,7 +52,6 @@
 #include "common/capsadvice.hpp"
 #include "common/elementproperties.hpp"
 #include "frameset.hpp"
-#include "rigcheck.hpp"
 #include "streamtimes.hpp"
 
 using rangecast::Status;

@@ -86,6 +86,12 @@ struct MuxStream : PadStream {
 
 using MuxStreams = std::vector<std::shared_ptr<MuxStream>>;
 
+/** Checks that the views of a stream are cameras of the expected rig, with the same pose and focal
+ *  length. The expected rig may hold range views or stereo pairs, also of other image sizes with
+ *  the same aspect ratio.
+ *  @return kBadValue that names the difference */
+rangecast::Status check_rig (const rangecast::Rig &stream, const rangecast::Rig &expected);
+
 /** Chooses the streams that make up frame sets: those of the format of the first one, raw or coded,
  *  with each view-id once and at most kMaxRigPixels. Streams that were chosen before and are alive
  *  have priority, so that two hosts with the same view-id do not alternate. Sets `chosen` and

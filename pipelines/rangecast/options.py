@@ -63,9 +63,7 @@ def host(text):
     """A name, or an address of IPv4 or IPv6."""
     try:
         socket.getaddrinfo(text, None)
-        if re.fullmatch(r"[\d.]+", text):
-            ipaddress.IPv4Address(text)
-    except (OSError, ValueError):
+    except OSError:
         raise Wrong(f"no host '{text}'") from None
     return text
 
