@@ -31,49 +31,16 @@ constexpr int kMaxInconsistency = 1;
  * there, disparities; pixels of half the size around a tile from which it is taken. */
 constexpr int kMany = 64, kMargin = 2, kAround = 4;
 
-/* By grey level step; greater steps are as the last one. */
-constexpr int kSteps = 32;
-static_assert (kJump * kEdge / (kEdge + kSteps - 1) <= kMinJump);
-constexpr auto kJumps = [] {
-  std::array<std::uint8_t, kSteps> jumps{};
-  for (int step = 0; step < kSteps; step++)
-    jumps[std::size_t (step)] = std::uint8_t (std::max (kMinJump, kJump * kEdge / (kEdge + step)));
-  return jumps;
-}();
-
-/* kJumps at each of `steps`, which are below kSteps. Clang has no shuffle by a variable. */
-template <typename Lanes>
-inline typename Lanes::B
-jumps_of (const typename Lanes::B &steps)
-{
-  using B = typename Lanes::B;
-  static_assert (kSteps == 32);
-#if defined __clang__
-  B found;
-  for (std::size_t i = 0; i < sizeof (B); i++)
-    found[i] = kJumps[steps[i]];
-  return found;
-#else
-  const B low = Lanes::at (kJumps.data ());
-  if constexpr (sizeof (B) == kSteps)
-    return __builtin_shuffle (low, steps);
-  else
-    return __builtin_shuffle (low, Lanes::at (kJumps.data () + sizeof (B)), steps);
-#endif
-}
-
 /* The penalties of jumps between kSide pixels and as many others. */
-template <typename Lanes>
 inline void
-find_jumps (const std::uint8_t *pixels, const std::uint8_t *others, std::uint8_t *jumps)
+find_jumps (const std::uint8_t *__restrict pixels, const std::uint8_t *__restrict others,
+    std::uint8_t *__restrict jumps)
 {
-  using B = typename Lanes::B;
-  constexpr int kBytes = sizeof (B);
-  for (int part = 0; part < kSide; part += kBytes) {
-    const B a = Lanes::at (pixels + part), b = Lanes::at (others + part),
-            step = min_of<Lanes> (
-                max_of<Lanes> (a, b) - min_of<Lanes> (a, b), B{} + std::uint8_t (kSteps - 1));
-    Lanes::at (jumps + part) = jumps_of<Lanes> (step);
+  for (int i = 0; i < kSide; i++) {
+    const int step = std::abs (pixels[i] - others[i]);
+    /* Rounded down: exact in floats, and vectors have no division of integers. */
+    jumps[i] =
+        std::uint8_t (greater (kMinJump, int (float (kJump * kEdge) / float (kEdge + step))));
   }
 }
 
@@ -102,92 +69,52 @@ step (const std::uint8_t *cost, std::uint8_t *path, std::uint8_t *lowest, const 
   Lanes::at (lowest) = least;
 }
 
-/* Interleaves the bytes of the low, or of the high, halves of 16 bytes. */
-template <typename Lanes>
-inline typename Lanes::B
-interleave_low (const typename Lanes::B &a, const typename Lanes::B &b)
-{
-  using B = typename Lanes::B;
-  if constexpr (sizeof (B) == 32)
-    return __builtin_shufflevector (a, b, 0, 32, 1, 33, 2, 34, 3, 35, 4, 36, 5, 37, 6, 38, 7, 39,
-        16, 48, 17, 49, 18, 50, 19, 51, 20, 52, 21, 53, 22, 54, 23, 55);
-  else
-    return __builtin_shufflevector (a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
-}
-
-template <typename Lanes>
-inline typename Lanes::B
-interleave_high (const typename Lanes::B &a, const typename Lanes::B &b)
-{
-  using B = typename Lanes::B;
-  if constexpr (sizeof (B) == 32)
-    return __builtin_shufflevector (a, b, 8, 40, 9, 41, 10, 42, 11, 43, 12, 44, 13, 45, 14, 46, 15,
-        47, 24, 56, 25, 57, 26, 58, 27, 59, 28, 60, 29, 61, 30, 62, 31, 63);
-  else
-    return __builtin_shufflevector (
-        a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
-}
-
 /* Two of four rounds of a transposition of 16 x 16 bytes, for four rows. */
-template <typename Lanes> inline void transpose_four (typename Lanes::B (&rows)[4])
+inline void
+transpose_four (Lanes<4>::B (&rows)[4])
 {
-  using B = typename Lanes::B;
-  const B a = interleave_low<Lanes> (rows[0], rows[2]),
-          b = interleave_high<Lanes> (rows[0], rows[2]),
-          c = interleave_low<Lanes> (rows[1], rows[3]),
-          d = interleave_high<Lanes> (rows[1], rows[3]);
-  rows[0] = interleave_low<Lanes> (a, c);
-  rows[1] = interleave_high<Lanes> (a, c);
-  rows[2] = interleave_low<Lanes> (b, d);
-  rows[3] = interleave_high<Lanes> (b, d);
+  using B = Lanes<4>::B;
+  const auto interleave = [] (const B &a, const B &b, B &low, B &high) {
+    low = __builtin_shufflevector (a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+    high = __builtin_shufflevector (
+        a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+  };
+  B a, b, c, d;
+  interleave (rows[0], rows[2], a, b);
+  interleave (rows[1], rows[3], c, d);
+  interleave (a, c, rows[0], rows[1]);
+  interleave (b, d, rows[2], rows[3]);
 }
 
-/* A vector from memory; one of 32 bytes from two places. */
-template <typename Lanes>
-inline typename Lanes::B
-load_halves (const std::uint8_t *low, const std::uint8_t *high)
-{
-  if constexpr (sizeof (typename Lanes::B) == 32)
-    return __builtin_shufflevector (rangecast::Lanes<4>::at (low), rangecast::Lanes<4>::at (high),
-        0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24,
-        25, 26, 27, 28, 29, 30, 31);
-  else
-    return Lanes::at (low);
-}
-
-/* Transposes kSide x kSide bytes: with 16-byte vectors in four squares of 16 x 16, with those of 32
- * bytes in pairs of squares, one below the other. */
-template <typename Lanes>
+/* Transposes kSide x kSide bytes in squares of 16 x 16. */
 inline void
 transpose (
     const std::uint8_t *from, std::ptrdiff_t from_step, std::uint8_t *to, std::ptrdiff_t to_step)
 {
-  using B = typename Lanes::B;
-  constexpr int kBytes = sizeof (B), kSquare = 16;
-  for (int y = 0; y < kSide; y += kBytes)
+  using B = Lanes<4>::B;
+  constexpr int kSquare = sizeof (B);
+  for (int y = 0; y < kSide; y += kSquare)
     for (int x = 0; x < kSide; x += kSquare) {
-      std::uint8_t half[kSquare * kBytes], *out = half;
-      const std::uint8_t *in = from + y * from_step + x, *below = in + kSquare * from_step;
-      for (int i = 0; i < 4; i++, in += from_step, below += from_step) {
-        B rows[4];
+      B half[kSquare], rows[4];
 #pragma GCC unroll 4
-        for (int k = 0; k < 4; k++)
-          rows[k] = load_halves<Lanes> (in + 4 * k * from_step, below + 4 * k * from_step);
-        transpose_four<Lanes> (rows);
-#pragma GCC unroll 4
-        for (int k = 0; k < 4; k++, out += kBytes)
-          Lanes::at (out) = rows[k];
-      }
-      std::uint8_t *at = to + x * to_step + y;
       for (int i = 0; i < 4; i++) {
-        B rows[4];
 #pragma GCC unroll 4
         for (int k = 0; k < 4; k++)
-          rows[k] = Lanes::at (half + (i + 4 * k) * kBytes);
-        transpose_four<Lanes> (rows);
+          rows[k] = Lanes<4>::at (from + (y + i + 4 * k) * from_step + x);
+        transpose_four (rows);
 #pragma GCC unroll 4
-        for (int k = 0; k < 4; k++, at += to_step)
-          Lanes::at (at) = rows[k];
+        for (int k = 0; k < 4; k++)
+          half[4 * i + k] = rows[k];
+      }
+#pragma GCC unroll 4
+      for (int i = 0; i < 4; i++) {
+#pragma GCC unroll 4
+        for (int k = 0; k < 4; k++)
+          rows[k] = half[i + 4 * k];
+        transpose_four (rows);
+#pragma GCC unroll 4
+        for (int k = 0; k < 4; k++)
+          Lanes<4>::at (to + (x + 4 * i + k) * to_step + y) = rows[k];
       }
     }
 }
@@ -269,7 +196,6 @@ SemiGlobalMatcher::compare_band (const Stripe &stripe, int band, Memory &m)
 }
 
 /* Jumps between each column and the one before. */
-template <typename Lanes>
 void
 SemiGlobalMatcher::find_jumps_of_band (const Stripe &stripe, int band, Memory &m)
 {
@@ -282,9 +208,9 @@ SemiGlobalMatcher::find_jumps_of_band (const Stripe &stripe, int band, Memory &m
     for (int row = 0; row < rows; row++) {
       const std::uint8_t *grey = padded_[0].ptr<std::uint8_t> (stripe.y0 + begin + row + kRadiusY) +
                                  kRadiusX + stripe.x0 + i * kSide;
-      find_jumps<Lanes> (grey, grey - 1, jumps + row * kSide);
+      find_jumps (grey, grey - 1, jumps + row * kSide);
     }
-    transpose<Lanes> (jumps, kSide, &m.jumps[std::size_t (i) * kTileArea], kSide);
+    transpose (jumps, kSide, &m.jumps[std::size_t (i) * kTileArea], kSide);
   }
 }
 
@@ -296,7 +222,7 @@ SemiGlobalMatcher::walk_band (const Stripe &stripe, int band, Memory &m)
   using B = typename Lanes::B;
   const Tile *tiles = &tiles_[std::size_t (band * stripe.across)];
   compare_band<Lanes> (stripe, band, m);
-  find_jumps_of_band<Lanes> (stripe, band, m);
+  find_jumps_of_band (stripe, band, m);
   const std::size_t first = tiles[0].at, n = end_of (tiles[stripe.across - 1]) - first;
   m.costs.resize (std::max (m.costs.size (), n));
   m.rests.resize (std::max (m.rests.size (), n));
@@ -314,7 +240,7 @@ SemiGlobalMatcher::walk_band (const Stripe &stripe, int band, Memory &m)
         realign (tiles[i - way], tile, m);
       if (way > 0)
         for (int d = 0; d < tile.count; d++)
-          transpose<Lanes> (&costs_[tile.at] + d * kSide, each, costs + d * kSide, each);
+          transpose (&costs_[tile.at] + d * kSide, each, costs + d * kSide, each);
       const int last = std::min (kSide, stripe.columns - i * kSide);
       for (int k = 0; k < last; k++) {
         const int x = way > 0 ? k : last - 1 - k;
@@ -337,7 +263,7 @@ SemiGlobalMatcher::walk_band (const Stripe &stripe, int band, Memory &m)
       }
       if (way < 0)
         for (int d = 0; d < tile.count; d++)
-          transpose<Lanes> (rests + d * kSide, each, &rests_[tile.at] + d * kSide, each);
+          transpose (rests + d * kSide, each, &rests_[tile.at] + d * kSide, each);
     }
   }
 }
@@ -427,7 +353,7 @@ SemiGlobalMatcher::walk_columns (const Stripe &stripe, int column, Memory &m)
         if (const int last = (row - way) / kSide; last != band)
           realign (tile_of (last), tile, m);
         const std::uint8_t *grey = grey_of (row), *before = grey_of (row - way);
-        find_jumps<Lanes> (grey, before, jumps.data ());
+        find_jumps (grey, before, jumps.data ());
       }
       const std::size_t at =
           tile.at + std::size_t (row - band * kSide) * std::size_t (tile.count) * kSide;
