@@ -48,18 +48,18 @@ on_candidate (GstElement *webrtc, guint media, const gchar *candidate, gpointer)
       json ({{"type", "call"}, {"media", index.c_str ()}, {"candidate", candidate}}));
 }
 
-GstWebRTCPeerConnectionState
-state_of (GstElement *webrtc)
+bool
+has_state (gpointer webrtc, GstWebRTCPeerConnectionState wanted)
 {
   GstWebRTCPeerConnectionState state = GST_WEBRTC_PEER_CONNECTION_STATE_NEW;
   g_object_get (webrtc, "connection-state", &state, nullptr);
-  return state;
+  return state == wanted;
 }
 
 gboolean
 on_no_way (gpointer webrtc)
 {
-  if (state_of (GST_ELEMENT (webrtc)) == GST_WEBRTC_PEER_CONNECTION_STATE_FAILED)
+  if (has_state (webrtc, GST_WEBRTC_PEER_CONNECTION_STATE_FAILED))
     GST_ELEMENT_ERROR (webrtc, RESOURCE, OPEN_READ_WRITE,
         ("There is no way through both networks to the other end: use a STUN server, or where that "
          "is not enough a TURN server"),
@@ -70,11 +70,10 @@ on_no_way (gpointer webrtc)
 void
 on_state (GstElement *webrtc, GParamSpec *, gpointer)
 {
-  const auto state = state_of (webrtc);
-  if (state == GST_WEBRTC_PEER_CONNECTION_STATE_FAILED) /* of the candidates so far */
+  if (has_state (webrtc, GST_WEBRTC_PEER_CONNECTION_STATE_FAILED)) /* of the candidates so far */
     g_timeout_add_full (G_PRIORITY_DEFAULT, kMaxCandidateWait_ms, on_no_way,
         gst_object_ref (webrtc), gst_object_unref);
-  if (state != GST_WEBRTC_PEER_CONNECTION_STATE_CONNECTED)
+  if (!has_state (webrtc, GST_WEBRTC_PEER_CONNECTION_STATE_CONNECTED))
     return;
   const auto open = [] (const GValue *valve, gpointer) {
     g_object_set (g_value_get_object (valve), "drop", FALSE, nullptr);
@@ -85,13 +84,6 @@ on_state (GstElement *webrtc, GParamSpec *, gpointer)
   gst_iterator_free (valves);
   gst_object_unref (pipeline);
   g_print ("the other end is connected\n");
-}
-
-/* The first packet of a frame set that comes later than the one before is not lost. */
-void
-on_jitterbuffer (GstElement *, GstElement *jitterbuffer, guint, guint, gpointer)
-{
-  g_object_set (jitterbuffer, "rtx-next-seqnum", FALSE, nullptr);
 }
 
 /* An offer or answer has been made: sets it, and sends it. */
@@ -198,7 +190,11 @@ WebrtcCall::join (GstElement *pipeline)
   g_signal_connect (webrtc_, "on-ice-candidate", G_CALLBACK (on_candidate), nullptr);
   g_signal_connect (webrtc_, "notify::connection-state", G_CALLBACK (on_state), nullptr);
   GstElement *rtpbin = gst_bin_get_by_name (GST_BIN (webrtc_), "rtpbin");
-  g_signal_connect (rtpbin, "new-jitterbuffer", G_CALLBACK (on_jitterbuffer), nullptr);
+  /* The first packet of a frame set that comes later than the one before is not lost. */
+  const auto set = [] (GstElement *, GObject *jitterbuffer, guint, guint, gpointer) {
+    g_object_set (jitterbuffer, "rtx-next-seqnum", FALSE, nullptr);
+  };
+  g_signal_connect (rtpbin, "new-jitterbuffer", GCallback (+set), nullptr);
   gst_object_unref (rtpbin);
   g_autoptr (GArray) transceivers = nullptr;
   g_signal_emit_by_name (webrtc_, "get-transceivers", &transceivers);
