@@ -61,8 +61,8 @@ def build_call(args, link, ports):
     filters = [*(["!", "webrtcdsp", "probe=heard"] if cancel else []), "!", "volume", "name=microphone"]
     transport.speak(launch, microphone, filters, [f"ssrc={audio}"])
     launch.add("!", *VALVE, "!", f"application/x-rtp,{transport.AUDIO},ssrc=(uint){audio}", "!", "webrtc.sink_1")
-    launch.add("webrtc.src_0", "!", "rtpneighbourcodedepay")
-    present(args, launch, lambda _, launch: launch.add("webrtc.src_1", "!", "rtpopusdepay"), PROBE if cancel else [])
+    launch.add("rtpneighbourcodedepay", "name=call-video")
+    present(args, launch, lambda _, launch: launch.add("rtpopusdepay", "name=call-audio"), PROBE if cancel else [])
     return launch
 
 

@@ -86,6 +86,25 @@ on_state (GstElement *webrtc, GParamSpec *, gpointer)
   g_print ("the other end is connected\n");
 }
 
+/* Pads have no caps yet in GStreamer 1.22, and the number of their arrival in later versions. */
+void
+on_pad (GstElement *webrtc, GstPad *pad, gpointer)
+{
+  g_autoptr (GObject) transceiver = nullptr;
+  GstWebRTCKind kind = GST_WEBRTC_KIND_UNKNOWN;
+  if (GST_PAD_IS_SINK (pad))
+    return;
+  g_object_get (pad, "transceiver", &transceiver, nullptr);
+  g_object_get (transceiver, "kind", &kind, nullptr);
+  GstObject *pipeline = gst_object_get_parent (GST_OBJECT (webrtc));
+  GstElement *receiver = gst_bin_get_by_name (
+      GST_BIN (pipeline), kind == GST_WEBRTC_KIND_VIDEO ? "call-video" : "call-audio");
+  if (receiver)
+    gst_element_link_pads (webrtc, GST_PAD_NAME (pad), receiver, "sink");
+  gst_clear_object (&receiver);
+  gst_object_unref (pipeline);
+}
+
 /* An offer or answer has been made: sets it, and sends it. */
 void
 on_description (GstPromise *promise, gpointer data)
@@ -189,6 +208,7 @@ WebrtcCall::join (GstElement *pipeline)
   }
   g_signal_connect (webrtc_, "on-ice-candidate", G_CALLBACK (on_candidate), nullptr);
   g_signal_connect (webrtc_, "notify::connection-state", G_CALLBACK (on_state), nullptr);
+  g_signal_connect (webrtc_, "pad-added", G_CALLBACK (on_pad), nullptr);
   GstElement *rtpbin = gst_bin_get_by_name (GST_BIN (webrtc_), "rtpbin");
   /* The first packet of a frame set that comes later than the one before is not lost. */
   const auto set = [] (GstElement *, GObject *jitterbuffer, guint, guint, gpointer) {

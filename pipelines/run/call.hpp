@@ -17,8 +17,9 @@ public:
   virtual ~Call () = default;
 
   /** Meets the other end, with the webrtcbin named webrtc of a pipeline that plays, whose valves it
-   *  opens when both are connected; or the next one, with another pipeline. Failures are error
-   *  messages of the webrtcbin. @return false after reporting that there is none */
+   *  opens when both are connected, and to whose elements call-video and call-audio goes what
+   * comes; or the next one, with another pipeline. Failures are error messages of the webrtcbin.
+   *  @return false after reporting that there is none */
   virtual bool join (GstElement *pipeline) = 0;
   /** Handles what the negotiation posts on the pipeline's bus.
    *  @return whether that ends: call-left, and another one may come, or call-over */
