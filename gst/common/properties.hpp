@@ -59,17 +59,11 @@ read (const GValue *value)
   else if constexpr (std::same_as<T, std::string>) {
     const gchar *text = g_value_get_string (value);
     return text ? text : "";
-  } else if constexpr (std::is_enum_v<T>)
-    return static_cast<T> (
-        G_VALUE_HOLDS_FLAGS (value) ? int (g_value_get_flags (value)) : g_value_get_enum (value));
-  else if constexpr (std::same_as<T, gint>)
-    return G_VALUE_HOLDS_ENUM (value) ? g_value_get_enum (value) : g_value_get_int (value);
-  else if constexpr (std::same_as<T, guint>)
-    return G_VALUE_HOLDS_FLAGS (value) ? g_value_get_flags (value) : g_value_get_uint (value);
-  else if constexpr (std::signed_integral<T>)
-    return g_value_get_int64 (value);
-  else
-    return g_value_get_uint64 (value);
+  } else { /* whole numbers, enumerations and flags */
+    GValue number = G_VALUE_INIT;
+    g_value_transform (value, g_value_init (&number, G_TYPE_INT64));
+    return static_cast<T> (g_value_get_int64 (&number));
+  }
 }
 
 template <typename T>
@@ -82,18 +76,11 @@ write (const T &member, GValue *value)
     g_value_set_double (value, member);
   else if constexpr (std::same_as<T, std::string>)
     g_value_set_string (value, member.empty () ? nullptr : member.c_str ());
-  else if constexpr (std::is_enum_v<T>)
-    G_VALUE_HOLDS_FLAGS (value) ? g_value_set_flags (value, guint (member))
-                                : g_value_set_enum (value, int (member));
-  else if constexpr (std::same_as<T, gint>)
-    G_VALUE_HOLDS_ENUM (value) ? g_value_set_enum (value, member) : g_value_set_int (value, member);
-  else if constexpr (std::same_as<T, guint>)
-    G_VALUE_HOLDS_FLAGS (value) ? g_value_set_flags (value, member)
-                                : g_value_set_uint (value, member);
-  else if constexpr (std::signed_integral<T>)
-    g_value_set_int64 (value, member);
-  else
-    g_value_set_uint64 (value, member);
+  else {
+    GValue number = G_VALUE_INIT;
+    g_value_set_int64 (g_value_init (&number, G_TYPE_INT64), static_cast<gint64> (member));
+    g_value_transform (&number, value);
+  }
 }
 
 template <typename Settings, auto... kPath>
