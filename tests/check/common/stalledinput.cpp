@@ -25,6 +25,10 @@ static const struct {
         "Pad right has no images in time; those of pad left are dropped"},
     {kCamera + "t. ! valve name=v ! queue ! e.left t. ! queue ! e.right " + kDepth,
         "Pad left has no images in time; those of pad right are dropped"},
+    {"avatartestsrc is-live=true name=c c.left ! video/x-raw,width=64,height=48,framerate=20/1 ! "
+     "queue ! e.left c.right ! valve name=v ! queue ! e.right " +
+            kDepth,
+        "Pad right has no images in time; those of pad left are dropped"},
     {kCamera + "t. ! queue ! e.colour t. ! valve name=v ! queue ! videoconvert ! "
                "video/x-raw,format=GRAY16_LE ! e.depth rangecombine name=e focal-length=64 ! "
                "fakesink name=out",
