@@ -69,12 +69,6 @@ stereo_cam_properties ()
           kMutableReady),
       P::number<&S::view_id> ("view-id", "View ID", "View of the rig file that names the cameras",
           0, 63, kMutableReady),
-      P::number<&S::offset_x> ("offset-x", "Offset x",
-          "Left edge of the region of interest on the sensor in pixels (-1 = centred)", -1, 65535,
-          kMutableReady),
-      P::number<&S::offset_y> ("offset-y", "Offset y",
-          "Top edge of the region of interest on the sensor in pixels (-1 = centred)", -1, 65535,
-          kMutableReady),
       P::number<&S::packet_size> ("packet-size", "Packet size",
           "GigE Vision packet size in bytes, with headers (0 = largest that passes the network, -1 "
           "= leave unchanged)",
@@ -177,8 +171,6 @@ StereoCamSettings::for_camera (int camera) const
 {
   CameraSettings s;
   const bool left = camera == 0;
-  s.x = offset_x;
-  s.y = offset_y;
   s.trigger = trigger;
   s.trigger_line = trigger_line;
   if (left)

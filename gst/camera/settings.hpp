@@ -26,7 +26,6 @@ struct StereoCamSettings {
   std::string rig;    ///< file that names them, if names are empty
   int view_id = 0;    ///< in the rig file
   std::string format; ///< GenICam pixel format; empty: negotiated
-  int offset_x = -1, offset_y = -1;
   TriggerMode trigger = TriggerMode::kFreeRun;
   double exposure_us = 0, gain = -1; ///< 0, -1: unchanged
   bool auto_exposure = false, auto_gain = false, auto_white_balance = false;

@@ -144,11 +144,9 @@ set_region (CameraControl &control, const CameraSettings &settings)
   const auto guard = control.lock ();
   ArvCamera *camera = control.camera ();
   read_sizes (control, a);
-  int x = settings.x, y = settings.y;
-  if (x < 0) /* near the middle, in the steps of the camera */
-    x = std::max (a.max_width - settings.width, 0) / 2;
-  if (y < 0)
-    y = std::max (a.max_height - settings.height, 0) / 2;
+  /* near the middle, in the steps of the camera */
+  int x = std::max (a.max_width - settings.width, 0) / 2;
+  int y = std::max (a.max_height - settings.height, 0) / 2;
   x -= x % std::max (1, arv_camera_get_x_offset_increment (camera, nullptr));
   y -= y % std::max (1, arv_camera_get_y_offset_increment (camera, nullptr));
   const auto text = [] (int left, int top, int width, int height) {

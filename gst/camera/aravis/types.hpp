@@ -123,8 +123,7 @@ enum class AutoMode {
 struct CameraSettings {
   /// Image
   std::string pixel_format;  ///< name in GenICam's naming convention: Mono8, RGB8, BayerRG8, ...
-  int width = 0, height = 0; ///< pixels
-  int x = -1, y = -1;        ///< top-left corner on the sensor, pixels; -1: centred
+  int width = 0, height = 0; ///< pixels, from the middle of the sensor
 
   /// Acquisition
   double frame_rate = 0; ///< frames per second; free-running and line masters only
