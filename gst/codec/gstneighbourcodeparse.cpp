@@ -131,24 +131,32 @@ reset_min_frame_size (GstBaseParse *base)
   gst_base_parse_set_min_frame_size (base, stream.reads_stream ? guint (kAccessUnitHeaderSize) : 1);
 }
 
-/* Lets a state change of the pipeline end, for 5 s at most: uridecodebin3 of GStreamer 1.22 starts
- * its source before decodebin3, which loses what comes before it is in PAUSED. */
+static bool
+any_parent_changes_state (GstBaseParse *base)
+{
+  bool changes = false;
+  GstObject *parent = gst_object_get_parent (GST_OBJECT (base));
+  while (parent && !changes) {
+    changes = !GST_STATE_TRYLOCK (parent);
+    if (!changes)
+      GST_STATE_UNLOCK (parent);
+    GstObject *next = gst_object_get_parent (parent);
+    gst_object_unref (parent);
+    parent = next;
+  }
+  gst_clear_object (&parent);
+  return changes;
+}
+
+/* For 5 s at most: uridecodebin3 of GStreamer 1.22 starts its source before decodebin3, which loses
+ * what comes before it is in PAUSED. */
 static void
 wait_for_state_change (GstBaseParse *base)
 {
-  auto top = static_cast<GstElement *> (gst_object_ref (base));
-  while (GstObject *parent = gst_object_get_parent (GST_OBJECT (top))) {
-    gst_object_unref (top);
-    top = GST_ELEMENT (parent);
-  }
-  for (int i = 0; i < 5000 && !GST_PAD_IS_FLUSHING (GST_BASE_PARSE_SRC_PAD (base)); i++) {
-    if (GST_STATE_TRYLOCK (top)) {
-      GST_STATE_UNLOCK (top);
-      break;
-    }
+  for (int i = 0; i < 5000 && any_parent_changes_state (base) &&
+                  !GST_PAD_IS_FLUSHING (GST_BASE_PARSE_SRC_PAD (base));
+       i++)
     g_usleep (1000);
-  }
-  gst_object_unref (top);
 }
 
 static bool

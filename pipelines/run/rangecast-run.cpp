@@ -397,8 +397,8 @@ GstElement *
 parse_pipeline (gchar **launch)
 {
   GError *error = nullptr;
-  /* Of a number out of range GObject only warns (later GLib calls that critical), and
-   * the default stays. */
+  /* Of a number out of range GObject only warns (later GLib calls that critical), and the default
+   * stays. Here it is an error, also where G_DEBUG would abort. */
   const auto fail = [] (const gchar *, GLogLevelFlags, const gchar *message, gpointer error) {
     if (!*static_cast<GError **> (error))
       g_set_error_literal (static_cast<GError **> (error), GST_PARSE_ERROR,
