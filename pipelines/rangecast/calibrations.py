@@ -336,14 +336,14 @@ KINDS = {
     "matrix": "m|k|mtx|(?:camera|cam)(?:matrix|mtx)|matrix|intrinsics?|intrinsicmatrix|cameraintrinsics?",
     "distortion": "d|dist(?:ortion)?(?:(?:coef|coeff|coefficient|param|parameter)s?)?",
     "rotation": f"(?:r|rot|rotation)(?:matrix)?{TO}",
-    "translation": f"(?:t|trans|translation)(?:vector|matrix)?{TO}(?:mm|cm|m)?",
+    "translation": f"(?:t|trans|translation)(?:vector|matrix)?{TO}(?P<unit>mm|cm|m)?",
     "width": "(?:image|img|imagesize)?width",
     "height": "(?:image|img|imagesize)?height",
     "size": "(?:image|img)?(?:size|resolution)",
     "model": "(?:distortion|lens)(?:model|type)",
     "camera": "camera(?:model|type)",
 }
-NAME = "(?:calibration|stereo|extrinsics?|cameras?|cam)*(left|right|[012])?(?:cameras?|cam|intrinsics?)*(?:%s)(?:camera|cam)?(left|right|[lr012])?(?:fe)?"  # ZED's fisheye
+NAME = "(?:calibration|stereo|extrinsics?|cameras?|cam)*(?P<a>left|right|[012])?(?:cameras?|cam|intrinsics?)*(?:%s)(?:camera|cam)?(?P<b>left|right|[lr012])?(?:fe)?"  # ZED's fisheye
 
 
 def opencv(documents, args):
@@ -354,7 +354,7 @@ def opencv(documents, args):
         return re.fullmatch(NAME % KINDS[kind], re.sub(r"[^a-z0-9]", "", str(name).lower()))
 
     def side_of(found):
-        return (found[1] or found[2] or "")[:1].upper()
+        return (found["a"] or found["b"] or "")[:1].upper()
 
     values, single = {}, []
 
@@ -368,7 +368,7 @@ def opencv(documents, args):
                 # The rotation of camera_info rectifies; a number is no matrix, but a coefficient k1.
                 if found and not (side and kind in ("rotation", "translation")) and not (kind == "matrix" and isinstance(value, (int, float))):
                     values.setdefault((kind, side_of(found) or side), value)
-                    values.setdefault(("name of " + kind, side_of(found) or side), str(name).lower())
+                    values.setdefault(("unit of " + kind, side_of(found) or side), found.groupdict().get("unit"))
 
     for document in documents:
         side = ""
@@ -388,13 +388,14 @@ def opencv(documents, args):
         size, width, height, model, camera = (values.get((kind, side), values.get((kind, ""))) for kind in ("size", "width", "height", "model", "camera"))
         if camera is not None:
             lens([], camera, "camera model")
-        size = size or (None if width is None or height is None else [width, height])
         intrinsics = pinhole(matrix, f"M{number} or K{number}")
         if size:  # NumPy's shape has the height first: that of which the principal point is nearer to the centre
             width, height = need(size, 2, "image size")
             size = min([width, height], [height, width], key=lambda one: math.dist(one, [2 * centre for centre in intrinsics[2:]]))
+        elif width is not None and height is not None:
+            size = need([width, height], 2, "image size")
         cameras[name] = Camera(size, intrinsics, lens(distortion, model, f"D{number}"), Pose(IDENTITY, [0, 0, 0]))
-    unit = 1 if args.unit else {"mm": 0.001, "cm": 0.01}.get(values["name of translation", ""].rpartition("_")[2], 1)
+    unit = 1 if args.unit else {"mm": 0.001, "cm": 0.01}.get(values["unit of translation", ""], 1)
     cameras["right"].pose = Pose(rotation(values["rotation", ""], "R"), metres(values["translation", ""], unit))
     return cameras
 

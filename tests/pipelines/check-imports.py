@@ -109,13 +109,18 @@ def opencv():
               "stereo": {"R": ROTATION.tolist(), "T": T.tolist()}, "image_size": SIZE}  # fmt: skip
     Path("nested.json").write_text(json.dumps(nested))
     check("maps of cameras", TRUTH, "nested.json")
-    Path("units.yaml").write_text(yaml.dump({f"{side}_camera": {"camera_matrix": k.tolist(), "distortion_params": [d.tolist()]} for side, k, d in
-                                             (("left", K1, FIVE1), ("right", K2, FIVE2))} | {"rotation_matrix_cam1_to_cam2": ROTATION.tolist(),
-                                            "translation_mm": (1000 * T).tolist(), "image_size": list(SIZE), "k1": 0.1}))  # fmt: skip
-    check("unit in a name", TRUTH, "units.yaml")
+    for name, unit in ("translation_mm", 1000), ("translationMM", 1000), ("T (mm)", 1000), ("T-cm", 100), ("T [m]", 1):
+        Path("units.yaml").write_text(yaml.dump({f"{side}_camera": {"camera_matrix": k.tolist(), "distortion_params": [d.tolist()]} for side, k, d in
+                                                 (("left", K1, FIVE1), ("right", K2, FIVE2))} | {"rotation_matrix_cam1_to_cam2": ROTATION.tolist(),
+                                                name: (unit * T).tolist(), "image_size": list(SIZE), "k1": 0.1}))  # fmt: skip
+        check(f"unit in the name {name}", TRUTH, "units.yaml")
     Path("shape.json").write_text(json.dumps(nested | {"image_size": SIZE[::-1]}))
     check("image size as NumPy's shape", TRUTH, "shape.json")
     expect("image size as NumPy's shape", np.array(yaml.safe_load(Path("rig.yaml").read_text().split("---")[1])["views"][0]["image_size"]), SIZE)
+    corner = K1 - [[0, 0, 280], [0, 0, -90], [0, 0, 0]]  # nearer to the centre of 720x1280
+    storage("named.yml", width=SIZE[0], height=SIZE[1], M1=corner, D1=FIVE1, M2=corner, D2=FIVE2, R=ROTATION, T=T)
+    run("named.yml")
+    expect("width and height by name", np.array(yaml.safe_load(Path("rig.yaml").read_text().split("---")[1])["views"][0]["image_size"]), SIZE)
     Path("swapped.json").write_text(json.dumps(nested | {"stereo": {"R": ROTATION.T.tolist(), "T": (-ROTATION.T @ T).tolist()}}))
     refused("swapped", "swapped: --cameras right,left swaps them", "swapped.json")
     check("swapped back", (K2, FIVE2, K1, FIVE1, ROTATION, T), "swapped.json", "--cameras", "right,left")
