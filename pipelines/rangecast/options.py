@@ -62,8 +62,10 @@ def address(text):
 def host(text):
     """A name, or an address of IPv4 or IPv6."""
     try:
+        if re.fullmatch(r"[\d.]+", text):  # getaddrinfo() takes 10.1 for 10.0.0.1
+            ipaddress.IPv4Address(text)
         socket.getaddrinfo(text, None)
-    except OSError:
+    except (OSError, ValueError):
         raise Wrong(f"no host '{text}'") from None
     return text
 

@@ -34,7 +34,7 @@ test_values_out_of_range_are_named () {
 
 test_addresses_are_checked () {
   local one
-  for one in ::1:5901 127.0.0.1 :5901 127.0.0.1:70000 239.255.7.300:5000 127.0.0.1:6000, nosuchhost.invalid:5; do
+  for one in ::1:5901 127.0.0.1 :5901 192.168.5:5000 1:5000 127.0.0.1:70000 239.255.7.300:5000 127.0.0.1:6000, nosuchhost.invalid:5; do
     refuses "argument --to: " parent --views 1 --listen 5000 --to "$one"
   done
   refuses "'10.0.0.1' is not a group" view --listen 5000 --multicast 10.0.0.1
