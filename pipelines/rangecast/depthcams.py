@@ -4,10 +4,12 @@
 import ctypes
 import math
 import os
+import re
 import shutil
 import sys
 
 from . import options
+from .check import run
 from .launch import Fail, fail_unless
 
 DEPTH_CAMERAS = """openni2, openni2=URI: a depth camera of OpenNI 2 (Xtion, Kinect, Astra), or a recording FILE.oni;
@@ -27,7 +29,11 @@ def add_depth_camera(launch, what, args, rig, view):
     calibration = [f"rig={rig}", f"view-id={view}"] if rig else []
     if kind == "openni2":
         value = os.path.abspath(value) if os.path.exists(value) else value
-        properties, flip = ask_openni(value, rig)
+        if args.print and not os.path.exists(value):
+            properties, flip = [], []
+            print("warning: --print asks no camera: depth-scale, focal-length and videoflip are left out", file=sys.stderr)
+        else:
+            properties, flip = ask_openni(value, rig)
         for sensor, pad in ("depth", "depth"), ("color", "colour"):
             launch.add("openni2src", *([f"location={value}"] if value else []), f"sourcetype={sensor}", *flip, *QUEUE, f"combine.{pad}")
     else:
@@ -38,8 +44,13 @@ def add_depth_camera(launch, what, args, rig, view):
         properties = [f"colour-view-id={view + 1}"]
         width, height = args.size
         # v4l2src does not know Z16.
-        launch.feed = ["v4l2-ctl", "-d", depth, "--set-fmt-video", f"width={width},height={height},pixelformat=Z16 ", "--set-parm", str(args.fps),
-                       "--stream-mmap", "--stream-to=-"]  # fmt: skip
+        control = ["v4l2-ctl", "-d", depth, "--set-fmt-video", f"width={width},height={height},pixelformat=Z16 "]
+        launch.feed = [*control, "--set-parm", str(args.fps), "--stream-mmap", "--stream-to=-"]
+        if not args.print:
+            status, said = run(*control, "--get-fmt-video")  # the nearest one, without an error
+            said = " ".join(said.split())
+            fail_unless(status == 0 and re.search(rf"t : {width}/{height} Pixel Format : 'Z16 ?'.* Bytes per Line : {2 * width}\b", said),
+                        f"{depth} has no {width}x{height} of Z16 without padding; give a --size of v4l2-ctl --list-formats-ext. It says: {said}")  # fmt: skip
         launch.add("fdsrc", f"blocksize={2 * width * height}", "!", "rawvideoparse", "format=gray16-le", f"width={width}", f"height={height}",
                    f"framerate={args.fps}/1", *QUEUE, "combine.depth")  # fmt: skip
         source = v4l2_source(colour, args.size, args.fps) if colour.startswith("/") else options.elements(colour)

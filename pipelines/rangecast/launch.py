@@ -94,7 +94,8 @@ class Launch:
         self.check_ports()
         os.environ.update(self.environment)
         if self.feed:
-            os.dup2(self.open_feed().fileno(), 0)
+            feed = self.open_feed()  # its end closes the file
+            os.dup2(feed.fileno(), 0)
         sys.stdout.flush()
         os.execvp("rangecast-run", self.command())
 

@@ -145,6 +145,8 @@ test_openni_recording_shows_the_head_with_intrinsics_unit_and_mirroring_of_the_c
   python3 "$source_dir/write-oni.py" wide.oni 160x120 10 60 depth.raw colour.raw --wide-colour
   expect_error "colour is 320x120 but depth 160x120" rangecast webcam --camera openni2=wide.oni --png none.png
   expect_error "no OpenNI 2 camera or recording none.oni" rangecast webcam --camera openni2=none.oni --png none.png
+  rangecast webcam --camera openni2=1d27/0609@1/2 --print 2>&1 >string.txt | grep -q 'are left out' || fail "no warning"
+  grep -q 'openni2src location=1d27/0609@1/2' string.txt || fail "$(cat string.txt)"
   expect_error "'kinect' is none of: openni2" rangecast webcam --camera kinect --png none.png
 }
 
@@ -183,6 +185,11 @@ test_v4l2_depth_camera_shows_the_head () {
   mkdir tools
   cat >tools/v4l2-ctl <<'EOF'
 #!/bin/sh
+if [ "$*" = "-d /dev/video2 --set-fmt-video width=160,height=120,pixelformat=Z16  --get-fmt-video" ]; then
+  printf 'Format Video Capture:\n\tWidth/Height      : %s\n\tPixel Format      : %s (16-bit Depth)\n' "${SIZE:-160/120}" "'${PIXELS:-Z16 }'"
+  printf '\tField             : None\n\tBytes per Line    : %s\n\tSize Image        : 38400\n' "${STRIDE:-320}"
+  exit
+fi
 [ "$*" = "-d /dev/video2 --set-fmt-video width=160,height=120,pixelformat=Z16  --set-parm 10 --stream-mmap --stream-to=-" ] || exit 1
 for i in $(seq 0 19); do
   dd if=depth.raw bs=38400 count=1 skip=$i 2>/dev/null
@@ -193,6 +200,11 @@ EOF
   local camera="v4l2=/dev/video2,videotestsrc is-live=true ! video/x-raw,width=160,height=120,framerate=10/1"
   PATH=$PWD/tools:$PATH rangecast webcam --camera "$camera" --rig rig.yaml --size 160x120 --fps 10 --depth depth-scale=0.0001 --png head.png
   expect_file head.png 30000
+  local wrong
+  for wrong in SIZE=320/240 PIXELS=YUYV STRIDE=3200; do
+    PATH=$PWD/tools:$PATH expect_error "/dev/video2 has no 160x120 of Z16 without padding" \
+      env "$wrong" rangecast webcam --camera "$camera" --rig rig.yaml --size 160x120 --png none.png
+  done
   expect_error "v4l2 needs --rig" rangecast webcam --camera "$camera" --png none.png
   rangecast webcam --camera v4l2=/dev/video2,/dev/video4 --rig rig.yaml --png none.png --print >string.txt
   grep -q '^v4l2-ctl -d /dev/video2 .*--stream-to=- | rangecast-run .*fdsrc' string.txt || fail "$(cat string.txt)"
