@@ -82,7 +82,8 @@ FrameSetJoiner::write_access_unit (GstClockTime time)
   for (const Part &part : parts_) {
     const auto add_slice = [&] (gsize, std::span<const guint8> unit,
                                const rangecast::UnitHeader &header) {
-      if (header.type == guint8 (rangecast::UnitType::kSlice) && unit.size () > kViewIdByte)
+      if (header.type == guint8 (rangecast::UnitType::kSlice) && unit.size () > kViewIdByte &&
+          unit[kViewIdByte] + part.id_offset < rangecast::kMaxViews)
         writer_.add (unit)[kViewIdByte] += guint8 (part.id_offset);
       return true;
     };

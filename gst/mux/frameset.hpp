@@ -27,8 +27,8 @@ public:
   /** Appends the views of a buffer.
    *  @param buffer  transfer none; must live until finish()
    *  @param id_offset  added to its view-ids
-   *  @return false, and nothing is added, if it is raw and has a view-id that was added before, or
-   *  if it would make a coded frame set too long */
+   *  @return false, and nothing is added, if it is raw and has a view-id that was added before or
+   *  is too large, or if it would make a coded frame set too long */
   bool add (GstBuffer *buffer, int id_offset);
   /** @param time  in the byte stream of coded ones
    *  @param[out] frame_set  transfer full, without times; nullptr on error

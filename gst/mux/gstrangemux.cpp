@@ -293,8 +293,8 @@ join_matching (GstRangeMux *self, const MuxStreams &streams, FrameTimes &times)
     times.running = std::min (times.running, stream->running);
     drop_buffer (priv, *stream);
     if (!priv->joiner.add (stream->buffer, stream->id_offset))
-      GST_WARNING_OBJECT (stream->pad, "dropping a buffer: its view-id is that of another pad, or "
-                                       "the frame set is too long");
+      GST_WARNING_OBJECT (stream->pad, "dropping a buffer: its view-id is that of another pad or "
+                                       "above 63, or the frame set is too long");
     set_state (self, *stream, StreamState::kIn, stream->running);
     std::lock_guard guard (priv->lock);
     stream->matched++;
@@ -440,6 +440,33 @@ handle_caps (GstRangeMux *self, MuxStream &stream, GstCaps *caps)
   std::lock_guard guard (self->priv->lock);
   stream.views = view_bits (stream.info.rig);
   return TRUE;
+}
+
+/* A region is that of one view: it is requested from the pad that has it, by the view-id there. */
+static gboolean
+gst_range_mux_src_event (GstAggregator *aggregator, GstEvent *event)
+{
+  guint id;
+  if (!gst_event_has_name (event, "GstRangeRoi") ||
+      !gst_structure_get_uint (gst_event_get_structure (event), "view-id", &id))
+    return GST_AGGREGATOR_CLASS (gst_range_mux_parent_class)->src_event (aggregator, event);
+  MuxStreams streams;
+  {
+    GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
+    std::lock_guard guard (priv->lock);
+    std::ranges::copy_if (priv->streams, std::back_inserter (streams), [&] (const auto &stream) {
+      return id < guint (rangecast::kMaxViews) && (stream->views >> id & 1);
+    });
+  }
+  gboolean taken = FALSE;
+  for (const auto &stream : streams) {
+    GstEvent *own = gst_event_copy (event);
+    gst_structure_set (gst_event_writable_structure (own), "view-id", G_TYPE_UINT,
+        id - guint (stream->id_offset), nullptr);
+    taken = gst_pad_push_event (GST_PAD (stream->pad), own) || taken;
+  }
+  gst_event_unref (event);
+  return taken;
 }
 
 static gboolean
@@ -658,6 +685,7 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
   aggregator_class->start = GST_DEBUG_FUNCPTR (gst_range_mux_start);
   aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_range_mux_stop);
   aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_range_mux_flush);
+  aggregator_class->src_event = GST_DEBUG_FUNCPTR (gst_range_mux_src_event);
   aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_range_mux_sink_event);
   aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_range_mux_update_src_caps);
   aggregator_class->negotiate = GST_DEBUG_FUNCPTR (negotiate_downstream);

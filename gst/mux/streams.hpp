@@ -60,7 +60,6 @@ struct MuxStream : PadStream {
   /* streaming thread */
   bool has_caps = false, coded = false;
   gstrange::RangeInfo info;                 ///< moved as the pad's properties say
-  int id_offset = 0;                        ///< what was added to its view-ids
   rangecast::Status other_rig;              ///< how it differs from the property `rig`
   rangecast::Status clash;                  ///< why it is not chosen
   bool chosen = false;                      ///< by choose_streams()
@@ -81,6 +80,7 @@ struct MuxStream : PadStream {
   GstClockTimeDiff skew = 0; ///< capture time - the oldest of its frame set, ns
 
   /* any thread */
+  std::atomic<int> id_offset = 0;           ///< what was added to its view-ids
   std::atomic<GstClockTimeDiff> offset = 0; ///< live: capture time - pipeline clock on arrival, ns
 };
 

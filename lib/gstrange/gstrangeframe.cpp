@@ -62,7 +62,8 @@ append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base, guint id_offse
 {
   gpointer state = nullptr;
   while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state))
-    if (gst_buffer_get_range_meta (frame_set, meta->view_id + id_offset))
+    if (meta->view_id >= rangecast::kMaxViews - id_offset ||
+        gst_buffer_get_range_meta (frame_set, meta->view_id + id_offset))
       return false;
   state = nullptr;
   while (const GstRangeMeta *meta = gst_buffer_iterate_range_meta (views, &state)) {

@@ -28,7 +28,7 @@ void copy_layout (GstRangeMeta *to, const GstRangeMeta *from);
 /** Adds the metas of `views` to a frame set like gst_range_buffer_append(), without its memories.
  *  @param base  offset in `frame_set` of the bytes of `views`
  *  @param id_offset  added to the view-ids of `views`
- *  @return false, and nothing is added, if both contain the same view-id */
+ *  @return false, and nothing is added, if both contain the same view-id or one is too large */
 bool append_metas (GstBuffer *frame_set, GstBuffer *views, gsize base, guint id_offset = 0);
 
 /** Maps all views of a frame set during its lifetime, without allocations. After a failure views()

@@ -107,7 +107,8 @@ gst_buffer_n_range_metas (GstBuffer *buffer)
  * @frame_set keeps a reference to @views, which then returns to its pool. (Beyond
  * gst_buffer_get_max_memory() memories GStreamer merges them, which copies.)
  *
- * Returns: %FALSE, and @frame_set is unchanged, if both contain the same view-id
+ * Returns: %FALSE, and @frame_set is unchanged, if both contain the same view-id or @views one
+ *   above 63
  */
 gboolean
 gst_range_buffer_append (GstBuffer *frame_set, GstBuffer *views)

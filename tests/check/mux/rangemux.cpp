@@ -112,21 +112,26 @@ GST_START_TEST (test_two_pads_with_one_view_are_one_error_that_names_both)
 }
 GST_END_TEST;
 
+static GstBuffer *
+slice_of_view (int id)
+{
+  guint8 bytes[kSliceHeaderSize];
+  SliceHeader header;
+  header.view_id = guint8 (id);
+  header.depth_bits = 12;
+  header.colour_bits = 8;
+  write_slice_header (header, sizeof bytes, bytes);
+  GstBuffer *buffer = gst_buffer_new_memdup (bytes, sizeof bytes);
+  gst_range_buffer_set_capture_time (buffer, 9);
+  GST_BUFFER_PTS (buffer) = 0;
+  return buffer;
+}
+
 GST_START_TEST (test_coded_access_units_are_joined)
 {
   Mux mux (2, true);
-  for (int i = 0; i < 2; i++) {
-    guint8 bytes[kSliceHeaderSize];
-    SliceHeader header;
-    header.view_id = guint8 (i);
-    header.depth_bits = 12;
-    header.colour_bits = 8;
-    write_slice_header (header, sizeof bytes, bytes);
-    GstBuffer *buffer = gst_buffer_new_memdup (bytes, sizeof bytes);
-    gst_range_buffer_set_capture_time (buffer, 9);
-    GST_BUFFER_PTS (buffer) = 0;
-    gst_harness_push (mux.in[i], buffer);
-  }
+  for (int i = 0; i < 2; i++)
+    gst_harness_push (mux.in[i], slice_of_view (i));
   GstBuffer *output = gst_harness_pull (mux.out);
   fail_unless_equals_int (slices_of (output).size (), 2);
   fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (output), 9);
@@ -189,6 +194,73 @@ GST_START_TEST (test_offset_beyond_the_last_view_id_names_the_pad)
 }
 GST_END_TEST;
 
+/* Pad 1 has view 0 as view 4. */
+static void
+offset_second_view (Mux &mux, bool coded)
+{
+  const auto info = gstrange::make_info (mux.one (0), 25, 1);
+  gst_child_proxy_set (GST_CHILD_PROXY (mux.out->element), "sink_1::view-id-offset", 4, nullptr);
+  gst_harness_set_src_caps (
+      mux.in[1], coded ? gstrange::make_neighbour_code_caps (info, "access-unit")
+                       : gstrange::make_range_caps (info));
+}
+
+GST_START_TEST (test_view_ids_that_the_offset_makes_too_large_are_left_out)
+{
+  const bool coded = __i__;
+  for (const int id : {60, 252}) {
+    Mux mux (2, coded);
+    offset_second_view (mux, coded);
+    for (int i = 0; i < 2; i++) {
+      GstBuffer *buffer = coded ? slice_of_view (i * id) : make_frame_set (mux.one (0), 9);
+      if (!coded)
+        gst_buffer_get_range_meta (buffer, 0)->view_id = guint (i * id);
+      gst_harness_push (mux.in[i], buffer);
+    }
+    if (coded) {
+      GstBuffer *output = gst_harness_pull (mux.out);
+      fail_unless_equals_int (slices_of (output).size (), 1);
+      gst_buffer_unref (output);
+    } else {
+      fail_unless_equals_int (mux.pull (), 1);
+    }
+  }
+}
+GST_END_TEST;
+
+/* The view-ids of the regions that were requested. */
+static std::vector<guint>
+requested_views (GstHarness *h)
+{
+  std::vector<guint> ids;
+  while (GstEvent *event = gst_harness_try_pull_upstream_event (h)) {
+    guint id;
+    if (gst_event_has_name (event, "GstRangeRoi") &&
+        gst_structure_get_uint (gst_event_get_structure (event), "view-id", &id))
+      ids.push_back (id);
+    gst_event_unref (event);
+  }
+  return ids;
+}
+
+GST_START_TEST (test_region_is_requested_from_the_pad_of_its_view_by_the_id_there)
+{
+  Mux mux (2);
+  offset_second_view (mux, false);
+  for (GstHarness *in : mux.in)
+    gst_harness_push (in, make_frame_set (mux.one (0), 0));
+  fail_unless_equals_int (mux.pull (), 0b10001);
+  for (const guint id : {4, 0, 1, 68})
+    fail_unless_equals_int (
+        gst_harness_push_upstream_event (
+            mux.out, gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM,
+                         gst_structure_new ("GstRangeRoi", "view-id", G_TYPE_UINT, id, nullptr))),
+        id == 4 || id == 0);
+  for (GstHarness *in : mux.in)
+    fail_unless (requested_views (in) == std::vector<guint>{0});
+}
+GST_END_TEST;
+
 GST_START_TEST (test_request_for_a_key_frame_set_goes_to_all_streams)
 {
   Mux mux (3, true);
@@ -225,6 +297,8 @@ rangemux_suite ()
   tcase_add_loop_test (
       tc, test_equal_rigs_make_one_scene_renumbered_and_moved, 0, G_N_ELEMENTS (kTwice));
   tcase_add_test (tc, test_offset_beyond_the_last_view_id_names_the_pad);
+  tcase_add_loop_test (tc, test_view_ids_that_the_offset_makes_too_large_are_left_out, 0, 2);
+  tcase_add_test (tc, test_region_is_requested_from_the_pad_of_its_view_by_the_id_there);
   tcase_add_test (tc, test_request_for_a_key_frame_set_goes_to_all_streams);
   return suite;
 }
