@@ -43,7 +43,7 @@ GST_DEBUG_CATEGORY_STATIC (gst_rig_calibrate_debug);
 
 /* aggregate waits for one image of each camera, drops those whose capture times do not match, and
  * posts the set as a job. Jobs look for the board, keep useful sets, draw a preview and, at EOS or
- * with auto-finish calibrate. If live, sets that arrive while a job runs are
+ * with auto-finish, calibrate. If live, sets that arrive while a job runs are
  * skipped; otherwise the streaming thread waits for each job. It pushes the previews. */
 
 /* Maximum frame rate of what is taken for single photographs instead of video, Hz. */

@@ -68,8 +68,9 @@ check_pair (
   }
   const Vec3 c = right_from_left.inverse ().translation;
   if (std::abs (c.x) < std::abs (c.y) || std::abs (c.x) < 0.5 * std::abs (c.z)) {
-    std::snprintf (
-        text, sizeof text, "%.3f m to the right, %.3f m below and %.3f m ahead", c.x, c.y, c.z);
+    std::snprintf (text, sizeof text, "%.3f m to the %s, %.3f m %s and %.3f m %s", std::abs (c.x),
+        c.x < 0 ? "left" : "right", std::abs (c.y), c.y < 0 ? "above" : "below", std::abs (c.z),
+        c.z < 0 ? "behind" : "ahead");
     return bad (view + right.name + " (right) stands " + text + " of " + left.name +
                 " (left); mount them side by side");
   }
