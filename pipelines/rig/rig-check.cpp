@@ -46,7 +46,7 @@ axis_of (const View &view)
 void
 print_cameras (const Rig &rig, Vec3 target)
 {
-  std::printf ("%-24s %-7s %-10s %-15s %-24s %s\n", "camera", "colour", "size", "field of view",
+  std::printf ("%-24s %-7s %-10s %-15s %-24s %s\n", "view", "colour", "size", "field of view",
       "position, metres", "distance of axis and camera from the centre");
   for (std::size_t i = 0; i < rig.views.size (); i++) {
     const View &v = rig.views[i];
