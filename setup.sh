@@ -11,6 +11,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 targets=(all)
+[ $# -le 1 ] || { echo "setup.sh: one option at a time" >&2; exit 2; }
 case "${1:-}" in
   --demo | --web)
     targets=(demo)

@@ -13,7 +13,7 @@ from pathlib import Path
 from . import options, transport
 from .demo import export_rig
 from .hosts import add_camera_options, present
-from .launch import Fail, Launch, fail_unless, has_element
+from .launch import Fail, Launch, fail_unless, has_display, has_element
 from .processes import Processes
 from .serve import print_links
 
@@ -31,7 +31,7 @@ def add_call(parser):
     parser.add_argument("--stun", metavar="HOST:PORT", help="STUN server, for ends behind routers (NAT)")
     parser.add_argument("--turn", metavar="USER:PASSWORD@HOST:PORT", help="TURN server, where there is no direct way between both ends")
     options.add(parser, "--rig")
-    options.add(parser, "--microphone", default="autoaudiosrc")
+    options.add(parser, "--microphone", default="autoaudiosrc", help="a source in gst-launch-1.0 syntax (default autoaudiosrc; none: no microphone)")
     options.add(parser, "--speaker")
     options.add(parser, "--jitter", default=60, help="jitter buffer (default 60)")
     parser.add_argument("--no-echo-cancel", action="store_true", help="for headphones: do not filter the microphone (webrtcdsp)")
@@ -96,6 +96,7 @@ def call(args, host):
     kind, _, model = args.input.partition("=")
     figure = kind in ("avatar", "range")
     fail_unless(args.rig or (figure and not args.print), "--rig: needed, except for the built-in figure without --print")
+    fail_unless(not args.window or args.print or has_display(), "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --no-window")
     fail_unless(has_element("nicesrc"), "no element nicesrc: install the Debian package gstreamer1.0-nice")
     with tempfile.TemporaryDirectory(prefix="rangecast-") as folder, Processes(args.print) as processes:
         rig = args.rig or str(Path(folder, "rig.yaml"))

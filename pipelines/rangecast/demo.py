@@ -97,6 +97,11 @@ def demo(args, host):
     threads = args.threads or max(1, (os.cpu_count() or 1) // args.views)
 
     with Processes(args.print) as processes:
+
+        def start(name, launch, *more, **settings):
+            launch.ports = [("--base-port", port) for _, port in launch.ports]
+            return processes.start(name, launch, *more, **settings)
+
         make_rig(args, rig, processes)
         if not args.print:
             print(f"{args.views} camera hosts at {size}, {args.fps} frame sets/s, a parent and a viewer", flush=True)
@@ -111,16 +116,16 @@ def demo(args, host):
             if Path(args.input).is_dir():
                 launch.option("--base-time", base_time)
             launch.environment.update(statistics, RANGECAST_HOST=f"camera{view}")
-            processes.start(f"camera{view}", launch, log / f"camera{view}.log")
+            start(f"camera{view}", launch, log / f"camera{view}.log")
         _, launch = host("parent", "--views", args.views, "--listen", args.base_port, "--to", f"127.0.0.1:{viewer_port}",
                          "--jitter", args.jitter, "--latency", args.latency, *sending)  # fmt: skip
         launch.option("--report", log / "parent.json")
         launch.environment.update(statistics, RANGECAST_HOST="parent")
-        processes.start("parent", launch, log / "parent.log")
+        start("parent", launch, log / "parent.log")
         if args.web is not None:
             parsed, launch = host("serve", "--listen", viewer_port, "--port", args.web, "--stats", viewer_port + 1, "--jitter", args.jitter,
                                   "--title", f"gst-rangecast: {args.views} stereo cameras")  # fmt: skip
-            child = processes.start("server", launch, stdout=subprocess.PIPE, text=True)
+            child = start("server", launch, stdout=subprocess.PIPE, text=True)
             if args.print:
                 return 0
             print("open the first link in a browser, or the second one for a dashboard of the rig; Ctrl-C ends the demo:", flush=True)
@@ -131,7 +136,7 @@ def demo(args, host):
         _, launch = host("view", "--listen", viewer_port, *video, "--jitter", args.jitter, "--render", " ".join(args.render))
         launch.option("--progress", "--turn", "--frames", args.frames, "--views", args.views, "--timeout", 60 + 4 * args.frames // args.fps)
         launch.option("--snapshot", out / "avatar.png", "--report", log / "viewer.json")
-        processes.start("viewer", launch)
+        start("viewer", launch)
         if args.print:
             return 0
         if args.no_video:

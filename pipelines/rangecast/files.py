@@ -86,7 +86,7 @@ def keep_existing(file):
 
 
 def add_play(parser):
-    parser.add_argument("file", type=options.existing_file, metavar="FILE", help="audio recorded with it, x.opus next to x.rcnc, is played, too")
+    parser.add_argument("file", type=options.recording, metavar="FILE", help="audio recorded with it, x.opus next to x.rcnc, is played, too")
     options.add(parser, "--video", help="write a video instead of opening a window")
     options.add(parser, "--orbit", default="30")
     options.add(parser, "--speaker", "--output-size")

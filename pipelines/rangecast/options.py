@@ -51,6 +51,12 @@ def metres(text):
     return text
 
 
+def square(text):
+    if float(metres(text)) > 1:
+        raise Wrong(f"'{text}' is more than a metre: give metres, such as 0.03")
+    return text
+
+
 def address(text):
     """HOST:PORT as a pair."""
     match = re.fullmatch(r"(\[[^\[\]]+\]|[^\[\]:]+):(.+)", text)
@@ -129,6 +135,13 @@ def properties(text):
 def existing_file(text):
     if not Path(text).is_file():
         raise Wrong(f"no file '{text}'")
+    return text
+
+
+def recording(text):
+    with open(existing_file(text), "rb") as file:
+        if b"RCU" not in file.read(1 << 20):  # of access units: docs/formats/bitstream.md
+            raise Wrong(f"'{text}' is not a recording of coded frame sets")
     return text
 
 

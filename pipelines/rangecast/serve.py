@@ -14,7 +14,7 @@ from .processes import Processes
 
 
 def add_serve(parser):
-    parser.add_argument("--file", type=options.existing_file, metavar="RECORDING", help="serve a recording")
+    parser.add_argument("--file", type=options.recording, metavar="RECORDING", help="serve a recording")
     parser.add_argument("--repeat", action="store_true", help="with --file: again and again")
     options.add(parser, "--source", help="serve what ends with coded frame sets, e.g. '... ! neighbourcodeenc'")
     parser.add_argument("--address", type=options.host, default="127.0.0.1", metavar="HOST", help="where to listen (default %(default)s: only this machine; 0.0.0.0: all)")

@@ -22,6 +22,7 @@ test_each_command_has_help () {
 }
 
 test_values_out_of_range_are_named () {
+  refuses "'30' is more than a metre" calibrate --left a --square 30 --out rig.yaml
   refuses "argument --views: '99' is not a whole number from 1 to 64" demo --views 99
   refuses "argument --size: 'big' is not WIDTHxHEIGHT" record x.rcnc --size big
   refuses "argument --size: '16384x16384' is not WIDTHxHEIGHT from 16x16 to 4096x4096" record x.rcnc --size 16384x16384
@@ -50,7 +51,8 @@ test_files_are_checked () {
   echo 123 >key
   refuses "'key' does not hold 60 hexadecimal digits" view --listen 5000 --key key
   echo "no recording" >text.rcnc
-  refuses "No valid frames found" play text.rcnc --video film.webm
+  refuses "'text.rcnc' is not a recording" play text.rcnc --video film.webm
+  refuses "'text.rcnc' is not a recording" serve --file text.rcnc
   [ ! -e film.webm ] || fail "an empty film is left"
 }
 
@@ -157,6 +159,7 @@ s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", 20200))
   refuses "--listen: UDP port 20200: Address already in use" parent --views 2 --listen 20199 --to 127.0.0.1:20201
   refuses "--feedback-port: UDP port 20200: " camera --view 0 --rig rig.yaml --to 127.0.0.1:20201 --feedback-port 20200
   refuses "--listen: UDP port 20200: " record none.rcnc --listen 20200
+  refuses "--base-port: UDP port 20200: " demo --views 2 --base-port 20198 --out out
   [ ! -e none.rcnc ] || fail "an empty file is left"
 }
 
