@@ -91,8 +91,9 @@ CompactDecoder::decode_run (PackedReader &slice_code, const CompactQuantisers &q
     const auto chosen =
         static_cast<unsigned> (x > begin || n.any () ? code.choice (n) : int{kCorrect});
     if (chosen < kPredict) [[likely]] {
-      const auto from = static_cast<std::ptrdiff_t> (x + chosen) - kTakeUpper;
       const std::uint64_t take_left = zero_mask (chosen);
+      const auto from =
+          static_cast<std::ptrdiff_t> (x + select (take_left, kTakeUpper, chosen)) - kTakeUpper;
       left_shown = select (take_left, left_shown, upper_shown[from]);
       /* codes do not tell unknown pixels from invalid ones */
       if ((take_left ? left.state : upper_states[from]) == 0)

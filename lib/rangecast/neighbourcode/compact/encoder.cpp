@@ -304,7 +304,8 @@ CompactEncoder::code_run (Code &slice_code, std::size_t begin, std::size_t end)
     /* Write the choice, or the pixel in full. */
     if (chosen != kPredict) [[likely]] {
       code.choice (n, static_cast<int> (chosen));
-      const auto from = static_cast<std::ptrdiff_t> (x + other) - kTakeUpper;
+      const auto from =
+          static_cast<std::ptrdiff_t> (x + select (take_left, kTakeUpper, other)) - kTakeUpper;
       left_key = select (take_left, left_key, upper_keys[from]);
       left = {select (take_left, left.code, upper_codes[from]),
           Delta || Code::kByRow ? copy_state (chosen)
