@@ -328,6 +328,29 @@ parse_caps_event (GstDebugCategory *category, GstAggregatorPad *pad, GstEvent *e
   return info;
 }
 
+bool
+refuse_bytes (GstAggregatorPad *pad, GstEvent *event)
+{
+  const GstSegment *segment = nullptr;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_SEGMENT)
+    gst_event_parse_segment (event, &segment);
+  if (!segment || segment->format == GST_FORMAT_TIME)
+    return false;
+  GstObject *element = gst_object_get_parent (GST_OBJECT (pad));
+  GST_ELEMENT_ERROR (element, STREAM, FORMAT,
+      ("Pad %s receives bytes without times: put a parser or decoder before it, for .rcnc files "
+       "neighbourcodeparse",
+          GST_PAD_NAME (pad)),
+      (nullptr));
+  gst_object_unref (element);
+  gst_event_unref (event);
+  GST_OBJECT_LOCK (pad);
+  gst_segment_init (
+      &pad->segment, GST_FORMAT_TIME); /* for buffers that come until the error ends it */
+  GST_OBJECT_UNLOCK (pad);
+  return true;
+}
+
 GstClockTime
 frame_duration (const std::optional<GstVideoInfo> &info)
 {

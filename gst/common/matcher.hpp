@@ -115,6 +115,10 @@ private:
 std::optional<GstVideoInfo> parse_caps_event (
     GstDebugCategory *category, GstAggregatorPad *pad, GstEvent *event);
 
+/** For sink_event(): takes an event that begins a stream of bytes, as files are without a parser,
+ * and posts an error. */
+bool refuse_bytes (GstAggregatorPad *pad, GstEvent *event);
+
 /** Frame duration of a pad's caps, ns; GST_CLOCK_TIME_NONE if there are none or the rate is
  *  unknown. */
 GstClockTime frame_duration (const std::optional<GstVideoInfo> &info);

@@ -136,6 +136,8 @@ static gboolean
 gst_range_combine_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
 {
   GstRangeCombinePrivate *priv = GST_RANGE_COMBINE (aggregator)->priv;
+  if (refuse_bytes (pad, event))
+    return FALSE;
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
     const auto info = parse_caps_event (GST_CAT_DEFAULT, pad, event);
     if (!info) {

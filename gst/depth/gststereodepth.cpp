@@ -150,6 +150,8 @@ static gboolean
 gst_stereo_depth_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
 {
   GstStereoDepthPrivate *priv = GST_STEREO_DEPTH (aggregator)->priv;
+  if (refuse_bytes (pad, event))
+    return FALSE;
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
     const Side side = pad == priv->left ? kLeft : pad == priv->right ? kRight : kThird;
     const auto info = parse_caps_event (GST_CAT_DEFAULT, pad, event);

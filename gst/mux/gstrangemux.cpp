@@ -473,6 +473,8 @@ static gboolean
 gst_range_mux_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
 {
   auto self = GST_RANGE_MUX (aggregator);
+  if (refuse_bytes (pad, event))
+    return FALSE;
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
     GstCaps *caps;
     gst_event_parse_caps (event, &caps);

@@ -79,6 +79,14 @@ test_file_that_is_no_recording_is_refused () {
   expect_error "neighbour" run filesrc location=noise.rcnc ! neighbourcodeparse ! neighbourcodedec ! fakesink
 }
 
+test_files_without_parser_at_elements_with_several_inputs_are_named () {
+  local file=$pipelines/examples/head.rcnc
+  expect_error "Pad sink_0 receives bytes without times" run rangemux name=m ! fakesink filesrc location="$file" ! m.
+  expect_error "receives bytes without times" run rangecombine name=m focal-length=300 ! fakesink filesrc location="$file" ! m.colour filesrc location="$file" ! m.depth
+  expect_error "receives bytes without times" run stereodepth name=m focal-length=300 baseline=0.1 ! fakesink filesrc location="$file" ! m.left \
+    filesrc location="$file" ! m.right
+}
+
 test_corrupted_recording_plays_on () {
   run avatartestsrc views=2 num-buffers=10 range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 \
     ! neighbourcodeenc profile=plain ! filesink location=good.rcnc
