@@ -10,6 +10,11 @@
 
 #include "recycledmemories.hpp"
 
+/** Raw frame sets, or coded ones as access units. */
+#define FRAME_SET_CAPS                                                                             \
+  GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                \
+                 ", version = (int) 4, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS
+
 /** Makes access units that describe themselves: an access-unit unit, the rig in key ones and where
  *  it is new, then the slices, in one memory that is recycled. Streaming thread. */
 class AccessUnitWriter {

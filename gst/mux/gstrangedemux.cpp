@@ -86,14 +86,10 @@ struct _GstRangeDemux {
   GstRangeDemuxPrivate *priv;
 };
 
-#define DEMUX_CAPS                                                                                 \
-  GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_MEDIA_TYPE ", version = (int) 4, alignment = (string) "   \
-                 "access-unit, " GST_RANGE_SIZE_CAPS
-
-static GstStaticPadTemplate sink_template =
-    GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (DEMUX_CAPS));
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (FRAME_SET_CAPS));
 static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
-    "src_%u", GST_PAD_SRC, GST_PAD_SOMETIMES, GST_STATIC_CAPS (DEMUX_CAPS));
+    "src_%u", GST_PAD_SRC, GST_PAD_SOMETIMES, GST_STATIC_CAPS (FRAME_SET_CAPS));
 
 G_DEFINE_TYPE (GstRangeDemux, gst_range_demux, GST_TYPE_ELEMENT)
 GST_ELEMENT_REGISTER_DEFINE (rangedemux, "rangedemux", GST_RANK_NONE, gst_range_demux_get_type ())
@@ -177,16 +173,12 @@ make_view (GstRangeDemux *self, GstBuffer *frame_set, int id)
   GstRangeDemuxPrivate *priv = self->priv;
   if (priv->coded)
     return make_coded_view (priv, frame_set, id);
-  GstBuffer *view = nullptr;
-  GstClockTime capture = GST_CLOCK_TIME_NONE;
-  if (const GstRangeMeta *meta = gst_buffer_get_range_meta (frame_set, guint (id))) {
-    view = gst_range_buffer_copy_view (frame_set, meta);
-    capture = meta->capture_time;
-    if (!view)
-      GST_DEBUG_OBJECT (self, "dropping view %d: its planes are not within the buffer", id);
-  }
+  const GstRangeMeta *meta = gst_buffer_get_range_meta (frame_set, guint (id));
+  GstBuffer *view = meta ? gst_range_buffer_copy_view (frame_set, meta) : nullptr;
   if (view)
-    copy_metadata (view, frame_set, capture);
+    copy_metadata (view, frame_set, meta->capture_time);
+  else if (meta)
+    GST_DEBUG_OBJECT (self, "dropping view %d: its planes are not within the buffer", id);
   return view;
 }
 

@@ -136,15 +136,6 @@ constexpr double kMaxDistance_m = 1e-3, kMaxRotation = 2e-3, kMaxScale = 2e-3;
  * stays empty. */
 constexpr double kMaxRectifiedScale = 0.5;
 
-double
-max_difference (const rangecast::Mat3 &a, const rangecast::Mat3 &b)
-{
-  double max = 0;
-  for (std::size_t i = 0; i < a.size (); i++)
-    max = std::max (max, std::abs (a[i] - b[i]));
-  return max;
-}
-
 Status
 differs (const View &view, const std::string &what)
 {
@@ -173,7 +164,8 @@ check_view (const View &view, View expected)
   if (const double apart = rangecast::norm (p.translation - q.translation);
       !(apart <= kMaxDistance_m))
     return differs (view, "its position is " + std::to_string (apart) + " m off");
-  if (!(max_difference (p.rotation, q.rotation) <= kMaxRotation))
+  const auto is_near = [] (double a, double b) { return std::abs (a - b) <= kMaxRotation; };
+  if (!std::ranges::equal (p.rotation, q.rotation, is_near))
     return differs (view, "its orientation differs");
   const double scale = view.intrinsics.fx / expected.intrinsics.fx;
   if (!(std::abs (scale - 1) <= max_scale))

@@ -136,11 +136,8 @@ StreamTimes::add_frame_set (const FrameTimes &times, GstClockTime period)
   GstClockTime &running = last_.running;
   if (!GST_CLOCK_TIME_IS_VALID (before.running))
     return running;
-  if (live_) { /* never backwards */
-    if (GST_CLOCK_TIME_IS_VALID (running))
-      running = std::max (running, before.running);
-    return running;
-  }
+  if (live_)
+    return running = std::max (running, before.running); /* never backwards; NONE is the maximum */
   const bool follows = GST_CLOCK_TIME_IS_VALID (before.capture) && times.capture > before.capture &&
                        times.capture - before.capture <= kMaxPause;
   const GstClockTime distance = follows ? times.capture - before.capture : period;
