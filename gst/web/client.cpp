@@ -220,7 +220,7 @@ Client::enter (const JsonMessage &message)
   if (!server_.admit (hello->token, user))
     return refuse (kCloseUnauthorized, "wrong or missing token");
   if (hello->room && server_.is_full (*hello->room))
-    return refuse (kCloseLimit, "two are in this call already");
+    return refuse (kCloseLimit, "the call already has two participants");
   hello_ = *hello;
   hello_.token.clear ();
   label_ += user.empty () ? "" : " (" + user + ")";

@@ -370,8 +370,7 @@ web_properties ()
   static P table = {
       P::text<&Settings::address> ("address", "Address",
           "Address or name to listen at; one that other machines can reach needs token, token-file "
-          "or "
-          "anonymous",
+          "or anonymous",
           kMutableReady),
       P::number<&Settings::port> (
           "port", "Port", "TCP port (0 = any that is free)", 0, 65535, kMutableReady),

@@ -92,20 +92,22 @@ parse_hello (const JsonMessage &message, std::string &error)
 {
   Hello hello;
   const auto version = message.number ("version");
-  const auto token = message.text ("token");
+  const auto token = message.text ("token"), room = message.text ("room");
   if (message.text ("type") != "hello")
     error = "the first message must have type 'hello'";
   else if (!version || *version != static_cast<int> (std::clamp (*version, 0.0, 1e6)))
     error = "version must be a whole number";
   else if (!token && json_object_has_member (message.object (), "token"))
     error = "token must be a string";
+  else if (!room && json_object_has_member (message.object (), "room"))
+    error = "room must be a string";
   else if (!parse_want (message, hello))
     error = "want must be an array of strings";
   if (!error.empty ())
     return {};
   hello.version = static_cast<int> (*version);
   hello.token = token.value_or ("");
-  hello.room = message.text ("room");
+  hello.room = room;
   hello.stream &= !hello.room;
   return hello;
 }

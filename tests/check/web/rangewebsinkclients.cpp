@@ -105,10 +105,11 @@ GST_START_TEST (test_first_message_that_is_no_hello_ends_the_connection)
 {
   WebSink sink;
   Witness witness (sink);
-  for (const char *message : {"", "hello", "[]", "{}", "{\"type\":1}",
-           R"({"type":"ack","frameSet":0})", R"({"type":"hello"})",
-           R"({"type":"hello","version":"1"})", R"({"type":"hello","version":1,"token":7})",
-           R"({"type":"hello","version":1,"want":"x"})"})
+  for (const char *message :
+      {"", "hello", "[]", "{}", "{\"type\":1}", R"({"type":"ack","frameSet":0})",
+          R"({"type":"hello"})", R"({"type":"hello","version":"1"})",
+          R"({"type":"hello","version":1,"token":7})", R"({"type":"hello","version":1,"room":7})",
+          R"({"type":"hello","version":1,"want":"x"})"})
     fail_unless_equals_int (code_after (sink, message), 4400);
   fail_unless_equals_int (code_after (sink, R"({"type":"hello","version":2})"), 4406);
   fail_unless_equals_int (code_after (sink, R"({"type":"hello","version":0})"), 4406);
