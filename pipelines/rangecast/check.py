@@ -117,5 +117,5 @@ def realtime():
 
 def cameras():
     found = sorted(path.name for path in Path("/dev").glob("video*"))
-    found += [line.strip() for line in run("arv-tool-0.8")[1].splitlines() if line.strip() and "No device" not in line]
+    found += [f"camera at {address}" for address in re.findall(r"\((\S+)\)$", run("arv-tool-0.8")[1], re.M)]  # without its serial number
     return bool(found), "cameras" + (": " + ", ".join(found) if found else ""), "none seen; the source tree simulates some: ./pipelines/demo.sh --input cameras"

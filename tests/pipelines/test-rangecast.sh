@@ -197,7 +197,12 @@ test_recordings_are_kept () {
 }
 
 test_check_says_what_this_machine_lacks () {
-  rangecast check >said.txt || true
+  mkdir bin
+  printf '%s\n' '#!/bin/sh' 'echo "Aravis-Fake-GV01 (127.0.0.1)"' >bin/arv-tool-0.8
+  chmod +x bin/arv-tool-0.8
+  PATH=$PWD/bin:$PATH rangecast check >said.txt || true
+  grep -q 'camera at 127.0.0.1' said.txt || fail "no camera: $(cat said.txt)"
+  ! grep GV01 said.txt || fail "a serial number"
   grep -q '^ok .*neighbourcodeenc' said.txt || fail "$(cat said.txt)"
   grep -qE '^(ok|missing) .*UDP receive buffers' said.txt || fail "$(cat said.txt)"
   make_rig
