@@ -23,7 +23,7 @@ PROBE = "! audio/x-raw,format=S16LE,rate=48000,channels=1 ! webrtcechoprobe name
 
 def add_call(parser):
     parser.add_argument("--signal", metavar="LINK",
-                        help="link that the other end, or 'rangecast serve', printed; ends with &room=NAME if several calls use the server "
+                        help="link that the other end, or 'rangecast serve', printed, in quotes ('...'); ends with &room=NAME if several calls use the server "
                         "(default: print one, and wait for the other end)")  # fmt: skip
     parser.add_argument("--port", type=options.number(0, 65535), default=8080, metavar="PORT", help="TCP port of that link (default 8080; 0: any)")
     parser.add_argument("--certificate", type=options.existing_file, metavar="PEM",
@@ -86,7 +86,7 @@ def start_server(args, host, processes):
     if server:
         line = server.stdout.readline()
         fail_unless(line, "the call's server failed: see above; --port chooses another port")
-        print("the other end runs: rangecast call --signal LINK, where LINK is one of", flush=True)
+        print("the other end runs: rangecast call --signal 'LINK', where LINK is one of", flush=True)
         print_links(parsed, line.split()[1], False)
         port = line.rstrip("/\n").rpartition(":")[2]
     return f"{'https' if tls else 'http'}://127.0.0.1:{port}/#token={token}"

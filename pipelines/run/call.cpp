@@ -10,11 +10,15 @@
 #include <initializer_list>
 #include <string>
 #include <utility>
+#include <vector>
+
+#include "common/for-each.hpp"
 
 namespace {
 
 /** STUN and TURN servers may be slower than the checks of candidates without them. */
 constexpr guint kMaxCandidateWait_ms = 15000;
+constexpr const char *kWasConnected = "was-connected"; /* data of the webrtcbin */
 
 std::string
 json (std::initializer_list<std::pair<const char *, const char *>> fields)
@@ -61,27 +65,25 @@ on_no_way (gpointer webrtc)
 {
   if (has_state (webrtc, GST_WEBRTC_PEER_CONNECTION_STATE_FAILED))
     GST_ELEMENT_ERROR (webrtc, RESOURCE, OPEN_READ_WRITE,
-        ("There is no way through both networks to the other end: use a STUN server, or where that "
-         "is not enough a TURN server"),
-        (nullptr));
+        ("No network path to the other end; try a STUN server, or a TURN server"), (nullptr));
   return G_SOURCE_REMOVE;
 }
 
 void
 on_state (GstElement *webrtc, GParamSpec *, gpointer)
 {
-  if (has_state (webrtc, GST_WEBRTC_PEER_CONNECTION_STATE_FAILED)) /* of the candidates so far */
+  const bool failed = has_state (webrtc, GST_WEBRTC_PEER_CONNECTION_STATE_FAILED);
+  if (failed && g_object_get_data (G_OBJECT (webrtc), kWasConnected))
+    post (webrtc, "call-left", "the connection to the other end is lost");
+  else if (failed) /* with the candidates so far */
     g_timeout_add_full (G_PRIORITY_DEFAULT, kMaxCandidateWait_ms, on_no_way,
         gst_object_ref (webrtc), gst_object_unref);
   if (!has_state (webrtc, GST_WEBRTC_PEER_CONNECTION_STATE_CONNECTED))
     return;
-  const auto open = [] (const GValue *valve, gpointer) {
-    g_object_set (g_value_get_object (valve), "drop", FALSE, nullptr);
-  };
+  g_object_set_data (G_OBJECT (webrtc), kWasConnected, webrtc);
   GstObject *pipeline = gst_object_get_parent (GST_OBJECT (webrtc));
-  GstIterator *valves = gst_bin_iterate_all_by_element_factory_name (GST_BIN (pipeline), "valve");
-  gst_iterator_foreach (valves, open, nullptr);
-  gst_iterator_free (valves);
+  for_each (gst_bin_iterate_all_by_element_factory_name (GST_BIN (pipeline), "valve"),
+      [] (GstElement *valve) { g_object_set (valve, "drop", FALSE, nullptr); });
   gst_object_unref (pipeline);
   g_print ("the other end is connected\n");
 }
@@ -149,7 +151,8 @@ public:
 private:
   static void on_connected (GObject *session, GAsyncResult *result, gpointer self);
   void connect ();
-  void receive (JsonObject *message);
+  void receive (const std::string &text);
+  void leave (const char *reason);
   void on_closed ();
 
   GstElement *webrtc_ = nullptr;
@@ -157,14 +160,20 @@ private:
   SoupWebsocketConnection *socket_ = nullptr;
   GTlsCertificate *certificate_ = nullptr;
   std::string url_, hello_;
+  std::vector<std::string> held_; /* messages for the next webrtcbin */
+  bool leaving_ = false;
+  bool offers_ = false; /* this end was in the room first */
+  bool answered_ = false;
 };
 
 bool
 WebrtcCall::parse (const char *url, const char *certificate)
 {
   g_autoptr (GError) error = nullptr;
-  g_autoptr (GUri) uri = g_uri_parse (url, G_URI_FLAGS_NONE, &error);
-  if (!uri || !g_uri_get_host (uri)) {
+  g_autoptr (GUri) uri = g_uri_parse (url, G_URI_FLAGS_ENCODED_FRAGMENT, &error);
+  const std::string scheme = uri ? g_uri_get_scheme (uri) : "";
+  const char *host = uri ? g_uri_get_host (uri) : nullptr;
+  if ((scheme != "http" && scheme != "https") || !host || !*host) {
     g_printerr ("rangecast-run: --signal: '%s' is not https://HOST:PORT/#token=TOKEN\n", url);
     return false;
   }
@@ -220,10 +229,15 @@ WebrtcCall::join (GstElement *pipeline)
   g_signal_emit_by_name (webrtc_, "get-transceivers", &transceivers);
   for (guint i = 0; i < transceivers->len; i++) /* lost packets are requested again */
     g_object_set (g_array_index (transceivers, GObject *, i), "do-nack", TRUE, nullptr);
-  if (session_)
-    g_print ("waiting for the other end\n");
-  else
+  leaving_ = answered_ = false;
+  if (!session_)
     connect ();
+  else if (offers_)
+    describe (webrtc_, "create-offer");
+  else
+    g_print ("waiting for the other end\n");
+  for (const std::string &text : std::exchange (held_, {}))
+    receive (text);
   return true;
 }
 
@@ -260,11 +274,10 @@ WebrtcCall::on_connected (GObject *session, GAsyncResult *result, gpointer user_
   }
   self->socket_ = socket;
   soup_websocket_connection_set_keepalive_interval (socket, 20);
-  const auto message = [] (SoupWebsocketConnection *, gint, GBytes *bytes, gpointer data) {
-    const auto text = static_cast<const char *> (g_bytes_get_data (bytes, nullptr));
-    g_autoptr (JsonNode) root = json_from_string (text, nullptr);
-    if (root && JSON_NODE_HOLDS_OBJECT (root))
-      static_cast<WebrtcCall *> (data)->receive (json_node_get_object (root));
+  const auto message = [] (SoupWebsocketConnection *, gint type, GBytes *bytes, gpointer data) {
+    if (type == SOUP_WEBSOCKET_DATA_TEXT) /* which libsoup terminates */
+      static_cast<WebrtcCall *> (data)->receive (
+          static_cast<const char *> (g_bytes_get_data (bytes, nullptr)));
   };
   const auto closed = [] (SoupWebsocketConnection *, gpointer data) {
     static_cast<WebrtcCall *> (data)->on_closed ();
@@ -288,27 +301,38 @@ WebrtcCall::on_closed ()
 
 /* What the server and, through it, the other end have to say. */
 void
-WebrtcCall::receive (JsonObject *message)
+WebrtcCall::receive (const std::string &text)
 {
+  if (leaving_)
+    return held_.push_back (text);
+  g_autoptr (JsonNode) root = json_from_string (text.c_str (), nullptr);
+  if (!root || !JSON_NODE_HOLDS_OBJECT (root))
+    return;
+  JsonObject *message = json_node_get_object (root);
   const auto field = [&] (const char *name) {
     return json_object_get_string_member_with_default (message, name, nullptr);
   };
   const std::string type = field ("type") ? field ("type") : "";
   if (type == "welcome")
     g_print ("waiting for the other end\n");
-  else if (type == "joined")
+  offers_ = type == "joined" || (offers_ && type != "left");
+  if (type == "joined")
     describe (webrtc_, "create-offer");
   else if (type == "left")
-    post (webrtc_, "call-left", "the other end left");
+    leave ("the other end left");
   if (type != "call")
     return;
+  if (field ("offer") && std::exchange (answered_, true)) {
+    leave ("the other end connects again");
+    return held_.push_back (text);
+  }
   if (field ("candidate") && field ("media"))
     g_signal_emit_by_name (
         webrtc_, "add-ice-candidate", guint (std::atoi (field ("media"))), field ("candidate"));
   for (const auto kind : {GST_WEBRTC_SDP_TYPE_OFFER, GST_WEBRTC_SDP_TYPE_ANSWER}) {
-    const char *text = field (gst_webrtc_sdp_type_to_string (kind));
+    const char *description = field (gst_webrtc_sdp_type_to_string (kind));
     GstSDPMessage *sdp = nullptr;
-    if (!text || gst_sdp_message_new_from_text (text, &sdp) != GST_SDP_OK)
+    if (!description || gst_sdp_message_new_from_text (description, &sdp) != GST_SDP_OK)
       continue;
     GstWebRTCSessionDescription *remote = gst_webrtc_session_description_new (kind, sdp);
     g_signal_emit_by_name (webrtc_, "set-remote-description", remote, nullptr);
@@ -316,6 +340,13 @@ WebrtcCall::receive (JsonObject *message)
     if (kind == GST_WEBRTC_SDP_TYPE_OFFER)
       describe (webrtc_, "create-answer");
   }
+}
+
+void
+WebrtcCall::leave (const char *reason)
+{
+  leaving_ = true;
+  post (webrtc_, "call-left", reason);
 }
 
 bool

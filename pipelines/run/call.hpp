@@ -16,9 +16,9 @@ public:
   static std::unique_ptr<Call> make (const char *url, const char *certificate);
   virtual ~Call () = default;
 
-  /** Meets the other end, with the webrtcbin named webrtc of a pipeline that plays, whose valves it
-   *  opens when both are connected, and to whose elements call-video and call-audio goes what
-   * comes; or the next one, with another pipeline. Failures are error messages of the webrtcbin.
+  /** Negotiates for the webrtcbin named webrtc of a playing pipeline. Once connected, opens the
+   *  pipeline's valves; received streams are linked to its elements call-video and call-audio.
+   *  Called again with a new pipeline after call-left. Failures are errors of the webrtcbin.
    *  @return false after reporting that there is none */
   virtual bool join (GstElement *pipeline) = 0;
   /** Handles what the negotiation posts on the pipeline's bus.

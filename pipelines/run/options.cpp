@@ -48,9 +48,7 @@ RunOptions::parse (int *argc, char ***argv)
           "(default: what its elements provide, such as a sound card's)",
           "CLOCK"},
       {"signal", 0, 0, G_OPTION_ARG_STRING, &signal,
-          "Connect the webrtcbin named webrtc with that of another who gives the same link of a "
-          "rangewebsink; &room=NAME at its end makes a room",
-          "URL"},
+          "Negotiate the webrtcbin named webrtc with the peer that uses the same link", "'LINK'"},
       {"certificate", 0, 0, G_OPTION_ARG_FILENAME, &certificate,
           "Certificate of the server of --signal (default: one that the system trusts)", "PEM"},
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &launch, nullptr, nullptr}, {}};

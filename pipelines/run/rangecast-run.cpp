@@ -21,6 +21,7 @@
 #include "call.hpp"
 #include "common/dump-graph.hpp"
 #include "common/final-signal.hpp"
+#include "common/for-each.hpp"
 #include "report.hpp"
 #include "srtp-key.hpp"
 #include "stats-sender.hpp"
@@ -324,14 +325,6 @@ request_stats (GstElement *element)
     g_object_get (element, "stats-interval", &interval, nullptr);
   if (spec && interval == 0)
     g_object_set (element, "stats-interval", 1000u, nullptr);
-  if (!GST_IS_BIN (element))
-    return;
-  const auto request = [] (const GValue *item, gpointer) {
-    request_stats (GST_ELEMENT (g_value_get_object (item)));
-  };
-  GstIterator *elements = gst_bin_iterate_elements (GST_BIN (element));
-  gst_iterator_foreach (elements, request, nullptr);
-  gst_iterator_free (elements);
 }
 
 void
@@ -348,7 +341,7 @@ play (Runner &runner)
     gst_element_set_base_time (runner.pipeline, GstClockTime (runner.options.base_time));
   }
   if (runner.stats)
-    request_stats (runner.pipeline);
+    for_each (gst_bin_iterate_recurse (GST_BIN (runner.pipeline)), request_stats);
   if (runner.muted)
     set_microphone (runner, true);
   runner.measure->start ();

@@ -207,7 +207,10 @@ test_wrong_options_are_named () {
   echo none >empty.yaml
   expect_error "'empty.yaml' has no views" rangecast call --rig empty.yaml
   expect_error "--rig: needed" rangecast call
-  expect_error "'nonsense' is not https://HOST:PORT" rangecast call --signal nonsense --input range --no-window
+  local link
+  for link in nonsense http:///x file:///x; do
+    expect_error "'$link' is not https://HOST:PORT" rangecast-run --signal "$link" fakesrc num-buffers=1 ! fakesink
+  done
   expect_error "Cannot connect to the call's server http://127.0.0.1:7001" rangecast call --signal http://127.0.0.1:7001 --input range \
     --no-window --microphone none --speaker fakesink
 }
@@ -318,13 +321,64 @@ test_call_is_of_two_who_have_the_link_and_needs_no_rig_for_the_figure () {
   "${call[@]}" --signal "$link" </dev/null >otto.log 2>&1 &
   otto=$!
   until_true 60 grep -q "the other end is connected" anna.log
-  expect_error "two are in this call already" "${call[@]}" --signal "$link"
+  expect_error "the call already has two participants" "${call[@]}" --signal "$link"
   "${call[@]}" --signal "$link&room=other" </dev/null >other.log 2>&1 &
   other=$!
   until_true 60 grep -q "waiting for the other end" other.log
   stop_all $anna
   for pid in $otto $other; do wait "$pid" || fail "status $?: $(cat otto.log other.log)"; done
   net_close
+}
+# A server that says that the other end left and another one joined, at once; then offers twice, as after a lost connection.
+test_no_message_of_the_server_is_lost_while_the_pipeline_is_made_anew () {
+  gst-inspect-1.0 --exists --atleast-version=0.0.0 nicesrc || skip "no nicesrc (Debian package gstreamer1.0-nice)"
+  timeout 60 python3 - >server.log <<'END' || fail "$(cat server.log run.log)"
+import base64, hashlib, json, re, socket, subprocess
+
+def frame(data, kind=0x81):
+    return bytes([kind]) + (bytes([len(data)]) if len(data) < 126 else b"\x7e" + len(data).to_bytes(2, "big")) + data
+
+def text(kind, **fields):
+    return frame(json.dumps({"type": kind, **fields}).encode())
+
+server = socket.create_server(("127.0.0.1", 0))
+link = f"http://127.0.0.1:{server.getsockname()[1]}/#token=a%2525&room=r"
+caps = "application/x-rtp,media=audio,encoding-name=OPUS,clock-rate=48000,payload=96"
+launch = f"audiotestsrc is-live=true ! opusenc ! rtpopuspay ! valve drop=true ! {caps} ! webrtc.sink_0 webrtcbin name=webrtc bundle-policy=max-bundle"
+run = subprocess.Popen(["rangecast-run", "--signal", link, *launch.split()], stdout=open("run.log", "w"), stderr=subprocess.STDOUT)
+stream = server.accept()[0]
+file = stream.makefile("rb")
+request = "".join(iter(lambda: file.readline().decode().rstrip("\n"), "\r"))
+key = re.search(r"Sec-WebSocket-Key: (\S+)", request)[1] + "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
+stream.sendall(b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Protocol: rangecast.v1\r\n"
+               b"Sec-WebSocket-Accept: " + base64.b64encode(hashlib.sha1(key.encode()).digest()) + b"\r\n\r\n")
+
+def receive(field):
+    while True:
+        size = file.read(2)[1] & 127
+        size = int.from_bytes(file.read(2), "big") if size == 126 else size
+        mask = file.read(4)
+        message = json.loads(bytes(b ^ mask[i % 4] for i, b in enumerate(file.read(size))))
+        if field in message:
+            return message[field]
+
+token = receive("token")
+assert token == "a%25", token
+stream.sendall(text("welcome") + frame(b'{"type":"left"}', 0x82) + text("joined"))
+first = receive("offer")
+stream.sendall(text("left") + text("joined"))
+offer = receive("offer")
+user = re.compile("ice-ufrag:(.*)")
+assert user.search(offer)[1] != user.search(first)[1], "an offer of the old webrtcbin"
+stream.sendall(text("left") + text("call", offer=offer))
+answers = [receive("answer")]
+stream.sendall(text("call", offer=first))
+answers.append(receive("answer"))
+assert len({user.search(answer)[1] for answer in answers}) == 2, "an answer of the old webrtcbin"
+run.terminate()
+assert run.wait() == 0, run.returncode
+END
+  [ "$(grep -c "the other end left" run.log)" = 2 ] || fail "$(cat run.log)"
 }
 has_ended () { ! kill -0 "$1" 2>/dev/null; }
 
