@@ -60,24 +60,21 @@ has_state (gpointer webrtc, GstWebRTCPeerConnectionState wanted)
   return state == wanted;
 }
 
-gboolean
-on_no_way (gpointer webrtc)
-{
-  if (has_state (webrtc, GST_WEBRTC_PEER_CONNECTION_STATE_FAILED))
-    GST_ELEMENT_ERROR (webrtc, RESOURCE, OPEN_READ_WRITE,
-        ("No network path to the other end; try a STUN server, or a TURN server"), (nullptr));
-  return G_SOURCE_REMOVE;
-}
-
 void
 on_state (GstElement *webrtc, GParamSpec *, gpointer)
 {
+  const auto give_up = [] (gpointer webrtc) -> gboolean {
+    if (has_state (webrtc, GST_WEBRTC_PEER_CONNECTION_STATE_FAILED))
+      GST_ELEMENT_ERROR (webrtc, RESOURCE, OPEN_READ_WRITE,
+          ("No network path to the other end; try a STUN server, or a TURN server"), (nullptr));
+    return G_SOURCE_REMOVE;
+  };
   const bool failed = has_state (webrtc, GST_WEBRTC_PEER_CONNECTION_STATE_FAILED);
   if (failed && g_object_get_data (G_OBJECT (webrtc), kWasConnected))
     post (webrtc, "call-left", "the connection to the other end is lost");
   else if (failed) /* with the candidates so far */
-    g_timeout_add_full (G_PRIORITY_DEFAULT, kMaxCandidateWait_ms, on_no_way,
-        gst_object_ref (webrtc), gst_object_unref);
+    g_timeout_add_full (G_PRIORITY_DEFAULT, kMaxCandidateWait_ms, give_up, gst_object_ref (webrtc),
+        gst_object_unref);
   if (!has_state (webrtc, GST_WEBRTC_PEER_CONNECTION_STATE_CONNECTED))
     return;
   g_object_set_data (G_OBJECT (webrtc), kWasConnected, webrtc);
@@ -141,18 +138,13 @@ describe (GstElement *webrtc, const char *action)
 }
 
 /* No loop runs when it ends. */
-class WebrtcCall : public Call {
-public:
-  bool parse (const char *url, const char *certificate);
+struct WebrtcCall : Call {
   ~WebrtcCall () override;
   bool join (GstElement *pipeline) override;
   bool handle (GstMessage *message) override;
-
-private:
   static void on_connected (GObject *session, GAsyncResult *result, gpointer self);
   void connect ();
   void receive (const std::string &text);
-  void leave (const char *reason);
   void on_closed ();
 
   GstElement *webrtc_ = nullptr;
@@ -165,36 +157,6 @@ private:
   bool offers_ = false; /* this end was in the room first */
   bool answered_ = false;
 };
-
-bool
-WebrtcCall::parse (const char *url, const char *certificate)
-{
-  g_autoptr (GError) error = nullptr;
-  g_autoptr (GUri) uri = g_uri_parse (url, G_URI_FLAGS_ENCODED_FRAGMENT, &error);
-  const std::string scheme = uri ? g_uri_get_scheme (uri) : "";
-  const char *host = uri ? g_uri_get_host (uri) : nullptr;
-  if ((scheme != "http" && scheme != "https") || !host || !*host) {
-    g_printerr ("rangecast-run: --signal: '%s' is not https://HOST:PORT/#token=TOKEN\n", url);
-    return false;
-  }
-  const char *fragment = g_uri_get_fragment (uri);
-  g_autoptr (GHashTable) fields =
-      g_uri_parse_params (fragment ? fragment : "", -1, "&", G_URI_PARAMS_NONE, nullptr);
-  const auto field = [&] (const char *name) {
-    auto value = fields ? static_cast<const char *> (g_hash_table_lookup (fields, name)) : nullptr;
-    return value ? value : "";
-  };
-  hello_ = json ({{"type", "hello"}, {"token", field ("token")}, {"room", field ("room")}});
-  hello_.insert (1, "\"version\":1,");
-  g_autofree gchar *page = g_uri_to_string_partial (uri, G_URI_HIDE_FRAGMENT);
-  g_autofree gchar *stream = g_uri_resolve_relative (page, "stream", G_URI_FLAGS_NONE, nullptr);
-  url_ = stream;
-  if (certificate && !(certificate_ = g_tls_certificate_new_from_file (certificate, &error))) {
-    g_printerr ("rangecast-run: --certificate: '%s': %s\n", certificate, error->message);
-    return false;
-  }
-  return true;
-}
 
 WebrtcCall::~WebrtcCall ()
 {
@@ -318,14 +280,13 @@ WebrtcCall::receive (const std::string &text)
   offers_ = type == "joined" || (offers_ && type != "left");
   if (type == "joined")
     describe (webrtc_, "create-offer");
-  else if (type == "left")
-    leave ("the other end left");
-  if (type != "call")
+  const bool again = type == "call" && field ("offer") && std::exchange (answered_, true);
+  if (again)
+    held_ = {text};
+  if ((leaving_ = again || type == "left"))
+    post (webrtc_, "call-left", again ? "the other end connects again" : "the other end left");
+  if (type != "call" || again)
     return;
-  if (field ("offer") && std::exchange (answered_, true)) {
-    leave ("the other end connects again");
-    return held_.push_back (text);
-  }
   if (field ("candidate") && field ("media"))
     g_signal_emit_by_name (
         webrtc_, "add-ice-candidate", guint (std::atoi (field ("media"))), field ("candidate"));
@@ -340,13 +301,6 @@ WebrtcCall::receive (const std::string &text)
     if (kind == GST_WEBRTC_SDP_TYPE_OFFER)
       describe (webrtc_, "create-answer");
   }
-}
-
-void
-WebrtcCall::leave (const char *reason)
-{
-  leaving_ = true;
-  post (webrtc_, "call-left", reason);
 }
 
 bool
@@ -368,7 +322,30 @@ std::unique_ptr<Call>
 Call::make (const char *url, const char *certificate)
 {
   auto call = std::make_unique<WebrtcCall> ();
-  if (!call->parse (url, certificate))
+  g_autoptr (GError) error = nullptr;
+  g_autoptr (GUri) uri = g_uri_parse (url, G_URI_FLAGS_ENCODED_FRAGMENT, &error);
+  const std::string scheme = uri ? g_uri_get_scheme (uri) : "";
+  const char *host = uri ? g_uri_get_host (uri) : nullptr;
+  if ((scheme != "http" && scheme != "https") || !host || !*host) {
+    g_printerr ("rangecast-run: --signal: '%s' is not https://HOST:PORT/#token=TOKEN\n", url);
     return nullptr;
+  }
+  const char *fragment = g_uri_get_fragment (uri);
+  g_autoptr (GHashTable) fields =
+      g_uri_parse_params (fragment ? fragment : "", -1, "&", G_URI_PARAMS_NONE, nullptr);
+  const auto field = [&] (const char *name) {
+    auto value = fields ? static_cast<const char *> (g_hash_table_lookup (fields, name)) : nullptr;
+    return value ? value : "";
+  };
+  call->hello_ = json ({{"type", "hello"}, {"token", field ("token")}, {"room", field ("room")}});
+  call->hello_.insert (1, "\"version\":1,");
+  g_autofree gchar *page = g_uri_to_string_partial (uri, G_URI_HIDE_FRAGMENT);
+  g_autofree gchar *stream = g_uri_resolve_relative (page, "stream", G_URI_FLAGS_NONE, nullptr);
+  call->url_ = stream;
+  if (certificate &&
+      !(call->certificate_ = g_tls_certificate_new_from_file (certificate, &error))) {
+    g_printerr ("rangecast-run: --certificate: '%s': %s\n", certificate, error->message);
+    return nullptr;
+  }
   return call;
 }
