@@ -205,7 +205,7 @@ test_wrong_options_are_named () {
   expect_error "--clock: 'wall' is neither system nor HOST:PORT" rangecast-run --clock wall fakesrc num-buffers=1 ! fakesink
   expect_error "no element \"nosuchsrc\"" "${camera[@]}" --input range --microphone nosuchsrc --audio-to 127.0.0.1:5300
   echo none >empty.yaml
-  expect_error "'empty.yaml' has no views" rangecast call --rig empty.yaml
+  expect_error "'empty.yaml' has no views" rangecast call --rig empty.yaml --no-window
   expect_error "--rig: needed" rangecast call
   local link
   for link in nonsense http:///x file:///x; do
