@@ -111,9 +111,9 @@ refused_by () {
 
 test_errors_name_the_option () {
   need_server
-  touch users.txt recording.rcnc
+  touch users.txt
   expect_error "argument --port: '65536' is not a whole number from 0 to 65535" rangecast serve --port 65536
-  expect_error "--listen, --file and --source exclude each other" rangecast serve --file recording.rcnc --source videotestsrc
+  expect_error "--listen, --file and --source exclude each other" rangecast serve --file "$pipelines/examples/head.rcnc" --source videotestsrc
   expect_error "--token: use letters" rangecast serve --token 'a b'
   expect_error "exclude each other" rangecast serve --anonymous --token-file users.txt
   expect_error "no file 'missing.pem'" rangecast serve --certificate missing.pem
