@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """calibrate: images of a chessboard or ChArUco board, from files or live, to a rig file."""
 
+import contextlib
 import queue
 import re
 import signal
@@ -178,10 +179,15 @@ def lines_of(child):
             lines.put(line)
         lines.put(None)
 
+    ended = 0
     for output in (child.stdout, child.stderr):
         threading.Thread(target=read, args=(output,), daemon=True).start()
-    for _ in range(2):
-        yield from iter(lines.get, None)
+    while ended < 2:
+        with contextlib.suppress(queue.Empty):
+            line = lines.get(timeout=0.5)  # Python handles a signal that another thread received when this one wakes
+            if line is not None:
+                yield line
+            ended += line is None
 
 
 def run_calibrate(args, launch):
