@@ -199,9 +199,8 @@ push_caps (GstRangeSplit *self, SplitPad &pad, const View &view, DepthMap map)
     GST_ELEMENT_ERROR (self, CORE, NEGOTIATION,
         ("pad %s: downstream does not accept %s%s", GST_PAD_NAME (pad.pad),
             gst_video_format_to_string (GST_VIDEO_INFO_FORMAT (&pad.video)),
-            pad.depth && map == DepthMap::kNone
-                ? "; depth has 16 bits; set depth-map for 8 bits"
-                : ""),
+            pad.depth && map == DepthMap::kNone ? "; depth has 16 bits; set depth-map for 8 bits"
+                                                : ""),
         (nullptr));
   pad.refused = refused;
   pad.current_view = view.id;

@@ -34,9 +34,10 @@ print_progress (RunMeasure &measure)
   if (stats.frames == 0)
     std::printf ("  waiting: cameras are learning their background\n");
   else
-    std::printf ("  frame set %5" G_GUINT64_FORMAT "  %d view%s  %5.1f /s  %7.0f points  %6.1f ms\n",
-        stats.frames, stats.views_now, stats.views_now == 1 ? "" : "s", measure.fps (), per_frame (stats.points, stats.coded_frames),
-        measure.latency_ms (0.5));
+    std::printf ("  frame set %5" G_GUINT64_FORMAT
+                 "  %d view%s  %5.1f /s  %7.0f points  %6.1f ms\n",
+        stats.frames, stats.views_now, stats.views_now == 1 ? "" : "s", measure.fps (),
+        per_frame (stats.points, stats.coded_frames), measure.latency_ms (0.5));
   std::fflush (stdout);
 }
 

@@ -27,9 +27,9 @@ make_harness ()
   GstHarness *h = gst_harness_new_parse ("rtpneighbourcodedepay ! neighbourcodedec conceal=last");
   gst_harness_set_drop_buffers (h, TRUE);
   gst_harness_set_src_caps (
-      h, gst_caps_new_simple ("application/x-rtp", "media", G_TYPE_STRING, "video",
-             "clock-rate", G_TYPE_INT, 90000, "encoding-name", G_TYPE_STRING, "X-NEIGHBOUR-CODE",
-             "rig", G_TYPE_STRING, rig, nullptr));
+      h, gst_caps_new_simple ("application/x-rtp", "media", G_TYPE_STRING, "video", "clock-rate",
+             G_TYPE_INT, 90000, "encoding-name", G_TYPE_STRING, "X-NEIGHBOUR-CODE", "rig",
+             G_TYPE_STRING, rig, nullptr));
   g_free (rig);
   return h;
 }

@@ -127,8 +127,8 @@ main (int argc, char **argv)
   while (!rest.empty ()) {
     const StreamPart part = next_part (rest, true);
     if (part.length > kAccessUnitHeaderSize) {
-      const FrameSet frame_set =
-          read_frame_set (rest.subspan (kAccessUnitHeaderSize, part.length - kAccessUnitHeaderSize));
+      const FrameSet frame_set = read_frame_set (
+          rest.subspan (kAccessUnitHeaderSize, part.length - kAccessUnitHeaderSize));
       add (reports, frame_set);
       if (list && !frame_set.empty ())
         print_frame_set (frame_set);

@@ -102,8 +102,8 @@ load_recording (const std::string &path, int skip, int frames, Input &input)
   while (!rest.empty () && input.sets.size () < std::size_t (frames)) {
     const StreamPart part = next_part (rest, true);
     if (part.length)
-      if (Status s =
-              reader.take (rest.subspan (kAccessUnitHeaderSize, part.length - kAccessUnitHeaderSize));
+      if (Status s = reader.take (
+              rest.subspan (kAccessUnitHeaderSize, part.length - kAccessUnitHeaderSize));
           !s.ok ())
         return s;
     rest = rest.subspan (part.length ? part.length : part.garbage);

@@ -24,8 +24,8 @@ access_units (std::span<const std::uint8_t> bytes)
   for (auto part = rangecast::next_part (bytes, true); part.length || part.garbage;
        part = rangecast::next_part (bytes, true)) {
     if (part.length)
-      units.push_back (
-          bytes.subspan (rangecast::kAccessUnitHeaderSize, part.length - rangecast::kAccessUnitHeaderSize));
+      units.push_back (bytes.subspan (
+          rangecast::kAccessUnitHeaderSize, part.length - rangecast::kAccessUnitHeaderSize));
     bytes = bytes.subspan (part.length + part.garbage);
   }
   return units;

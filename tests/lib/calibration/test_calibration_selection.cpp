@@ -134,8 +134,7 @@ TEST_F (SelectionTest, coverage_says_which_cells_tilts_and_distances_are_missing
   EXPECT_FALSE (c.cells[3]);
   EXPECT_FALSE (c.tilted_left || c.tilted_right || c.tilted_up || c.tilted_down || c.distances);
   const auto missing = c.missing ();
-  EXPECT_NE (
-      std::ranges::find (missing, "board at the bottom right of the image"), missing.end ());
+  EXPECT_NE (std::ranges::find (missing, "board at the bottom right of the image"), missing.end ());
   EXPECT_EQ (std::ranges::find (missing, "board at the top left of the image"), missing.end ());
 }
 

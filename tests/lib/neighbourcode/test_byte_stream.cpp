@@ -124,8 +124,8 @@ TEST (ByteStream, TruncatedEndHasTheSizeThatItShouldHave)
     const std::vector<std::uint8_t> cut (whole.begin (), whole.begin () + std::ptrdiff_t (size));
     const std::size_t expected = size < 8                       ? 0
                                  : size < kAccessUnitHeaderSize ? kAccessUnitHeaderSize
-                                 : size < whole.size ()     ? whole.size ()
-                                                            : 0;
+                                 : size < whole.size ()         ? whole.size ()
+                                                                : 0;
     EXPECT_EQ (next_part (cut, true).expected, expected) << size;
     EXPECT_EQ (next_part (cut, false).expected, 0u) << size;
   }

@@ -185,4 +185,3 @@ TEST (CongestionControl, limits_hold_whatever_is_reported)
     ASSERT_LE (control.bits_per_s (), 2e6);
   }
 }
-

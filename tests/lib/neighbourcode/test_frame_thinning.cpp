@@ -88,4 +88,3 @@ TEST (FrameThinning, rate_at_which_frame_sets_come_counts_where_the_stream_says_
     EXPECT_NEAR (kept, 5 * fps, 1) << fps;
   }
 }
-

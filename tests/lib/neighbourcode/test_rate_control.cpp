@@ -303,4 +303,3 @@ TEST (RateMeter, starts_over_where_time_goes_back)
   meter.add (100'000'005, 1900);
   EXPECT_NEAR (meter.bits_per_s (), 80'000, 1);
 }
-

@@ -115,8 +115,8 @@ always_another (int i)
 
 } // namespace
 
-INSTANTIATE_TEST_SUITE_P (All, ReferenceChoices,
-    ::testing::Values (Profile::kPacked, Profile::kEntropy), name_of);
+INSTANTIATE_TEST_SUITE_P (
+    All, ReferenceChoices, ::testing::Values (Profile::kPacked, Profile::kEntropy), name_of);
 
 TEST_P (ReferenceChoices, frame_sets_that_have_nothing_in_common_cost_no_more_than_without)
 {
@@ -172,4 +172,3 @@ TEST_P (ReferenceChoices, each_row_is_coded_again_within_the_refresh_period_what
   }
   EXPECT_GT (deltas, 20); /* or this shows nothing */
 }
-
