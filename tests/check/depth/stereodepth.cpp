@@ -429,7 +429,7 @@ pull_sample (GstElement *pipeline)
 {
   GstElement *sink = gst_bin_get_by_name (GST_BIN (pipeline), "out");
   GstSample *sample = nullptr;
-  g_signal_emit_by_name (sink, "try-pull-sample", guint64{20 * GST_SECOND}, &sample);
+  g_signal_emit_by_name (sink, "try-pull-sample", guint64{600 * GST_SECOND}, &sample);
   gst_object_unref (sink);
   fail_unless (sample != nullptr);
   return sample;
