@@ -54,7 +54,8 @@ def main():
             if not ok and counts[1] == 0:  # crashed, timed out, leaked: beyond what it counted itself
                 counts = (counts[0], 1, counts[2])
             if not ok:
-                print(f"failed: {test['name']} ({test['result']})")
+                said = re.findall(r"^(?:not ok |FAILED: ).*", test.get("stdout", "") + "\n" + test.get("stderr", ""), re.M)
+                print(f"failed: {test['name']} ({test['result']})", *said, sep="\n  ")
             total = [a + b for a, b in zip(total, counts)]
     if meson_status and not total[1]:
         total[1] = 1
