@@ -53,24 +53,27 @@ on_no_end (gpointer user_data)
   return G_SOURCE_REMOVE;
 }
 
-/* From another thread: a source may keep this one waiting. */
+/* From another thread: a source may keep this one waiting. Files have their first bytes before the
+ * pipeline plays; until sinks are prerolled, sources hold locks that EOS needs. */
 void
-send_eos (GstElement *pipeline, gpointer)
+send_eos (GstElement *pipeline, gpointer user_data)
 {
-  gst_element_send_event (pipeline, gst_event_new_eos ());
+  GstState state = GST_STATE_NULL;
+  gst_element_get_state (pipeline, &state, nullptr, kPatience_ms / 3 * GST_MSECOND);
+  if (state == GST_STATE_PLAYING)
+    gst_element_send_event (pipeline, gst_event_new_eos ());
+  else
+    g_main_loop_quit (static_cast<Runner *> (user_data)->loop);
 }
 
 gboolean
 on_interrupt (gpointer user_data)
 {
   auto runner = static_cast<Runner *> (user_data);
-  GstState state = GST_STATE_NULL;
-  gst_element_get_state (runner->pipeline, &state, nullptr, 0);
-  if (runner->call || state != GST_STATE_PLAYING) {
-    /* sources hold locks that EOS needs until sinks are prerolled */
+  if (runner->call) {
     g_main_loop_quit (runner->loop);
   } else if (!std::exchange (runner->ending, true)) {
-    gst_element_call_async (runner->pipeline, send_eos, nullptr, nullptr);
+    gst_element_call_async (runner->pipeline, send_eos, runner, nullptr);
     g_timeout_add (kPatience_ms * 2 / 3, on_no_end, runner);
   }
   return G_SOURCE_REMOVE;
