@@ -83,13 +83,16 @@ END
 
 # Each piece plays by itself, and all of them show what was coded.
 test_pieces_of_a_recording_begin_with_rig_and_key_frame_set () {
-  local elements piece file scene
+  local elements piece file scene limit
   while read -r scene elements; do
     declare -n coded=$scene
     rm -f piece*.rcnc direct-*.raw element-*.raw
     write_pictures direct 2 "${coded[@]}" ! neighbourcodedec
+    limit=60
+    # Once in ten times splitmuxsink of GStreamer 1.22 forgets the end of any stream; an interrupt closes its last file.
+    [[ $elements != splitmuxsink* ]] || limit="--preserve-status -s INT 15"
     # shellcheck disable=SC2086
-    timeout 60 gst-launch-1.0 -q "${coded[@]}" ! $elements location=piece%02d.rcnc || fail "$elements"
+    timeout $limit gst-launch-1.0 -q "${coded[@]}" ! $elements location=piece%02d.rcnc || fail "$elements"
     [ -s piece01.rcnc ] || fail "$scene $elements: one piece"
     for piece in piece*.rcnc; do
       play_file part "$piece"
