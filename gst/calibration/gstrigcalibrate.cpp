@@ -21,6 +21,7 @@
 
 #include "common/backgroundjobs.hpp"
 #include "common/elementproperties.hpp"
+#include "common/matcher.hpp"
 #include "frames.hpp"
 #include "messages.hpp"
 #include "settings.hpp"
@@ -407,7 +408,7 @@ gst_rig_calibrate_aggregate (GstAggregator *aggregator, gboolean timeout)
   {
     std::lock_guard guard (priv->lock);
     if (priv->finished)
-      return GST_FLOW_EOS;
+      return end_inputs (aggregator);
   }
   const CameraInputs cameras = current_cameras (self);
   if (std::ranges::any_of (cameras, [] (const auto &camera) { return camera->refused; }))

@@ -113,7 +113,7 @@ FrameMatcher::take_set (GstClockTime tolerance, bool timeout)
     case MatchStep::kWait:
       return GST_AGGREGATOR_FLOW_NEED_DATA;
     case MatchStep::kEnd:
-      return GST_FLOW_EOS;
+      return end_inputs (GST_AGGREGATOR (element_));
     case MatchStep::kDrop:
       drop (std::size_t (std::ranges::find (streams, dropped) - streams.begin ()), tolerance);
       return GST_AGGREGATOR_FLOW_NEED_DATA; /* GstAggregator looks at the pads again */
@@ -313,6 +313,35 @@ FrameMatcher::stop ()
 }
 
 /* ---- caps and pads ---- */
+
+static GstPadProbeReturn
+refuse_input (GstPad *, GstPadProbeInfo *info, gpointer)
+{
+  if (info->type & GST_PAD_PROBE_TYPE_BUFFER) {
+    gst_buffer_unref (GST_PAD_PROBE_INFO_BUFFER (info));
+    GST_PAD_PROBE_INFO_FLOW_RETURN (info) = GST_FLOW_EOS;
+    return GST_PAD_PROBE_HANDLED;
+  }
+  const GstEventType type = GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info));
+  return type == GST_EVENT_STREAM_START || type == GST_EVENT_FLUSH_STOP ? GST_PAD_PROBE_REMOVE
+                                                                        : GST_PAD_PROBE_OK;
+}
+
+GstFlowReturn
+end_inputs (GstAggregator *aggregator)
+{
+  const auto end = [] (GstElement *, GstPad *pad, gpointer) -> gboolean {
+    gst_pad_add_probe (pad,
+        GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
+                         GST_PAD_PROBE_TYPE_EVENT_FLUSH),
+        refuse_input, nullptr, nullptr);
+    while (gst_aggregator_pad_drop_buffer (GST_AGGREGATOR_PAD (pad)))
+      ;
+    return TRUE;
+  };
+  gst_element_foreach_sink_pad (GST_ELEMENT (aggregator), end, nullptr);
+  return GST_FLOW_EOS;
+}
 
 std::optional<GstVideoInfo>
 parse_caps_event (GstDebugCategory *category, GstAggregatorPad *pad, GstEvent *event)

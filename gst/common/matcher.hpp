@@ -119,6 +119,11 @@ std::optional<GstVideoInfo> parse_caps_event (
  * and posts an error. */
 bool refuse_bytes (GstAggregatorPad *pad, GstEvent *event);
 
+/** Ends the inputs of an aggregator that is over before they are: drops what waits on its sink pads
+ * and refuses more until the next stream. From GStreamer 1.26 on the base class leaves their
+ * threads waiting. For aggregate(). @return GST_FLOW_EOS */
+GstFlowReturn end_inputs (GstAggregator *aggregator);
+
 /** Frame duration of a pad's caps, ns; GST_CLOCK_TIME_NONE if there are none or the rate is
  *  unknown. */
 GstClockTime frame_duration (const std::optional<GstVideoInfo> &info);

@@ -369,6 +369,21 @@ GST_START_TEST (test_cameras_whose_images_never_pair_up_are_one_warning)
 }
 GST_END_TEST;
 
+/* With GStreamer 1.26 the tee would wait for ever, and its other branch never end. */
+GST_START_TEST (test_a_stream_that_goes_on_after_the_other_has_ended_goes_on_elsewhere)
+{
+  RigFile rig;
+  const std::string line = "videotestsrc num-buffers=2 ! " + kSize +
+                           " ! d.left videotestsrc num-buffers=50 ! " + kSize +
+                           " ! tee name=t ! queue max-size-buffers=1 ! d.right t. ! queue ! "
+                           "fakesink stereodepth name=d " +
+                           rig.property () + " ! fakesink";
+  GstElement *pipeline = gst_parse_launch (line.c_str (), nullptr);
+  play_to_the_end (pipeline);
+  gst_object_unref (pipeline);
+}
+GST_END_TEST;
+
 /* ---- three cameras ---- */
 
 /* At half of the rate, until it ends. */
@@ -555,6 +570,7 @@ stereodepth_suite ()
   tcase_add_test (tc, test_gap_after_a_flush_follows_a_segment);
   tcase_add_test (tc, test_late_frames_are_dropped_before_matching_and_reported);
   tcase_add_test (tc, test_cameras_whose_images_never_pair_up_are_one_warning);
+  tcase_add_test (tc, test_a_stream_that_goes_on_after_the_other_has_ended_goes_on_elsewhere);
   tcase_add_test (tc, test_third_camera_takes_part_while_it_has_images);
   tcase_add_test (tc, test_live_a_silent_third_camera_costs_the_latency_and_no_frame);
   tcase_add_test (tc, test_halves_of_an_image_give_the_depth_of_two_cameras);
