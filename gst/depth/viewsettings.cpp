@@ -20,7 +20,7 @@ load_view (const std::string &rig_file, int view_id, const char *property, int w
   if (!found)
     return {StatusCode::kNotFound, rig_file + ": has no view with view-id " +
                                        std::to_string (view_id) + ", the value of property " +
-                                       property};
+                                       property + "; use an id of its views"};
   view = *found;
   const Status scaled = rangecast::scale_view (view, width, height);
   return scaled.ok () ? scaled : Status{scaled.code (), rig_file + ": " + scaled.message ()};

@@ -96,8 +96,6 @@ def add_play(parser):
 def build_play(args):
     audio = audio_file_of(args.file)
     fail_unless(args.video or args.print or has_display(), "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --video")
-    for file in (args.file, audio):
-        fail_unless(not args.video or os.path.realpath(args.video) != os.path.realpath(file), f"--video: '{file}' is what is played")
     launch = Launch("filesrc", f"location={args.file}", "!", "neighbourcodeparse", "!", "neighbourcodedec", "!", "rangealign")
     launch.add("!", "striprender", "fit=true", "background-shade=0.5", f"auto-orbit={args.orbit}", "!", size_caps(args.output_size, media=GL))
     with_audio = audio != args.file and Path(audio).is_file() and args.speaker != ["none"]

@@ -93,11 +93,11 @@ def build_serve(args):
 def print_links(args, url, rig):
     """The page's address, at all addresses of this machine where it listens there."""
     scheme, host, port = re.fullmatch(r"(https?)://(.*):(\d+)/?", url).groups()
-    hosts = [host]
+    hosts = []
     if args.address in ("0.0.0.0", "::"):
         found = subprocess.run(["hostname", "-I"], capture_output=True, text=True, check=False).stdout.split()
-        hosts += [f"[{one}]" if ":" in one else one for one in found if ":" not in one or args.address == "::"]
-    for one in hosts:
+        hosts = [f"[{one}]" if ":" in one else one for one in found if ":" not in one or args.address == "::"]
+    for one in hosts or [host]:
         for page in ("", "rig") if rig else ("",):
             print(f"{scheme}://{one}:{port}/{page}" + (f"#token={args.token}" if args.token else ""), flush=True)
     if args.token_file:

@@ -86,6 +86,7 @@ def receive(launch, port, *, number=0, jitter, buffer=4194304, group=None, inter
     """Adds the elements that receive coded frame sets from a port. `number` makes names unique among several receivers."""
     kind = "application/x-srtp" if key else "application/x-rtp"
     listen(launch, "--listen", port, group, interface)
+    launch.add("timeout=10000000000")  # rangecast-run says that nothing comes
     launch.add(f"buffer-size={buffer}", f"caps={kind},{FIELDS},payload=96,{FEEDBACK},{TWCC}")
     if key:
         launch.add("!", f"decrypt{number}.rtp_sink", "srtpdec", f"name=decrypt{number}", f"decrypt{number}.rtp_src")

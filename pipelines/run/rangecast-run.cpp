@@ -80,7 +80,7 @@ on_interrupt (gpointer user_data)
 }
 
 /* Warnings say when rangemux lost a stream or stereocamsrc its cameras; only an element message
- * says that they are back. */
+ * says that they are back, or that udpsrc receives nothing. */
 void
 report_recovery (GstMessage *message)
 {
@@ -88,6 +88,10 @@ report_recovery (GstMessage *message)
   const gchar *name = GST_OBJECT_NAME (message->src);
   if (gst_structure_has_name (structure, "stereocamsrc-back")) {
     g_printerr ("%s: the cameras are back\n", name);
+  } else if (gst_structure_has_name (structure, "GstUDPSrcTimeout")) {
+    int port = 0;
+    g_object_get (message->src, "port", &port, nullptr);
+    g_printerr ("%s: no packet comes to UDP port %d\n", name, port);
   } else if (gst_structure_has_name (structure, "rangemux-stream") &&
              g_strcmp0 (gst_structure_get_string (structure, "state"), "in") == 0) {
     int view_id = -1;

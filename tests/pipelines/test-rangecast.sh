@@ -186,7 +186,7 @@ test_addresses_are_names_or_of_either_ip_version () {
 test_recordings_are_kept () {
   rangecast record good.rcnc --frames 3 --size 160x120 --views 1
   cp good.rcnc before.rcnc
-  refuses "'good.rcnc' is what is played" play good.rcnc --video good.rcnc
+  refuses "'good.mp4': use a name that ends in .webm" play good.rcnc --video good.mp4
   rangecast record good.rcnc --listen 20300 >record.log 2>&1 &
   until_true 60 takes_interrupt $!
   refuses "'good.rcnc' is being recorded by another program" record good.rcnc --listen 20301

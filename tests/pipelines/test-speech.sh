@@ -184,8 +184,6 @@ test_speech_is_sent_without_any_to_hear () {
 test_recordings_are_kept () {
   rangecast record talk.rcnc --frames 3 --views 1 --size 64x48
   echo speech >talk.opus
-  expect_error "'talk.opus' is what is played" rangecast play talk.rcnc --video talk.opus
-  [ -s talk.opus ] || fail "speech is lost"
   cp talk.rcnc talk.rcnc~
   cp talk.opus talk.opus~
   rangecast play talk.rcnc~ --video x.webm --print >launch.txt

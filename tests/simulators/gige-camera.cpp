@@ -123,9 +123,11 @@ GigeCamera::open_sockets ()
     wake_ = eventfd (0, EFD_CLOEXEC | EFD_NONBLOCK);
   if (wake_ >= 0)
     return {};
-  const char *why = errno == EADDRINUSE      ? "another camera or program is there (UDP port 3956)"
-                    : errno == EADDRNOTAVAIL ? "not an address of this machine"
-                                             : std::strerror (errno);
+  const char *why =
+      errno == EADDRINUSE
+          ? "another camera or program is there (UDP port 3956); stop it or use another address"
+      : errno == EADDRNOTAVAIL ? "not an address of this machine"
+                               : std::strerror (errno);
   return {StatusCode::kBadValue,
       "camera " + settings_.serial + " at " + settings_.address + ": " + why};
 }
