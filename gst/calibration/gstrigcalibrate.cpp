@@ -408,7 +408,7 @@ gst_rig_calibrate_aggregate (GstAggregator *aggregator, gboolean timeout)
   {
     std::lock_guard guard (priv->lock);
     if (priv->finished)
-      return end_inputs (aggregator);
+      return GST_FLOW_EOS;
   }
   const CameraInputs cameras = current_cameras (self);
   if (std::ranges::any_of (cameras, [] (const auto &camera) { return camera->refused; }))
@@ -617,5 +617,5 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_rig_calibrate_update_src_caps);
   aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_rig_calibrate_get_next_time);
   aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
-  aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_rig_calibrate_aggregate);
+  aggregator_class->aggregate = aggregate_to_the_end<gst_rig_calibrate_aggregate>;
 }

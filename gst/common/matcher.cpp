@@ -113,7 +113,7 @@ FrameMatcher::take_set (GstClockTime tolerance, bool timeout)
     case MatchStep::kWait:
       return GST_AGGREGATOR_FLOW_NEED_DATA;
     case MatchStep::kEnd:
-      return end_inputs (GST_AGGREGATOR (element_));
+      return GST_FLOW_EOS;
     case MatchStep::kDrop:
       drop (std::size_t (std::ranges::find (streams, dropped) - streams.begin ()), tolerance);
       return GST_AGGREGATOR_FLOW_NEED_DATA; /* GstAggregator looks at the pads again */
@@ -322,25 +322,36 @@ refuse_input (GstPad *, GstPadProbeInfo *info, gpointer)
     GST_PAD_PROBE_INFO_FLOW_RETURN (info) = GST_FLOW_EOS;
     return GST_PAD_PROBE_HANDLED;
   }
-  const GstEventType type = GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info));
-  return type == GST_EVENT_STREAM_START || type == GST_EVENT_FLUSH_STOP ? GST_PAD_PROBE_REMOVE
-                                                                        : GST_PAD_PROBE_OK;
+  if (info->type &
+      GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM) /* would wait for the thread that has ended */
+    return gst_query_type_get_flags (GST_QUERY_TYPE (GST_PAD_PROBE_INFO_QUERY (info))) &
+                   GST_QUERY_TYPE_SERIALIZED
+               ? GST_PAD_PROBE_DROP
+               : GST_PAD_PROBE_OK;
+  switch (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info))) {
+    case GST_EVENT_STREAM_START:
+    case GST_EVENT_FLUSH_STOP:
+      return GST_PAD_PROBE_REMOVE;
+    case GST_EVENT_GAP: /* nobody would take it from the queue */
+      return GST_PAD_PROBE_DROP;
+    default:
+      return GST_PAD_PROBE_OK;
+  }
 }
 
-GstFlowReturn
+void
 end_inputs (GstAggregator *aggregator)
 {
   const auto end = [] (GstElement *, GstPad *pad, gpointer) -> gboolean {
     gst_pad_add_probe (pad,
         GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
-                         GST_PAD_PROBE_TYPE_EVENT_FLUSH),
+                         GST_PAD_PROBE_TYPE_EVENT_FLUSH | GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM),
         refuse_input, nullptr, nullptr);
     while (gst_aggregator_pad_drop_buffer (GST_AGGREGATOR_PAD (pad)))
       ;
     return TRUE;
   };
   gst_element_foreach_sink_pad (GST_ELEMENT (aggregator), end, nullptr);
-  return GST_FLOW_EOS;
 }
 
 std::optional<GstVideoInfo>

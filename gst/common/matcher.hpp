@@ -119,10 +119,22 @@ std::optional<GstVideoInfo> parse_caps_event (
  * and posts an error. */
 bool refuse_bytes (GstAggregatorPad *pad, GstEvent *event);
 
-/** Ends the inputs of an aggregator that is over before they are: drops what waits on its sink pads
- * and refuses more until the next stream. From GStreamer 1.26 on the base class leaves their
- * threads waiting. For aggregate(). @return GST_FLOW_EOS */
-GstFlowReturn end_inputs (GstAggregator *aggregator);
+/** Drops the buffers that an aggregator has queued and refuses further ones with GST_FLOW_EOS until
+ *  STREAM_START or FLUSH_STOP: after EOS, GstAggregator of GStreamer 1.26 no longer flushes its
+ * sink pads, and upstream's threads would block. A buffer behind a queued event stays. For
+ * aggregate(). */
+void end_inputs (GstAggregator *aggregator);
+
+/** An element's aggregate(), after whose GST_FLOW_EOS, downstream's too, its inputs end. */
+template <GstFlowReturn (*kAggregate) (GstAggregator *, gboolean)>
+GstFlowReturn
+aggregate_to_the_end (GstAggregator *aggregator, gboolean timeout)
+{
+  const GstFlowReturn flow = kAggregate (aggregator, timeout);
+  if (flow == GST_FLOW_EOS)
+    end_inputs (aggregator);
+  return flow;
+}
 
 /** Frame duration of a pad's caps, ns; GST_CLOCK_TIME_NONE if there are none or the rate is
  *  unknown. */

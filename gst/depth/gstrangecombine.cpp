@@ -590,6 +590,6 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
   aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_range_combine_update_src_caps);
   aggregator_class->negotiate = GST_DEBUG_FUNCPTR (negotiate_downstream);
   aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
-  aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_range_combine_aggregate);
+  aggregator_class->aggregate = aggregate_to_the_end<gst_range_combine_aggregate>;
   aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_range_combine_get_next_time);
 }

@@ -620,7 +620,7 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   aggregator_class->negotiate = GST_DEBUG_FUNCPTR (negotiate_downstream);
   aggregator_class->create_new_pad = GST_DEBUG_FUNCPTR (gst_stereo_depth_create_new_pad);
   aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
-  aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_stereo_depth_aggregate);
+  aggregator_class->aggregate = aggregate_to_the_end<gst_stereo_depth_aggregate>;
   aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_stereo_depth_get_next_time);
   aggregator_class->propose_allocation = GST_DEBUG_FUNCPTR (propose_video_meta);
 }

@@ -51,6 +51,7 @@
 #include "clockpublisher.hpp"
 #include "common/capsadvice.hpp"
 #include "common/elementproperties.hpp"
+#include "common/matcher.hpp"
 #include "frameset.hpp"
 #include "streamtimes.hpp"
 
@@ -689,7 +690,7 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
   aggregator_class->negotiate = GST_DEBUG_FUNCPTR (negotiate_downstream);
   aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_range_mux_get_next_time);
   aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
-  aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_range_mux_aggregate);
+  aggregator_class->aggregate = aggregate_to_the_end<gst_range_mux_aggregate>;
 
   GST_DEBUG_CATEGORY_INIT (gst_range_mux_debug, "rangemux", 0, "Range multiplexer");
 }

@@ -545,7 +545,7 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
   aggregator_class->sink_query = GST_DEBUG_FUNCPTR (gst_strip_render_sink_query);
   aggregator_class->src_event = GST_DEBUG_FUNCPTR (gst_strip_render_src_event);
   aggregator_class->src_query = GST_DEBUG_FUNCPTR (gst_strip_render_src_query);
-  aggregator_class->aggregate = GST_DEBUG_FUNCPTR (gst_strip_render_aggregate);
+  aggregator_class->aggregate = aggregate_to_the_end<gst_strip_render_aggregate>;
   aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_strip_render_get_next_time);
   aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_strip_render_flush);
   aggregator_class->start = GST_DEBUG_FUNCPTR (gst_strip_render_start);

@@ -5,6 +5,7 @@
 #include <glib/gstdio.h>
 #include <gst/video/video.h>
 
+#include <atomic>
 #include <rangecast/rigfile/rig_file.hpp>
 #include <vector>
 
@@ -369,18 +370,48 @@ GST_START_TEST (test_cameras_whose_images_never_pair_up_are_one_warning)
 }
 GST_END_TEST;
 
-/* With GStreamer 1.26 the tee would wait for ever, and its other branch never end. */
-GST_START_TEST (test_a_stream_that_goes_on_after_the_other_has_ended_goes_on_elsewhere)
+/* With GStreamer 1.26 the tee's thread would wait for ever, and its other branch not end. */
+GST_START_TEST (test_a_tee_before_a_stream_ends_with_the_other_stream)
 {
   RigFile rig;
   const std::string line = "videotestsrc num-buffers=2 ! " + kSize +
                            " ! d.left videotestsrc num-buffers=50 ! " + kSize +
                            " ! tee name=t ! queue max-size-buffers=1 ! d.right t. ! queue ! "
                            "fakesink stereodepth name=d " +
-                           rig.property () + " ! fakesink";
-  GstElement *pipeline = gst_parse_launch (line.c_str (), nullptr);
-  play_to_the_end (pipeline);
-  gst_object_unref (pipeline);
+                           rig.property () + " ! ";
+  for (const char *sink : {"fakesink", "fakesink num-buffers=1"}) { /* EOS from downstream, too */
+    GstElement *pipeline = gst_parse_launch ((line + sink).c_str (), nullptr);
+    play_to_the_end (pipeline);
+    gst_object_unref (pipeline);
+  }
+}
+GST_END_TEST;
+
+/* As after the end of one stream: a flush begins anew. */
+GST_START_TEST (test_inputs_that_have_ended_take_a_new_stream)
+{
+  const std::string caps = "video/x-raw,format=RGBx,width=160,height=120,framerate=25/1";
+  Stereo s (kCalibration, caps, caps);
+  s.push_pair (0);
+  s.pull (0);
+  gst_harness_push_event (s.left, gst_event_new_eos ());
+  GstFlowReturn flow = GST_FLOW_OK;
+  for (int i = 1; flow == GST_FLOW_OK && i < 50; i++)
+    flow = gst_harness_push (s.right, gst_harness_create_buffer (s.right, 160 * 120 * 4));
+  fail_unless_equals_int (flow, GST_FLOW_EOS);
+  const guint32 seqnum = gst_util_seqnum_next ();
+  for (const bool stop : {false, true})
+    for (GstHarness *h : {s.left, s.right}) {
+      GstEvent *event = stop ? gst_event_new_flush_stop (TRUE) : gst_event_new_flush_start ();
+      gst_event_set_seqnum (event, seqnum);
+      gst_harness_push_event (h, event);
+    }
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  for (GstHarness *h : {s.left, s.right})
+    gst_harness_push_event (h, gst_event_new_segment (&segment));
+  s.push_pair (0);
+  s.pull (0);
 }
 GST_END_TEST;
 
@@ -570,7 +601,8 @@ stereodepth_suite ()
   tcase_add_test (tc, test_gap_after_a_flush_follows_a_segment);
   tcase_add_test (tc, test_late_frames_are_dropped_before_matching_and_reported);
   tcase_add_test (tc, test_cameras_whose_images_never_pair_up_are_one_warning);
-  tcase_add_test (tc, test_a_stream_that_goes_on_after_the_other_has_ended_goes_on_elsewhere);
+  tcase_add_test (tc, test_a_tee_before_a_stream_ends_with_the_other_stream);
+  tcase_add_test (tc, test_inputs_that_have_ended_take_a_new_stream);
   tcase_add_test (tc, test_third_camera_takes_part_while_it_has_images);
   tcase_add_test (tc, test_live_a_silent_third_camera_costs_the_latency_and_no_frame);
   tcase_add_test (tc, test_halves_of_an_image_give_the_depth_of_two_cameras);
