@@ -121,9 +121,7 @@ names_from_rig (const StereoCamSettings &settings, CameraNames &found)
   const std::string which = settings.rig + ": view " + std::to_string (settings.view_id);
   const rangecast::View *view = rig.find (settings.view_id);
   if (!view)
-    return {StatusCode::kNotFound, settings.rig + ": has no view with view-id " +
-                                       std::to_string (settings.view_id) +
-                                       "; use an id of its views"};
+    return {StatusCode::kNotFound, settings.rig + ": " + rig.without_view (settings.view_id)};
   found = camera_names (*view);
   for (int i = 0; i < 2; i++)
     if (found[i].empty ())

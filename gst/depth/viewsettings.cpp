@@ -18,9 +18,8 @@ load_view (const std::string &rig_file, int view_id, const char *property, int w
     return s;
   const View *found = rig.find (view_id);
   if (!found)
-    return {StatusCode::kNotFound, rig_file + ": has no view with view-id " +
-                                       std::to_string (view_id) + ", the value of property " +
-                                       property + "; use an id of its views"};
+    return {StatusCode::kNotFound,
+        rig_file + ": " + rig.without_view (view_id) + "; set property " + property};
   view = *found;
   const Status scaled = rangecast::scale_view (view, width, height);
   return scaled.ok () ? scaled : Status{scaled.code (), rig_file + ": " + scaled.message ()};

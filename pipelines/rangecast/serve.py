@@ -97,7 +97,7 @@ def print_links(args, url, rig):
     if args.address in ("0.0.0.0", "::"):
         found = subprocess.run(["hostname", "-I"], capture_output=True, text=True, check=False).stdout.split()
         hosts = [f"[{one}]" if ":" in one else one for one in found if ":" not in one or args.address == "::"]
-    for one in hosts or [host]:
+    for one in [*hosts, host]:
         for page in ("", "rig") if rig else ("",):
             print(f"{scheme}://{one}:{port}/{page}" + (f"#token={args.token}" if args.token else ""), flush=True)
     if args.token_file:

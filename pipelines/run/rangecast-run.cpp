@@ -56,14 +56,14 @@ on_no_end (gpointer user_data)
 /* From another thread: a source may keep this one waiting. Files have their first bytes before the
  * pipeline plays; until sinks are prerolled, sources hold locks that EOS needs. */
 void
-send_eos (GstElement *pipeline, gpointer user_data)
+send_eos (GstElement *pipeline, gpointer loop)
 {
   GstState state = GST_STATE_NULL;
   gst_element_get_state (pipeline, &state, nullptr, kPatience_ms / 3 * GST_MSECOND);
   if (state == GST_STATE_PLAYING)
     gst_element_send_event (pipeline, gst_event_new_eos ());
   else
-    g_main_loop_quit (static_cast<Runner *> (user_data)->loop);
+    g_main_loop_quit (static_cast<GMainLoop *> (loop));
 }
 
 gboolean
@@ -73,7 +73,8 @@ on_interrupt (gpointer user_data)
   if (runner->call) {
     g_main_loop_quit (runner->loop);
   } else if (!std::exchange (runner->ending, true)) {
-    gst_element_call_async (runner->pipeline, send_eos, runner, nullptr);
+    gst_element_call_async (runner->pipeline, send_eos, g_main_loop_ref (runner->loop),
+        reinterpret_cast<GDestroyNotify> (g_main_loop_unref));
     g_timeout_add (kPatience_ms * 2 / 3, on_no_end, runner);
   }
   return G_SOURCE_REMOVE;
@@ -82,7 +83,7 @@ on_interrupt (gpointer user_data)
 /* Warnings say when rangemux lost a stream or stereocamsrc its cameras; only an element message
  * says that they are back, or that udpsrc receives nothing. */
 void
-report_recovery (GstMessage *message)
+report_element_message (GstMessage *message)
 {
   const GstStructure *structure = gst_message_get_structure (message);
   const gchar *name = GST_OBJECT_NAME (message->src);
@@ -91,7 +92,9 @@ report_recovery (GstMessage *message)
   } else if (gst_structure_has_name (structure, "GstUDPSrcTimeout")) {
     int port = 0;
     g_object_get (message->src, "port", &port, nullptr);
-    g_printerr ("%s: no packet comes to UDP port %d\n", name, port);
+    guint64 time = 0;
+    gst_structure_get_uint64 (structure, "timeout", &time);
+    g_printerr ("%s: no packets on UDP port %d for %g s\n", name, port, double (time) / GST_SECOND);
   } else if (gst_structure_has_name (structure, "rangemux-stream") &&
              g_strcmp0 (gst_structure_get_string (structure, "state"), "in") == 0) {
     int view_id = -1;
@@ -193,7 +196,7 @@ on_message (GstBus *, GstMessage *message, gpointer user_data)
       gst_element_set_state (runner->pipeline, GST_STATE_PLAYING);
       break;
     case GST_MESSAGE_ELEMENT:
-      report_recovery (message);
+      report_element_message (message);
       report_address (message);
       report_learning (*runner, message);
       if (runner->stats)

@@ -33,7 +33,7 @@ test_malformed_rig_file_is_named () {
 
 test_unknown_view_id_is_named () {
   make_rig
-  expect_error "view-id" pair $vga $vga rig=rig.yaml view-id=7
+  expect_error "has no view with view-id 7, only 0, 1; set property view-id" pair $vga $vga rig=rig.yaml view-id=7
 }
 
 test_pictures_that_do_not_match_the_rig_are_named () {
@@ -162,8 +162,17 @@ test_a_full_disk_names_the_file () {
   expect_error "location=/dev/full: No space left" run avatartestsrc num-buffers=5 ! neighbourcodeenc ! filesink location=/dev/full
 }
 
+test_silent_udp_sources_are_named () {
+  rangecast-run udpsrc port=$((ports + 210)) timeout=200000000 ! fakesink 2>said.txt &
+  wait_for said.txt "udpsrc0: no packets on UDP port $((ports + 210)) for 0.2 s" 20
+  kill -INT $!
+  wait $!
+}
+
+# The second sink is prerolled long after the file has its first bytes.
 test_a_signal_finishes_files () {
-  rangecast-run videotestsrc is-live=true ! identity name=rendered ! jpegenc ! qtmux ! filesink location=film.mov &
+  rangecast-run videotestsrc is-live=true ! tee name=t ! queue ! jpegenc ! qtmux ! filesink location=film.mov \
+    t. ! queue max-size-buffers=1 leaky=downstream ! identity sleep-time=300000 ! fakesink sync=false &
   until_true 20 test -s film.mov
   kill -INT $!
   wait $!

@@ -162,6 +162,17 @@ Rig::find (int view_id) const
   return it == views.end () ? nullptr : &*it;
 }
 
+std::string
+Rig::without_view (int view_id) const
+{
+  std::string text = "has no view with view-id " + std::to_string (view_id), separator = ", only ";
+  for (const View &view : views) {
+    text += separator + std::to_string (view.id);
+    separator = ", ";
+  }
+  return text;
+}
+
 Status
 validate (const Rig &rig)
 {

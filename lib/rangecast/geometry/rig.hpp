@@ -61,6 +61,8 @@ struct Rig {
 
   /** The view with this id, or nullptr. */
   [[nodiscard]] const View *find (int view_id) const;
+  /** "has no view with view-id 7, only 0, 1", for errors. */
+  [[nodiscard]] std::string without_view (int view_id) const;
 };
 
 /** Checks every field against the ranges above; the message names view and field.
