@@ -8,6 +8,7 @@ usage: frame_source.py [--sink LAUNCH] [--frames N] [--fps FPS] [--live]
 needs: PyGObject, NumPy, the Gst overrides (Debian: python3-gst-1.0 python3-numpy); docs/guide/python.md
 """
 import argparse
+import signal
 import sys
 from fractions import Fraction
 
@@ -63,31 +64,25 @@ def main():
         source.set_property(name, value)
     failed = pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE
     duration = int(Gst.SECOND / options.fps) if options.fps else Gst.CLOCK_TIME_NONE
-    message, status = None, 0
-    try:
-        for number in range(options.frames):
-            while not (failed or message) and source.get_property("current-level-buffers") >= 2:
-                message = bus.timed_pop_filtered(Gst.SECOND // 100, Gst.MessageType.ERROR)  # waits for room, or an error
-            if failed or message:
-                break
-            pts = Gst.CLOCK_TIME_NONE if options.live else int(number * Gst.SECOND / options.fps)
-            buffer = GstRange.new_buffer(caps, capture(number), pts, duration)
-            if source.emit("push-buffer", buffer) != Gst.FlowReturn.OK:
-                break  # the error is on the bus
-    except KeyboardInterrupt:
-        status = 130
-    try:
-        source.emit("end-of-stream")
-        while not message:  # in steps, between which Ctrl-C counts
-            message = bus.timed_pop_filtered(Gst.SECOND // 10, Gst.MessageType.EOS | Gst.MessageType.ERROR)
-    except KeyboardInterrupt:
-        sys.exit(130)
-    finally:
-        pipeline.set_state(Gst.State.NULL)
-    if message.type == Gst.MessageType.ERROR:
+    message, interrupts = None, []
+    signal.signal(signal.SIGINT, lambda *_: interrupts.append(130))  # an exception might come in the middle of PyGObject's work
+    for number in range(options.frames):
+        while not (failed or message or interrupts) and source.get_property("current-level-buffers") >= 2:
+            message = bus.timed_pop_filtered(Gst.SECOND // 100, Gst.MessageType.ERROR)  # waits for room, or an error
+        if failed or message or interrupts:
+            break
+        pts = Gst.CLOCK_TIME_NONE if options.live else int(number * Gst.SECOND / options.fps)
+        buffer = GstRange.new_buffer(caps, capture(number), pts, duration)
+        if source.emit("push-buffer", buffer) != Gst.FlowReturn.OK:
+            break  # the error is on the bus
+    source.emit("end-of-stream")
+    while not message and len(interrupts) < 2:  # in steps, between which Ctrl-C counts
+        message = bus.timed_pop_filtered(Gst.SECOND // 10, Gst.MessageType.EOS | Gst.MessageType.ERROR)
+    pipeline.set_state(Gst.State.NULL)
+    if message and message.type == Gst.MessageType.ERROR:
         error, details = message.parse_error()
         sys.exit(f"frame_source.py: {error.message} {details or ''}")
-    sys.exit(status)
+    sys.exit(interrupts[0] if interrupts else 0)
 
 
 if __name__ == "__main__":

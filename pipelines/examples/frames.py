@@ -8,6 +8,7 @@ usage: frames.py [--source LAUNCH] [--frames N] [--save FILE.ply|FILE.npy]
 needs: PyGObject, NumPy, the Gst overrides (Debian: python3-gst-1.0 python3-numpy); docs/guide/python.md
 """
 import argparse
+import signal
 import sys
 
 try:
@@ -62,19 +63,18 @@ def main():
     pipeline = Gst.parse_launch(f"{options.source} ! video/x-range ! appsink name=frames sync=false max-buffers=2")
     sink, bus = pipeline.get_by_name("frames"), pipeline.get_bus()
     started = pipeline.set_state(Gst.State.PLAYING) != Gst.StateChangeReturn.FAILURE
-    count, message, status = 0, None, 0
-    try:
-        while started and count < options.frames and not message and not sink.get_property("eos"):
-            if not (sample := sink.emit("try-pull-sample", Gst.SECOND // 10)):
-                message = bus.pop_filtered(Gst.MessageType.ERROR)
-                continue
-            views = GstRange.map_views(sample)
-            points, colours = (np.concatenate(parts) for parts in zip(*map(world_points, views)))
-            middle = "centre {:.3f} {:.3f} {:.3f} m".format(*points.mean(axis=0)) if len(points) else "empty"
-            print(f"{Gst.TIME_ARGS(sample.get_buffer().pts)}: {len(views)} views, {len(points)} points, {middle}")
-            count += 1
-    except KeyboardInterrupt:
-        status = 130
+    count, message, interrupts = 0, None, []
+    signal.signal(signal.SIGINT, lambda *_: interrupts.append(130))  # an exception might come in the middle of PyGObject's work
+    while started and count < options.frames and not (message or interrupts or sink.get_property("eos")):
+        if not (sample := sink.emit("try-pull-sample", Gst.SECOND // 10)):
+            message = bus.pop_filtered(Gst.MessageType.ERROR)
+            continue
+        views = GstRange.map_views(sample)
+        points, colours = (np.concatenate(parts) for parts in zip(*map(world_points, views)))
+        middle = "centre {:.3f} {:.3f} {:.3f} m".format(*points.mean(axis=0)) if len(points) else "empty"
+        print(f"{Gst.TIME_ARGS(sample.get_buffer().pts)}: {len(views)} views, {len(points)} points, {middle}")
+        count += 1
+    status = interrupts[0] if interrupts else 0
     message = message or bus.pop_filtered(Gst.MessageType.ERROR)
     pipeline.set_state(Gst.State.NULL)
     if message:
