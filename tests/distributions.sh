@@ -16,6 +16,7 @@ for suite; do
   echo "$suite: $root, removed if all is well"
   debootstrap --variant=minbase "$suite" "$root" >"$root/debootstrap.log" || { tail "$root/debootstrap.log"; exit 1; }
   mkdir "$root/srv/gst-rangecast"
+  printf '127.0.0.1 localhost\n::1 localhost\n' >"$root/etc/hosts" # as Debian's installer does
   git archive HEAD | tar -x -C "$root/srv/gst-rangecast"
   mount --bind "$root" "$root" # `ip netns exec` wants a mount point as root
   for folder in dev proc sys; do mount --rbind "/$folder" "$root/$folder"; done

@@ -22,9 +22,9 @@ open_viewer () { # arguments of the viewer
   rangecast-viewer "$@" >log.txt 2>&1 &
   pipeline=$!
   trap 'kill -KILL $pipeline 2>/dev/null || true' EXIT
-  until_true 20 window_id
+  until_true 60 window_id
   window=$(cat window.txt)
-  until_true 20 first_picture
+  until_true 60 first_picture
 }
 press () { xdotool key --window "$window" "$1"; }
 has_ended () { ! kill -0 "$pipeline" 2>/dev/null; }
@@ -288,9 +288,9 @@ shows_and_turns () { # command...
   "$@" >log.txt 2>&1 &
   pipeline=$!
   trap 'kill -KILL $pipeline 2>/dev/null || true' EXIT
-  until_true 20 first_picture
+  until_true 60 first_picture
   xdotool mousemove 160 120 mousedown 1 mousemove 120 120 mousemove 80 120 mouseup 1
-  until_true 20 turned
+  until_true 60 turned
 }
 gst_play_shows () { shows_and_turns gst-play-1.0 --no-interactive still.rcnc; }
 playbin_shows () { shows_and_turns gst-launch-1.0 playbin "uri=file://$PWD/still.rcnc"; }
