@@ -322,21 +322,15 @@ refuse_input (GstPad *, GstPadProbeInfo *info, gpointer)
     GST_PAD_PROBE_INFO_FLOW_RETURN (info) = GST_FLOW_EOS;
     return GST_PAD_PROBE_HANDLED;
   }
-  if (info->type &
-      GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM) /* would wait for the thread that has ended */
-    return gst_query_type_get_flags (GST_QUERY_TYPE (GST_PAD_PROBE_INFO_QUERY (info))) &
-                   GST_QUERY_TYPE_SERIALIZED
-               ? GST_PAD_PROBE_DROP
-               : GST_PAD_PROBE_OK;
-  switch (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info))) {
-    case GST_EVENT_STREAM_START:
-    case GST_EVENT_FLUSH_STOP:
-      return GST_PAD_PROBE_REMOVE;
-    case GST_EVENT_GAP: /* nobody would take it from the queue */
-      return GST_PAD_PROBE_DROP;
-    default:
-      return GST_PAD_PROBE_OK;
+  if (info->type & GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM) { /* nobody takes it from the queue */
+    const GstQueryType type = GST_QUERY_TYPE (GST_PAD_PROBE_INFO_QUERY (info));
+    const bool queued = gst_query_type_get_flags (type) & GST_QUERY_TYPE_SERIALIZED;
+    return queued ? GST_PAD_PROBE_DROP : GST_PAD_PROBE_OK;
   }
+  const GstEventType type = GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info));
+  if (type == GST_EVENT_STREAM_START || type == GST_EVENT_FLUSH_STOP)
+    return GST_PAD_PROBE_REMOVE;
+  return type == GST_EVENT_GAP ? GST_PAD_PROBE_DROP : GST_PAD_PROBE_OK;
 }
 
 void

@@ -91,9 +91,8 @@ report_element_message (GstMessage *message)
     g_printerr ("%s: the cameras are back\n", name);
   } else if (gst_structure_has_name (structure, "GstUDPSrcTimeout")) {
     int port = 0;
-    g_object_get (message->src, "port", &port, nullptr);
     guint64 time = 0;
-    gst_structure_get_uint64 (structure, "timeout", &time);
+    g_object_get (message->src, "port", &port, "timeout", &time, nullptr);
     g_printerr ("%s: no packets on UDP port %d for %g s\n", name, port, double (time) / GST_SECOND);
   } else if (gst_structure_has_name (structure, "rangemux-stream") &&
              g_strcmp0 (gst_structure_get_string (structure, "state"), "in") == 0) {
