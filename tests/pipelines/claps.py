@@ -4,16 +4,17 @@
 
 usage: claps.py LOG
 
-Prints for each clap that was both seen and heard: its time in s, and by how many ms the sound comes after the picture
-(negative: before). By running time, when sinks are to show them: what a busy machine shows late was not sent late. The beginnings of
-picture and sound are where brightness and loudness rise over the middle between what they are most of the time and their greatest."""
+Prints for each clap that was both seen and heard: its time in s, and by how many ms at least the sound comes after the picture
+(negative: before). By running time, when sinks are to show them: what a busy machine shows late was not sent late. A clap lasts while
+brightness or loudness is over the middle between what it is most of the time and its greatest. A picture that a busy machine loses
+makes the clap begin later or end earlier, so the least difference that both beginnings and both ends allow counts."""
 import sys
 
 APART_S = 0.5  # claps are 2 s apart
 
 
-def beginnings(points):
-    """Times in s at which a level rises over the middle between its median and its maximum; where packets are lost, it falls."""
+def claps(points):
+    """First and last time in s at which a level is over the middle between its median and its maximum."""
     if not points:
         return []
     levels = sorted(level for _, level in points)
@@ -23,8 +24,10 @@ def beginnings(points):
         return []
     result, above = [], True  # what begins loud did not begin here
     for time, level in points:
-        if level > middle and not above and (not result or time - result[-1] > APART_S):
-            result.append(time)
+        if level > middle and not above and (not result or time - result[-1][0] > APART_S):
+            result.append([time, time])
+        elif level > middle and result and time - result[-1][0] < APART_S:
+            result[-1][1] = time
         above = level > middle
     return result
 
@@ -38,11 +41,12 @@ def main():
             words = line.split()
             if len(words) == 3:
                 points[words[0]].append((int(words[1]) * 1e-9, float(words[2])))
-    sounds = beginnings(points["sound"])
-    for picture in beginnings(points["picture"]):
-        sound = min(sounds, key=lambda time: abs(time - picture), default=None)
-        if sound is not None and abs(sound - picture) < APART_S:
-            print(f"{picture:.3f} {1000 * (sound - picture):.0f}")
+    sounds = claps(points["sound"])
+    for picture in claps(points["picture"]):
+        sound = min(sounds, key=lambda times: abs(times[0] - picture[0]), default=None)
+        if sound is not None and abs(sound[0] - picture[0]) < APART_S:
+            least, most = sorted(a - b for a, b in zip(sound, picture))
+            print(f"{picture[0]:.3f} {1000 * max(least, min(0, most)):.0f}")
 
 
 main()
