@@ -2,6 +2,7 @@
 """calibrate: images of a chessboard or ChArUco board, from files or live, to a rig file."""
 
 import contextlib
+import os
 import queue
 import re
 import signal
@@ -196,6 +197,7 @@ def run_calibrate(args, launch):
     child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True)
 
     def interrupt(*_):
+        os.write(1, b"calibrating; Ctrl-C again cancels\n")  # print() may be at work
         child.send_signal(signal.SIGINT)
         signal.signal(signal.SIGINT, lambda *_: (child.kill(), sys.exit(130)))
 

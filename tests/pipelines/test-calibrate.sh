@@ -63,12 +63,12 @@ test_webcam_calibrates_first_and_packed_pictures_give_the_rig_of_separate_ones (
   # Live, each board for a second, until Ctrl-C.
   local live="multifilesrc location=packed-%02d.png start-index=1 stop-index=9 loop=true caps=image/png,framerate=1/1 ! pngdec
     ! videorate ! video/x-raw,framerate=10/1 ! clocksync"
-  rangecast webcam --rig new.yaml --source "$live" --calibrate "--near 0.2" --png view.png >report.txt &
+  rangecast webcam --rig new.yaml --source "$live" --calibrate "--near 0.2" --png view.png >live.txt &
   local webcam=$!
-  seen () { grep -qE '^sink_1 .*: ([89]|1[0-9]) frames' report.txt; }
+  seen () { grep -qsE '^sink_1 .*: ([89]|1[0-9]) frames' live.txt; }
   until_true 90 seen
   pkill -INT -P "$webcam" || true # unless it had seen enough
-  wait $webcam || fail "$(tail -n 5 report.txt)"
+  wait $webcam || fail "$(tail -n 5 live.txt)"
   expect_file new.yaml 500
 }
 
