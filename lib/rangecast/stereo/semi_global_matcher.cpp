@@ -69,53 +69,50 @@ step (const std::uint8_t *cost, std::uint8_t *path, std::uint8_t *lowest, const 
   Lanes::at (lowest) = least;
 }
 
-/* Two of four rounds of a transposition of 16 x 16 bytes, for four rows. */
+/* Interleaves the bytes of 16 of two rows; with vectors of 32 bytes, of two such pairs. */
+template <typename B>
 inline void
-transpose_four (Lanes<4>::B (&rows)[4])
+interleave (const B &a, const B &b, B &low, B &high)
 {
-  using B = Lanes<4>::B;
-  const auto interleave = [] (const B &a, const B &b, B &low, B &high) {
+  if constexpr (sizeof (B) == 16) {
     low = __builtin_shufflevector (a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
     high = __builtin_shufflevector (
         a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
-  };
-  B a, b, c, d;
-  interleave (rows[0], rows[2], a, b);
-  interleave (rows[1], rows[3], c, d);
-  interleave (a, c, rows[0], rows[1]);
-  interleave (b, d, rows[2], rows[3]);
+  } else {
+    low = __builtin_shufflevector (a, b, 0, 32, 1, 33, 2, 34, 3, 35, 4, 36, 5, 37, 6, 38, 7, 39, 16,
+        48, 17, 49, 18, 50, 19, 51, 20, 52, 21, 53, 22, 54, 23, 55);
+    high = __builtin_shufflevector (a, b, 8, 40, 9, 41, 10, 42, 11, 43, 12, 44, 13, 45, 14, 46, 15,
+        47, 24, 56, 25, 57, 26, 58, 27, 59, 28, 60, 29, 61, 30, 62, 31, 63);
+  }
 }
 
-/* Transposes kSide x kSide bytes in squares of 16 x 16. */
+/* Transposes kSide x kSide bytes in squares of 16 x 16, as many at once, one below the other, as a
+ * vector has halves. Two rounds of four are the same for rows that are four apart. */
+template <typename Lanes>
 inline void
 transpose (
     const std::uint8_t *from, std::ptrdiff_t from_step, std::uint8_t *to, std::ptrdiff_t to_step)
 {
-  using B = Lanes<4>::B;
-  constexpr int kSquare = sizeof (B);
-  for (int y = 0; y < kSide; y += kSquare)
+  using B = typename Lanes::B;
+  constexpr int kBytes = sizeof (B), kSquare = 16;
+  for (int y = 0; y < kSide; y += kBytes)
     for (int x = 0; x < kSide; x += kSquare) {
-      B half[kSquare], rows[4];
-#pragma GCC unroll 4
-      for (int i = 0; i < 4; i++) {
-#pragma GCC unroll 4
-        for (int k = 0; k < 4; k++)
-          rows[k] = Lanes<4>::at (from + (y + i + 4 * k) * from_step + x);
-        transpose_four (rows);
-#pragma GCC unroll 4
-        for (int k = 0; k < 4; k++)
-          half[4 * i + k] = rows[k];
+      B rows[kSquare], next[kSquare];
+      for (int i = 0; i < kSquare; i++)
+        for (int half = 0; half < kBytes; half += kSquare)
+          std::memcpy (reinterpret_cast<std::uint8_t *> (&rows[i]) + half,
+              from + (y + half + i) * from_step + x, kSquare);
+#pragma GCC unroll 2
+      for (int round = 0; round < 2; round++) {
+#pragma GCC unroll 8
+        for (int i = 0; i < kSquare / 2; i++)
+          interleave<B> (rows[i], rows[i + 8], next[2 * i], next[2 * i + 1]);
+#pragma GCC unroll 8
+        for (int i = 0; i < kSquare / 2; i++)
+          interleave<B> (next[i], next[i + 8], rows[2 * i], rows[2 * i + 1]);
       }
-#pragma GCC unroll 4
-      for (int i = 0; i < 4; i++) {
-#pragma GCC unroll 4
-        for (int k = 0; k < 4; k++)
-          rows[k] = half[i + 4 * k];
-        transpose_four (rows);
-#pragma GCC unroll 4
-        for (int k = 0; k < 4; k++)
-          Lanes<4>::at (to + (x + 4 * i + k) * to_step + y) = rows[k];
-      }
+      for (int i = 0; i < kSquare; i++)
+        Lanes::at (to + (x + i) * to_step + y) = rows[i];
     }
 }
 
@@ -196,6 +193,7 @@ SemiGlobalMatcher::compare_band (const Stripe &stripe, int band, Memory &m)
 }
 
 /* Jumps between each column and the one before. */
+template <typename Lanes>
 void
 SemiGlobalMatcher::find_jumps_of_band (const Stripe &stripe, int band, Memory &m)
 {
@@ -210,7 +208,7 @@ SemiGlobalMatcher::find_jumps_of_band (const Stripe &stripe, int band, Memory &m
                                  kRadiusX + stripe.x0 + i * kSide;
       find_jumps (grey, grey - 1, jumps + row * kSide);
     }
-    transpose (jumps, kSide, &m.jumps[std::size_t (i) * kTileArea], kSide);
+    transpose<Lanes> (jumps, kSide, &m.jumps[std::size_t (i) * kTileArea], kSide);
   }
 }
 
@@ -222,7 +220,7 @@ SemiGlobalMatcher::walk_band (const Stripe &stripe, int band, Memory &m)
   using B = typename Lanes::B;
   const Tile *tiles = &tiles_[std::size_t (band * stripe.across)];
   compare_band<Lanes> (stripe, band, m);
-  find_jumps_of_band (stripe, band, m);
+  find_jumps_of_band<Lanes> (stripe, band, m);
   const std::size_t first = tiles[0].at, n = end_of (tiles[stripe.across - 1]) - first;
   m.costs.resize (std::max (m.costs.size (), n));
   m.rests.resize (std::max (m.rests.size (), n));
@@ -240,7 +238,7 @@ SemiGlobalMatcher::walk_band (const Stripe &stripe, int band, Memory &m)
         realign (tiles[i - way], tile, m);
       if (way > 0)
         for (int d = 0; d < tile.count; d++)
-          transpose (&costs_[tile.at] + d * kSide, each, costs + d * kSide, each);
+          transpose<Lanes> (&costs_[tile.at] + d * kSide, each, costs + d * kSide, each);
       const int last = std::min (kSide, stripe.columns - i * kSide);
       for (int k = 0; k < last; k++) {
         const int x = way > 0 ? k : last - 1 - k;
@@ -263,7 +261,7 @@ SemiGlobalMatcher::walk_band (const Stripe &stripe, int band, Memory &m)
       }
       if (way < 0)
         for (int d = 0; d < tile.count; d++)
-          transpose (rests + d * kSide, each, &rests_[tile.at] + d * kSide, each);
+          transpose<Lanes> (rests + d * kSide, each, &rests_[tile.at] + d * kSide, each);
     }
   }
 }

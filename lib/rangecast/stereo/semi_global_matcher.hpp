@@ -66,6 +66,7 @@ private:
   void match_stripe (const Stripe &stripe, int y, int end, int n_threads, cv::Mat &disparity);
   static void realign (const Tile &from, const Tile &to, Memory &memory);
   template <typename Lanes> void compare_band (const Stripe &stripe, int band, Memory &memory);
+  template <typename Lanes>
   void find_jumps_of_band (const Stripe &stripe, int band, Memory &memory);
   template <typename Lanes> void walk_band (const Stripe &stripe, int band, Memory &memory);
   template <typename Lanes> void walk_columns (const Stripe &stripe, int column, Memory &memory);
