@@ -25,6 +25,14 @@ square (int side)
   return cv::getStructuringElement (cv::MORPH_RECT, cv::Size (side, side));
 }
 
+/* What a median finds in a mask of 0 and 255, in less time. */
+void
+find_majority (const cv::Mat &mask, cv::Mat &to, int side)
+{
+  cv::blur (mask, to, {side, side}, {-1, -1}, cv::BORDER_REPLICATE);
+  cv::compare (to, 127, to, cv::CMP_GT);
+}
+
 const Status kFailed = {StatusCode::kNoSpace, "background subtraction: OpenCV failed"};
 
 } // namespace
@@ -70,7 +78,7 @@ Segmenter::find_sides (const SegmentationSettings &settings)
   cv::bitwise_or (seen_, blank_, inside_);
   cv::bitwise_or (inside_, other_, inside_);
   cv::bitwise_not (inside_, inside_);
-  cv::medianBlur (inside_, inverse_, 5);
+  find_majority (inside_, inverse_, 5);
   sides_.setTo (int (Side::kBackground), inverse_);
   sides_.setTo (int (Side::kForeground), near_);
   const int reach = std::clamp (int (kSight * sides_.cols), 16, 255);
@@ -84,7 +92,7 @@ Segmenter::find_sides (const SegmentationSettings &settings)
   cv::bitwise_not (opened_, inverse_);
   cv::bitwise_and (inverse_, calm_, inverse_);
   cv::compare (inverse_, 0, inverse_, cv::CMP_GT);
-  cv::medianBlur (inverse_, opened_, 5);
+  find_majority (inverse_, opened_, 5);
   cv::bitwise_or (inverse_, opened_, inverse_);
   surrounded_.copyTo (inside_);
   inside_.setTo (0, inverse_);
@@ -161,7 +169,7 @@ Segmenter::find_same (int reach)
   compare_with_mean (opened_, reach, 1, inverse_);
   cv::bitwise_and (same_, inverse_, same_);
   cv::compare (counts_, 0, inverse_, cv::CMP_EQ);
-  cv::medianBlur (same_, opened_, 3); /* single pixels may match by chance */
+  find_majority (same_, opened_, 3); /* single pixels may match by chance */
   cv::bitwise_and (opened_, nearer_, same_);
 }
 
@@ -288,7 +296,7 @@ Segmenter::extend_depth (const RangeImage &image, const SegmentationSettings &se
 {
   if (settings.fill <= 0)
     return;
-  cv::medianBlur (mask_, opened_, 3);
+  find_majority (mask_, opened_, 3);
   cv::bitwise_and (opened_, mask_, opened_);
   if (settings.cue != Cue::kDepth)
     opened_.setTo (0, calm_);
