@@ -6,7 +6,6 @@
 #include "camera/aravis/camera.hpp"
 #include <span>
 #include <string>
-#include <vector>
 
 /** The format of all cameras of stereocamsrc. */
 struct SourceFormat {

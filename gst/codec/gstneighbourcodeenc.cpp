@@ -30,7 +30,6 @@
 
 #include <gst/base/base.h>
 
-#include <algorithm>
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>

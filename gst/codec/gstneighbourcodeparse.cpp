@@ -20,7 +20,6 @@
 
 #include <gst/base/base.h>
 
-#include <algorithm>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
@@ -28,7 +27,6 @@
 #include <rangecast/neighbourcode/bitstream/key_check.hpp>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include "common/accessunitwriter.hpp"
 #include "common/capsadvice.hpp"

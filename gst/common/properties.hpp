@@ -4,7 +4,6 @@
 #include <gst/gst.h>
 
 #include <concepts>
-#include <cstdint>
 #include <functional>
 #include <initializer_list>
 #include <string>

@@ -38,8 +38,6 @@
 #include <rangecast/geometry/point_cloud.hpp>
 #include <rangecast/geometry/size_text.hpp>
 #include <rangecast/registration/registration.hpp>
-#include <string>
-#include <utility>
 #include <vector>
 
 using rangecast::RangeImage;

@@ -21,7 +21,6 @@
 
 #include <gst/base/gstflowcombiner.h>
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <gstrange/gstrangeinfo.hpp>
@@ -30,7 +29,6 @@
 #include <rangecast/neighbourcode/bitstream/key_check.hpp>
 #include <rangecast/neighbourcode/bitstream/unit.hpp>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "common/accessunitwriter.hpp"

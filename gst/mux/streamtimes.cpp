@@ -2,7 +2,6 @@
 #include "streamtimes.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
 

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "glhelpers.hpp"
 
-#include <utility>
-
 void
 define_texture (const GstGLFuncs *gl, guint internal, int width, int height, guint format,
     guint type, const void *data)

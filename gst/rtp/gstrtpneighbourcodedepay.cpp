@@ -21,7 +21,6 @@
 
 #include <gst/rtp/rtp.h>
 
-#include <algorithm>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """calibrate: images of a chessboard or ChArUco board, from files or live, to a rig file."""
 
-import contextlib
 import os
 import queue
 import re
@@ -184,11 +183,10 @@ def lines_of(child):
     for output in (child.stdout, child.stderr):
         threading.Thread(target=read, args=(output,), daemon=True).start()
     while ended < 2:
-        with contextlib.suppress(queue.Empty):
-            line = lines.get(timeout=0.5)  # Python handles a signal that another thread received when this one wakes
-            if line is not None:
-                yield line
-            ended += line is None
+        line = lines.get()
+        if line is not None:
+            yield line
+        ended += line is None
 
 
 def run_calibrate(args, launch):

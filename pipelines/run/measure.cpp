@@ -4,7 +4,6 @@
 #include <gstrange/gstrange.h>
 
 #include <algorithm>
-#include <utility>
 
 namespace {
 

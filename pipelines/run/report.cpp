@@ -4,10 +4,6 @@
 #include <gst/video/video.h>
 #include <sys/resource.h>
 
-#include <fstream>
-#include <string>
-#include <vector>
-
 namespace {
 
 double

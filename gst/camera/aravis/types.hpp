@@ -7,7 +7,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 inline constexpr int kMaxCameras = 3; ///< left, right, third
 

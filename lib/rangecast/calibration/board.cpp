@@ -2,7 +2,6 @@
 #include "board.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>

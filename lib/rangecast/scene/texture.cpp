@@ -4,7 +4,6 @@
 #ifdef RANGECAST_HAVE_MODELS
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>

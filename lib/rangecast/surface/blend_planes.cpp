@@ -2,7 +2,6 @@
 #include "blend_planes.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdlib>
 

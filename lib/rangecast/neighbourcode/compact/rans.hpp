@@ -4,7 +4,6 @@
  */
 #pragma once
 
-#include <cmath>
 #include <numbers>
 
 #include "symbol_model.hpp"

@@ -2,11 +2,8 @@
 /* Adaptive frequencies of symbols. docs/formats/bitstream.md says how they change. */
 #pragma once
 
-#include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 
 namespace rangecast {
 
