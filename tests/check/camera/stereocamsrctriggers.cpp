@@ -112,7 +112,8 @@ GST_START_TEST (test_action_commands_trigger_all_cameras_of_an_element_on_ticks)
       }
     const auto left = p->seen (0);
     const auto ticks = guint64 ((left.back ().capture - left.front ().capture) / kPeriod);
-    fail_unless (ticks >= guint64 (left.back ().mark.number - left.front ().mark.number),
+    /* Twice as many if it did; a late image at either end is one of the next tick. */
+    fail_unless (ticks + 2 >= guint64 (left.back ().mark.number - left.front ().mark.number),
         "more images than ticks: another element's commands trigger the camera, too");
   }
 }
