@@ -126,7 +126,7 @@ test_interrupt_ends_the_stream_and_calibrates_and_terminate_leaves_nothing () {
     kill -$signal "$calibration"
     ! wait "$calibration" || fail "status 0: $(cat said.txt)"
     gone () { ! kill -0 "$child" 2>/dev/null; }
-    until_true 20 gone
+    until_true 60 gone
     [ $signal = TERM ] || grep -q "no board was found" said.txt || fail "$(cat said.txt)"
   done
 }

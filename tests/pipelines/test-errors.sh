@@ -133,7 +133,7 @@ test_programs_end_at_signals_and_time_limits_whatever_an_element_blocks () {
       # shellcheck disable=SC2086
       rangecast-run $blocked >said.txt 2>&1 &
       pid=$! status=0
-      until_true 20 takes_interrupt $pid
+      until_true 60 takes_interrupt $pid
       kill -$signal $pid
       timeout 30 tail --pid=$pid -f /dev/null || fail "still runs: $blocked"
       wait $pid || status=$?
@@ -173,7 +173,7 @@ test_silent_udp_sources_are_named () {
 test_a_signal_finishes_files () {
   rangecast-run videotestsrc is-live=true ! tee name=t ! queue ! jpegenc ! qtmux ! filesink location=film.mov \
     t. ! queue max-size-buffers=1 leaky=downstream ! identity sleep-time=300000 ! fakesink sync=false &
-  until_true 20 test -s film.mov
+  until_true 60 test -s film.mov
   kill -INT $!
   wait $!
   gst-discoverer-1.0 film.mov >found.txt 2>&1 || true

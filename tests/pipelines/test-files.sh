@@ -232,7 +232,7 @@ test_examples_of_launch_strings_run () {
   sh record.sh >record.log 2>&1 &
   local recorder=$!
   recorded () { [ -e person.rcnc ] && [ "$(stat -c %s person.rcnc)" -gt 20000 ]; }
-  until_true 30 recorded
+  until_true 60 recorded
   kill -TERM $recorder
   wait $recorder || true
   sh play.sh >play.log 2>&1 && grep -q 'Got EOS' play.log || fail "$(tail -n 5 play.log)"

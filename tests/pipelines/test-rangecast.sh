@@ -153,7 +153,7 @@ test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
 test_ports_in_use_are_named () {
   python3 -c 'import socket, time
 s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", 20200)); print("bound", flush=True); time.sleep(100)' >blocker.txt &
-  until_true 20 grep -q bound blocker.txt
+  until_true 60 grep -q bound blocker.txt
   make_rig
   refuses "--listen: UDP port 20200: Address already in use" view --listen 20200
   refuses "--listen: UDP port 20200: Address already in use" parent --views 2 --listen 20199 --to 127.0.0.1:20201

@@ -166,7 +166,7 @@ test_speech_from_a_file_is_sent_at_its_own_pace () {
   rangecast camera --view 0 --rig rig.yaml --input range --size 160x120 --learn 5 --to "127.0.0.1:$((ports + 60))" \
     --microphone 'filesrc location="my speech.wav" ! decodebin' --audio-to "127.0.0.1:$((ports + 80))" >camera.log 2>&1 &
   camera=$!
-  timeout 20 gst-launch-1.0 -q udpsrc port=$((ports + 80)) num-buffers=100 ! filesink location=packets.bin || fail "$(tail -n 5 camera.log)"
+  timeout 60 gst-launch-1.0 -q udpsrc port=$((ports + 80)) num-buffers=100 ! filesink location=packets.bin || fail "$(tail -n 5 camera.log)"
   kill -0 "$camera" || fail "100 packets of 20 ms came, and the file has ended"
   stop_all "$camera"
 }
@@ -287,15 +287,15 @@ test_call_has_picture_and_sound_both_ways () {
   until_true 90 has_claps_of anna $((before + 3))
   # Muted: the picture goes on, no clap is heard.
   echo m >&"$anna_keys"
-  until_true 10 grep -q "microphone is muted" anna.log
+  until_true 60 grep -q "microphone is muted" anna.log
   sleep 1
   before=$(claps_of otto)
   sleep 3
   [ "$(claps_of otto)" = "$before" ] || fail "heard while muted"
   echo m >&"$anna_keys"
-  until_true 30 has_claps_of otto $((before + 2))
+  until_true 60 has_claps_of otto $((before + 2))
   echo q >&"$anna_keys"
-  until_true 20 has_ended "${ends[anna]}"
+  until_true 60 has_ended "${ends[anna]}"
   wait "${ends[otto]}" || fail "the end of the call is an error: $(cat otto.log)"
   for name in anna otto; do
     claps "$name/seen.log" | tail -n +2 >claps.txt
