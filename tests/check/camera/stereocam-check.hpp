@@ -347,7 +347,9 @@ private:
 };
 
 /** PTS of all pads grow, and pictures with one PTS were taken together and say so. A pad that was
- *  held up may lack some that another has; they are counted as its overrun.
+ *  held up may lack some that another has; they are counted as its overrun. On a busy machine a
+ *  camera may take one late: then its number is that of its partner, as far as those of most pairs
+ *  are.
  *  @param apart  ns; how far moments of one pair may lie apart */
 inline void
 expect_pairs (CameraPipeline &p, int cameras, std::int64_t apart)
@@ -359,6 +361,8 @@ expect_pairs (CameraPipeline &p, int cameras, std::int64_t apart)
     for (const SeenPicture &picture : p.seen (side))
       others[picture.pts] = picture;
     std::size_t met = 0;
+    std::map<std::int32_t, std::size_t> together; /* by difference of the numbers */
+    std::vector<std::int32_t> late;
     for (const SeenPicture &picture : left) {
       const auto found = others.find (picture.pts);
       if (found == others.end ())
@@ -367,11 +371,17 @@ expect_pairs (CameraPipeline &p, int cameras, std::int64_t apart)
       met++;
       fail_unless_equals_uint64 (other.capture, picture.capture);
       fail_unless_equals_int (other.mark.camera, side);
-      fail_unless (std::llabs (other.mark.taken_ns - picture.mark.taken_ns) < slowdown () * apart,
-          "PTS %" GST_TIME_FORMAT ": %s was taken %" G_GINT64_FORMAT " us after left",
-          GST_TIME_ARGS (picture.pts), kSides[side],
-          (other.mark.taken_ns - picture.mark.taken_ns) / 1000);
+      const std::int32_t numbers = other.mark.number - picture.mark.number;
+      if (std::llabs (other.mark.taken_ns - picture.mark.taken_ns) < slowdown () * apart)
+        together[numbers]++;
+      else
+        late.push_back (numbers);
     }
+    fail_unless (10 * late.size () <= met, "%d of %d pictures of %s were not taken with left's",
+        int (late.size ()), int (met), kSides[side]);
+    for (const std::int32_t numbers : late)
+      fail_unless (
+          together[numbers] > 0, "%s was taken with another one than left's", kSides[side]);
     const guint64 lacking = p.stat ((std::string ("overrun-") + kSides[side]).c_str ());
     fail_unless (met + lacking >= left.size (), "%d of %d left pictures have a partner", int (met),
         int (left.size ()));
