@@ -209,8 +209,8 @@ test_stalled_viewer_delays_nobody () {
   stalled=$!
   trap 'kill -KILL $server $stalled 2>/dev/null || true' EXIT
   until_true 60 grep -q playing stalled.txt
-  count "$url" --frame-sets 150 >udp.txt || fail "$(cat udp.txt)"
-  count "$url" --tcp --frame-sets 75 >tcp.txt || fail "$(cat tcp.txt)"
+  count "$url" --frame-sets 150 >udp.txt || fail "UDP: $(cat udp.txt server.log)"
+  count "$url" --tcp --frame-sets 75 >tcp.txt || fail "TCP: $(cat tcp.txt server.log)"
   kill "$stalled"
   stop_server
 }

@@ -47,7 +47,7 @@ const picture = async (page) => {
   for (let i = 0; i < 50; i++) {
     const now = await page.evaluate (() => new Promise ((resolve) => requestAnimationFrame (() => requestAnimationFrame (() => {
       const canvas = document.getElementById ('picture');
-      resolve (canvas.width === canvas.clientWidth ? canvas.toDataURL ('image/png') : '');
+      resolve (canvas.width === canvas.clientWidth && document.body.dataset.frameSets > 0 ? canvas.toDataURL ('image/png') : '');
     }))));
     if (now !== '' && now === last)
       return now;
