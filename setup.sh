@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Installs what the project needs (Debian 12 packages), configures and builds build/.
+# Installs what the project needs (packages of Debian 12 or 13), configures and builds build/.
 # Quick when nothing changed. What the compiler prints goes to build/setup.log.
 # usage: setup.sh [--demo | --web | --cameras | --tests]
 #   --demo     what demo.sh, the viewer and README's launch lines need

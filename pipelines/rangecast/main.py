@@ -64,7 +64,11 @@ def main():
 
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # leaves nothing behind that it started
     try:
-        args = parser.parse_args()
+        args, rest = parser.parse_known_args()
+        if args.command == "convert" and not any(word.startswith("-") for word in rest):
+            args.files += rest  # after options
+        elif rest:
+            parser.parse_args()  # says which
         if not args.command:
             parser.error(f"which command? {', '.join(COMMANDS)}; --help says what they do")
         set_up_environment()

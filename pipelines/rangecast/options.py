@@ -152,10 +152,13 @@ def output_file(text):
     return text
 
 
-def webm_file(text):
-    if Path(text).suffix != ".webm":
-        raise Wrong(f"'{text}': use a name that ends in .webm")
-    return output_file(text)
+def file_of_type(suffix):
+    def check(text):
+        if Path(text).suffix != suffix:
+            raise Wrong(f"'{text}': use a name that ends in {suffix}")
+        return output_file(text)
+
+    return check
 
 
 def key_file(text):
@@ -219,7 +222,7 @@ SHARED = {
     "--audio-port": dict(type=even_port, metavar="PORT", help="receive audio at this UDP port; RTCP at PORT + 1"),
     "--clock": dict(type=lambda text: text if text == "system" else endpoint(text), metavar="CLOCK", default="system",
                     help="HOST:PORT where 'rangecast parent --clock-port' publishes the camera hosts' clock (default: this machine's)"),
-    "--video": dict(type=webm_file, metavar="WEBM", help="write a video, with the audio if there is any"),
+    "--video": dict(type=file_of_type(".webm"), metavar="WEBM", help="write a video, with the audio if there is any"),
     "--out": dict(type=output_file, metavar="FILE", required=True, help="rig file to write: .yaml or .json"),
 }  # fmt: skip
 

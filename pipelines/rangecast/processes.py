@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Several hosts as processes of one: demo and call."""
 
+import ctypes
 import os
 import signal
 import subprocess
@@ -9,6 +10,10 @@ import time
 
 PATIENCE_S = 1.9  # for a process to end, and a video to be written to its end: rangecast-run takes 1.8 at most
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+
+
+def end_with_parent(prctl=ctypes.CDLL(None).prctl):
+    prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG: also if that one is killed
 
 
 class Processes:
@@ -52,7 +57,7 @@ class Processes:
     def spawn(self, name, popen, *command, **options):
         """In a group of its own: Ctrl-C reaches it once, from here."""
         self.held = True
-        self.running[name] = popen(*command, stdin=subprocess.DEVNULL, start_new_session=True, **options)
+        self.running[name] = popen(*command, stdin=subprocess.DEVNULL, start_new_session=True, preexec_fn=end_with_parent, **options)
         self.held = False
         if self.pending:
             self.handle(self.pending, None)

@@ -25,7 +25,7 @@ def add_webcam(parser):
     parser.add_argument("--calibrate", type=options.words, metavar="OPTIONS", default=[], help="options of that, e.g. '--square 0.03'")
     options.add(parser, "--learn", default=0)
     options.add(parser, "--settle", "--depth")
-    parser.add_argument("--png", type=options.output_file, metavar="FILE",
+    parser.add_argument("--png", type=options.file_of_type(".png"), metavar="FILE",
                         help="write one frame instead of opening a window: the first one, or with --learn the 30th with somebody in it")  # fmt: skip
     parser.set_defaults(build=build_webcam)
 

@@ -327,7 +327,7 @@ Call::make (const char *url, const char *certificate)
   const std::string scheme = uri ? g_uri_get_scheme (uri) : "";
   const char *host = uri ? g_uri_get_host (uri) : nullptr;
   if ((scheme != "http" && scheme != "https") || !host || !*host) {
-    g_printerr ("rangecast-run: --signal: '%s' is not https://HOST:PORT/#token=TOKEN\n", url);
+    g_printerr ("rangecast-run: --signal: '%s' is not http[s]://HOST:PORT/#token=TOKEN\n", url);
     return nullptr;
   }
   const char *fragment = g_uri_get_fragment (uri);

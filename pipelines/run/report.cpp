@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "report.hpp"
 
+#include <cstdio>
 #include <gst/video/video.h>
 #include <sys/resource.h>
 

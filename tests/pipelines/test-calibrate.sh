@@ -92,6 +92,7 @@ test_webcam_learns_the_background_before_it_writes_a_picture () {
 test_webcam_says_what_is_wrong () {
   simulate_webcam
   expect_error "no display" env -u DISPLAY -u WAYLAND_DISPLAY rangecast webcam --rig rig.yaml --source videotestsrc
+  expect_error "ends in .png" rangecast webcam --rig rig.yaml --source videotestsrc --png view.bmp
   expect_error "no camera '/dev/nothing'" rangecast webcam --device /dev/nothing --png view.png
 }
 

@@ -101,3 +101,10 @@ test_interrupted_demo_ends_all_hosts () {
   [ "$status" = 130 ] || [ "$status" = 143 ] || fail "status $status after signals"
   ! pgrep -f "rangecast-run .*$PWD/demo" || fail "hosts are left"
 }
+
+test_hosts_end_with_a_demo_that_is_killed () {
+  rangecast demo --no-video --views 2 --frames 1000 --size 160x120 --out demo >demo.txt 2>&1 &
+  until_true 60 grep -q 'frame set ' demo.txt
+  kill -KILL $!
+  until_true 60 eval '! pgrep -f -- "--report $PWD/demo/log"'
+}

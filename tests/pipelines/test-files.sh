@@ -25,7 +25,7 @@ test_recording_becomes_points_film_and_numbers () {
   rangecast convert recording.rcnc cloud-%05d.ply
   [ "$(find . -name 'cloud-*.ply' | wc -l)" = 8 ] || fail "not 8 PLY files: $(ls)"
   [ "$(ply_vertices cloud-00005.ply)" -gt 3000 ] || fail "few points: $(ply_vertices cloud-00005.ply)"
-  rangecast convert recording.rcnc one.ply # the first
+  rangecast convert recording.rcnc --output-size 160x120 one.ply # the first; options may stand anywhere
   cmp one.ply cloud-00000.ply
   expect_error "recording.rcnc' is what is converted" rangecast convert recording.rcnc ./recording.rcnc
   expect_error "needs a name that ends in .ply" rangecast convert recording.rcnc one.png

@@ -208,7 +208,7 @@ test_wrong_options_are_named () {
   expect_error "--rig: needed" rangecast call
   local link
   for link in nonsense http:///x file:///x; do
-    expect_error "'$link' is not https://HOST:PORT" rangecast-run --signal "$link" fakesrc num-buffers=1 ! fakesink
+    expect_error "'$link' is not http[s]://HOST:PORT" rangecast-run --signal "$link" fakesrc num-buffers=1 ! fakesink
   done
   expect_error "Cannot connect to the call's server http://127.0.0.1:7001" rangecast call --signal http://127.0.0.1:7001 --input range \
     --no-window --microphone none --speaker fakesink

@@ -2,6 +2,7 @@
 /* The 13 stereo pairs of OpenCV's documentation: a chessboard of 9x6 inner corners, 25 mm. */
 #include "../test-support.hpp"
 
+#include <cstdio>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <rangecast/calibration/rig_calibration.hpp>

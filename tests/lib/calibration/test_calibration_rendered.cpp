@@ -3,6 +3,7 @@
 #include "../board-renderer.hpp"
 #include "../test-support.hpp"
 
+#include <cstdio>
 #include <rangecast/calibration/rig_calibration.hpp>
 
 using namespace rangecast;
