@@ -139,8 +139,9 @@ launch_media_handle_message (GstRTSPMedia *media, GstMessage *message)
   return GST_RTSP_MEDIA_CLASS (launch_media_parent_class)->handle_message (media, message);
 }
 
-/* Version 1.22 stops a stream for everybody while all of its TCP viewers are slow. This one is
- * always ready. */
+/* Version 1.22 stops a stream for everybody while all of its TCP viewers are slow, and forgets RTP
+ * that waits together with RTCP until some transport has sent a message. This one is always ready,
+ * and always has. */
 static GstRTSPStreamTransport *
 make_discarding_transport (GstRTSPStream *stream)
 {
@@ -151,9 +152,12 @@ make_discarding_transport (GstRTSPStream *stream)
   tcp->lower_transport = GST_RTSP_LOWER_TRANS_TCP;
   tcp->destination = g_strdup ("nobody"); /* which the library compares with senders of RTCP */
   GstRTSPStreamTransport *transport = gst_rtsp_stream_transport_new (stream, tcp);
-  const auto discard = [] (auto *, guint8, gpointer) -> gboolean { return TRUE; };
-  gst_rtsp_stream_transport_set_callbacks (transport, discard, discard, nullptr, nullptr);
-  gst_rtsp_stream_transport_set_list_callbacks (transport, discard, discard, nullptr, nullptr);
+  const auto discard = [] (auto *, guint8, gpointer self) -> gboolean {
+    gst_rtsp_stream_transport_message_sent (GST_RTSP_STREAM_TRANSPORT (self));
+    return TRUE;
+  };
+  gst_rtsp_stream_transport_set_callbacks (transport, discard, discard, transport, nullptr);
+  gst_rtsp_stream_transport_set_list_callbacks (transport, discard, discard, transport, nullptr);
   return transport;
 }
 
