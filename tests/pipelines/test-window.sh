@@ -11,7 +11,7 @@ need_display () {
 }
 
 # From a number of its own on: of two that look for a free display at the same time, both take it.
-on_display () { xvfb-run -n $((100 + BASHPID % 20000)) -a -s "-screen 0 640x480x24" env -u GST_GL_PLATFORM -u GST_GL_WINDOW "$@"; }
+on_display () { xvfb-run -n $((100 + BASHPID % 20000)) -a -s "-screen 0 640x480x24 -noreset" env -u GST_GL_PLATFORM -u GST_GL_WINDOW "$@"; }
 
 look () { gst-launch-1.0 -q ximagesrc num-buffers=1 show-pointer=false ! videoconvert ! pngenc ! filesink "location=$1"; }
 
