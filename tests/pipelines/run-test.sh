@@ -43,18 +43,18 @@ expect_file () { # path bytes
   [ "$(stat -c %s "$1")" -ge "$2" ] || fail "$1: $(stat -c %s "$1") bytes, expected at least $2"
 }
 
-# Until the command succeeds.
-until_true () { # seconds command...
+# Until the command succeeds, for a minute or $seconds.
+until_true () { # command...
   local i
-  for ((i = 0; i < $1 * 5; i++)); do
-    ! "${@:2}" || return 0
+  for ((i = 0; i < ${seconds:-60} * 5; i++)); do
+    ! "$@" || return 0
     sleep 0.2
   done
-  fail "not within $1 s: ${*:2}; $(tail -n 5 ./*.log ./*.txt 2>/dev/null)"
+  fail "not within ${seconds:-60} s: $*; $(tail -n 5 ./*.log ./*.txt 2>/dev/null)"
 }
 wait_for () { # file regular-expression seconds
   holds () { grep -qE "$2" "$1" 2>/dev/null; }
-  until_true "$3" holds "$1" "$2"
+  seconds=$3 until_true holds "$1" "$2"
 }
 # The process is the program that a script becomes, and has a handler for Ctrl-C. Until then it misses one: bash starts what is in the
 # background without.

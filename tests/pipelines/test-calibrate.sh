@@ -66,7 +66,7 @@ test_webcam_calibrates_first_and_packed_pictures_give_the_rig_of_separate_ones (
   rangecast webcam --rig new.yaml --source "$live" --calibrate "--near 0.2" --png view.png >live.txt &
   local webcam=$!
   seen () { grep -qsE '^sink_1 .*: ([89]|1[0-9]) frames' live.txt; }
-  until_true 90 seen
+  seconds=90 until_true seen
   pkill -INT -P "$webcam" || true # unless it had seen enough
   wait $webcam || fail "$(tail -n 5 live.txt)"
   expect_file new.yaml 500
@@ -123,11 +123,11 @@ test_interrupt_ends_the_stream_and_calibrates_and_terminate_leaves_nothing () {
     setsid rangecast calibrate --left 'videotestsrc is-live=true' --out rig.yaml >said.txt 2>&1 &
     calibration=$!
     runs () { child=$(pgrep -P "$calibration" gst-launch) && takes_interrupt "$child"; }
-    until_true 60 runs
+    until_true runs
     kill -$signal "$calibration"
     ! wait "$calibration" || fail "status 0: $(cat said.txt)"
     gone () { ! kill -0 "$child" 2>/dev/null; }
-    until_true 60 gone
+    until_true gone
     [ $signal = TERM ] || grep -q "no board was found" said.txt || fail "$(cat said.txt)"
   done
 }

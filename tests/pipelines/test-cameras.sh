@@ -226,7 +226,7 @@ watch_machines () { # images
   for view in 0 1 2; do
     enough () { [ "$(grep -c left "shots$view.log")" -ge "$images" ]; }
     images=$1
-    until_true 120 enough
+    seconds=120 until_true enough
   done
   remove_machines
   spread shots?.log | tee spread.txt

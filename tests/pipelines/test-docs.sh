@@ -42,7 +42,7 @@ test_recipes_of_coded_streams_run () {
   while read -r sender && read -r receiver; do
     timeout 60 bash -c "exec $sender" >sender.log 2>&1 &
     sending=$!
-    until_true 60 timeout 20 bash -c "$receiver" >receiver.log 2>&1 || fail "$sender: $(tail -n 3 sender.log); $receiver: $(tail -n 3 receiver.log)"
+    until_true timeout 20 bash -c "$receiver" >receiver.log 2>&1 || fail "$sender: $(tail -n 3 sender.log); $receiver: $(tail -n 3 receiver.log)"
     grep -q 'Got EOS' receiver.log || fail "$(cat receiver.log)"
     kill $sending
     wait $sending || true

@@ -133,7 +133,7 @@ test_programs_end_at_signals_and_time_limits_whatever_an_element_blocks () {
       # shellcheck disable=SC2086
       rangecast-run $blocked >said.txt 2>&1 &
       pid=$! status=0
-      until_true 60 takes_interrupt $pid
+      until_true takes_interrupt $pid
       kill -$signal $pid
       timeout 30 tail --pid=$pid -f /dev/null || fail "still runs: $blocked"
       wait $pid || status=$?
@@ -148,7 +148,7 @@ test_programs_end_at_signals_and_time_limits_whatever_an_element_blocks () {
     children=$(pgrep -P $pid) && [ "$(wc -w <<<"$children")" = 4 ] || return 1
     for child in $children; do takes_interrupt "$child" || return 1; done
   }
-  until_true 60 all_take_interrupt
+  until_true all_take_interrupt
   kill -TERM $pid
   timeout 30 tail --pid=$pid -f /dev/null || fail "rangecast call still runs"
 }
@@ -173,7 +173,7 @@ test_silent_udp_sources_are_named () {
 test_a_signal_finishes_files () {
   rangecast-run videotestsrc is-live=true ! tee name=t ! queue ! jpegenc ! qtmux ! filesink location=film.mov \
     t. ! queue max-size-buffers=1 leaky=downstream ! identity sleep-time=300000 ! fakesink sync=false &
-  until_true 60 test -s film.mov
+  until_true test -s film.mov
   kill -INT $!
   wait $!
   gst-discoverer-1.0 film.mov >found.txt 2>&1 || true

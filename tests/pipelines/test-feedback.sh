@@ -23,7 +23,7 @@ test_a_loss_brings_a_key_frame_set_over_rtcp () {
     r.send_rtcp_src_0 ! udpsink host=127.0.0.1 port=$((port + 1)) sync=false async=false \
     udpsrc port=$((port + 2)) ! r.recv_rtcp_sink_0 >camera.log 2>&1 &
   sender=$!
-  until_true 50 was_asked
+  until_true was_asked
   kill -TERM "$viewer" "$sender"
   wait "$viewer" "$sender" 2>/dev/null || true
   grep -q 'requesting a key frame set' viewer.log || fail "nothing was lost: $(tail -n 5 viewer.log)"

@@ -161,7 +161,7 @@ open("colour.raw", "wb").write(b"".join(bytes([20 * i]) * 3 * 768 for i in range
     openni2src location=planes.oni sourcetype=color ! queue ! c.colour \
     rangecombine name=c do-timestamp=true focal-length=30 ! plyenc ! multifilesink max-files=0 location=%d.ply & # plays for ever
   local player=$!
-  until_true 50 test -e 7.ply
+  until_true test -e 7.ply
   kill -INT $player
   wait $player || true
   python3 - <<'EOF' || fail "wrong pairs"
@@ -232,7 +232,7 @@ test_examples_of_launch_strings_run () {
   sh record.sh >record.log 2>&1 &
   local recorder=$!
   recorded () { [ -e person.rcnc ] && [ "$(stat -c %s person.rcnc)" -gt 20000 ]; }
-  until_true 60 recorded
+  until_true recorded
   kill -TERM $recorder
   wait $recorder || true
   sh play.sh >play.log 2>&1 && grep -q 'Got EOS' play.log || fail "$(tail -n 5 play.log)"

@@ -187,7 +187,7 @@ interrupt () {
   set -m # else bash starts it with SIGINT ignored
   $python -u "${@:2}" >interrupted.txt 2>&1 &
   set +m
-  until_true 60 test -s "$1"
+  until_true test -s "$1"
   kill -INT $!
   local status=0
   wait $! || status=$?

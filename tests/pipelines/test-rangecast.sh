@@ -153,7 +153,7 @@ test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {
 test_ports_in_use_are_named () {
   python3 -c 'import socket, time
 s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", 20200)); print("bound", flush=True); time.sleep(100)' >blocker.txt &
-  until_true 60 grep -q bound blocker.txt
+  until_true grep -q bound blocker.txt
   make_rig
   refuses "--listen: UDP port 20200: Address already in use" view --listen 20200
   refuses "--listen: UDP port 20200: Address already in use" parent --views 2 --listen 20199 --to 127.0.0.1:20201
@@ -172,7 +172,7 @@ test_addresses_are_names_or_of_either_ip_version () {
     rangecast record "got$n.rcnc" --listen 20600 >record.log 2>&1 &
     local recording=$!
     rangecast camera --view 0 --rig rig.yaml --input range --learn 2 --to "$to" >camera.log 2>&1 &
-    until_true 60 test -s "got$n.rcnc"
+    until_true test -s "got$n.rcnc"
     kill -INT $recording
     wait $recording
     kill $!
@@ -188,7 +188,7 @@ test_recordings_are_kept () {
   cp good.rcnc before.rcnc
   refuses "'good.mp4': use a name that ends in .webm" play good.rcnc --video good.mp4
   rangecast record good.rcnc --listen 20300 >record.log 2>&1 &
-  until_true 60 takes_interrupt $!
+  until_true takes_interrupt $!
   refuses "'good.rcnc' is being recorded by another program" record good.rcnc --listen 20301
   kill -INT $!
   ! wait $! || fail "nothing came, but no error"
@@ -224,8 +224,8 @@ test_bash_completes_commands_and_options () {
 test_a_film_of_a_stream_that_did_not_come_is_not_left () {
   need_gl
   rangecast view --listen 20400 --video film.webm --output-size 160x120 >viewer.log 2>&1 &
-  until_true 60 takes_interrupt $!
-  until_true 60 test -e film.webm
+  until_true takes_interrupt $!
+  until_true test -e film.webm
   kill -INT $!
   ! wait $! || fail "nothing came, but no error"
   [ ! -e film.webm ] || fail "an empty film is left"

@@ -94,7 +94,7 @@ test_camera_host_with_feedback_follows_the_link () {
     --to "127.0.0.1:$((ports + 50))" --feedback-port $((ports + 52)) --encoder "profile=entropy adaptive-bitrate=true" --print | sed 's/^gst-launch-1.0 -e/& -m/' >camera.sh
   GST_DEBUG=neighbourcodeenc:5 GST_DEBUG_NO_COLOR=1 timeout -k 5 80 bash camera.sh >camera.log 2>&1 &
   adapted () { grep -qE 'colour-threshold [1-9][0-9]' camera.log && [ -e out.rcnc ] && [ "$(stat -c %s out.rcnc)" -ge 20000 ]; }
-  until_true 60 adapted
+  until_true adapted
   jobs -p | xargs -r kill 2>/dev/null || true
   wait
 }

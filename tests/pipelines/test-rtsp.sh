@@ -16,7 +16,7 @@ serve () {
   rtsp-server --address 127.0.0.1 --port 0 "$@" >server.log 2>&1 &
   server=$!
   trap 'kill -KILL $server 2>/dev/null || true' EXIT
-  until_true 60 grep -q '^serving' server.log
+  until_true grep -q '^serving' server.log
   url=$(sed -n 's/^serving //p' server.log)
 }
 stop_server () {
@@ -81,10 +81,10 @@ test_twenty_viewers_over_udp_and_tcp_share_one_run () {
   serve -- "$figure"
   count "$url" --viewers 10 --frame-sets 60 >udp.txt &
   first=$!
-  until_true 60 grep -q playing udp.txt
+  until_true grep -q playing udp.txt
   count "$url" --viewers 10 --frame-sets 40 --tcp >tcp.txt &
   second=$!
-  until_true 60 grep -q playing tcp.txt
+  until_true grep -q playing tcp.txt
   [ "$(cat "/proc/$server"/task/*/comm | grep -c '^rtpsession-rtcp')" = 1 ] || fail "$(cat "/proc/$server"/task/*/comm)"
   wait "$first" || fail "$(cat udp.txt)"
   wait "$second" || fail "$(cat tcp.txt)"
@@ -100,7 +100,7 @@ test_joiner_gets_a_key_frame_set_at_once () {
   watch "$url" --frame-sets 100000 >first.txt 2>&1 &
   first=$!
   trap 'kill -KILL $server $first 2>/dev/null || true' EXIT
-  until_true 60 grep -q playing first.txt
+  until_true grep -q playing first.txt
   for protocol in udp tcp; do
     until_eos joiner.log -v rtspsrc "location=$url" protocols=$protocol latency=50 ! rtpneighbourcodedepay \
       ! identity silent=false eos-after=30 ! fakesink sync=false || fail "$(tail -n 5 joiner.log)"
@@ -120,7 +120,7 @@ test_loss_at_a_viewer_brings_key_frame_sets () {
   trap 'kill -KILL $server $player 2>/dev/null || true' EXIT
   # Two at most are the first one and the server's own.
   four_keys () { [ "$(grep -E 'last-message = (chain|drop)' player.log | grep -vc delta-unit)" -ge 4 ]; }
-  until_true 60 four_keys
+  until_true four_keys
   kill "$player"
   stop_server
 }
@@ -194,7 +194,7 @@ test_multicast_reaches_two_hosts () {
   for host in parent near far; do net_host "$host"; done
   net_on parent rtsp-server --port 8554 --multicast 239.7.7.7:5000-5001 -- "$figure" >server.log 2>&1 &
   server=$!
-  until_true 60 grep -q '^serving' server.log
+  until_true grep -q '^serving' server.log
   watch_by_multicast near &
   near=$!
   watch_by_multicast far || fail "$(tail -n 5 far.log)"
@@ -208,7 +208,7 @@ test_stalled_viewer_delays_nobody () {
   watch "$url" --tcp --stall 100 >stalled.txt 2>&1 &
   stalled=$!
   trap 'kill -KILL $server $stalled 2>/dev/null || true' EXIT
-  until_true 60 grep -q playing stalled.txt
+  until_true grep -q playing stalled.txt
   count "$url" --frame-sets 150 >udp.txt || fail "UDP: $(cat udp.txt server.log)"
   count "$url" --tcp --frame-sets 75 >tcp.txt || fail "TCP: $(cat tcp.txt server.log)"
   kill "$stalled"
@@ -219,7 +219,7 @@ test_viewers_beyond_the_limit_are_refused () {
   serve --max-viewers 2 -- "$figure"
   count "$url" --viewers 2 >two.txt # with TEARDOWN
   expect_error 503 python3 "$viewers" "$url" --viewers 3
-  until_true 60 count "$url" >one.txt 2>&1 # those two are gone without TEARDOWN
+  until_true count "$url" >one.txt 2>&1 # those two are gone without TEARDOWN
   stop_server
 }
 

@@ -59,12 +59,12 @@ test_audio_is_in_sync_with_loss_and_encryption_and_after_a_restart () {
   start_viewer $((p + 5)) --key studio.key
   start_parent "$p" --key studio.key
   start_sender "$p" --key studio.key
-  until_true 60 has_claps 6
+  until_true has_claps 6
   kill -KILL "$camera"
   wait "$camera" 2>/dev/null || true
   before=$(claps seen.log | wc -l)
   start_sender "$p" --key studio.key
-  until_true 60 has_claps $((before + 4))
+  until_true has_claps $((before + 4))
   stop_all "$camera" "$parent" "$viewer" "$relay"
   claps seen.log >all.txt
   sed -n "2,${before}p" all.txt >claps.txt
@@ -90,7 +90,7 @@ test_recording_has_speech_in_step_with_the_picture () {
   start_sender "$p"
   # A clap in two seconds, of which a busy machine loses some.
   enough () { [ -f talk.rcnc ] && [ "$(stat -c %s talk.rcnc)" -gt 900000 ]; }
-  until_true 120 enough
+  seconds=120 until_true enough
   stop_all "$recorder" "$camera" "$parent"
   play_claps talk >claps.txt
   expect_in_step claps.txt 2
@@ -145,7 +145,7 @@ view () { # pad that the audio passes, options...
   env -u GST_GL_PLATFORM -u GST_GL_WINDOW GST_DEBUG=GST_SCHEDULING:5 GST_DEBUG_NO_COLOR=1 GST_DEBUG_FILE="$PWD/passed.txt" \
     timeout -s INT 60 xvfb-run -a rangecast-viewer --size 160x120 "${@:2}" >window.log 2>&1 &
   local window=$!
-  until_true 40 passed "$1"
+  until_true passed "$1"
   stop_all $window
 }
 test_window_plays_speech () {
@@ -234,7 +234,7 @@ test_speech_reaches_all_hosts_of_a_multicast_group () {
   hosts+=($!)
   net_on two rangecast record talk.rcnc --listen 6000 --audio-port 6002 --multicast $group --interface eth0 >two.log 2>&1 &
   hosts+=($!)
-  until_true 90 has_claps 6
+  seconds=90 until_true has_claps 6
   stop_all "${hosts[@]}"
   claps seen.log | tail -n +2 >claps.txt
   expect_in_step claps.txt 4
@@ -273,29 +273,29 @@ test_call_has_picture_and_sound_both_ways () {
   mkfifo anna.keys otto.keys
   exec {anna_keys}<>anna.keys {otto_keys}<>otto.keys # so that they do not end
   start_end anna --certificate anna.pem
-  until_true 60 has_link anna.log
+  until_true has_link anna.log
   local otto=(otto --certificate cert.pem --signal "$(link_of anna.log "$(net_address anna)")")
   start_end "${otto[@]}"
   net_faults anna --loss 0.05
-  for name in anna otto; do until_true 90 has_claps_of $name 5; done
+  for name in anna otto; do seconds=90 until_true has_claps_of $name 5; done
   # One end is gone for a moment.
   kill -TERM "${ends[otto]}"
   wait "${ends[otto]}" 2>/dev/null || true
   before=$(claps_of anna)
-  until_true 60 grep -q "the other end left" anna.log
+  until_true grep -q "the other end left" anna.log
   start_end "${otto[@]}"
-  until_true 90 has_claps_of anna $((before + 3))
+  seconds=90 until_true has_claps_of anna $((before + 3))
   # Muted: the picture goes on, no clap is heard.
   echo m >&"$anna_keys"
-  until_true 60 grep -q "microphone is muted" anna.log
+  until_true grep -q "microphone is muted" anna.log
   sleep 1
   before=$(claps_of otto)
   sleep 3
   [ "$(claps_of otto)" = "$before" ] || fail "heard while muted"
   echo m >&"$anna_keys"
-  until_true 60 has_claps_of otto $((before + 2))
+  until_true has_claps_of otto $((before + 2))
   echo q >&"$anna_keys"
-  until_true 60 has_ended "${ends[anna]}"
+  until_true has_ended "${ends[anna]}"
   wait "${ends[otto]}" || fail "the end of the call is an error: $(cat otto.log)"
   for name in anna otto; do
     claps "$name/seen.log" | tail -n +2 >claps.txt
@@ -314,16 +314,16 @@ test_call_is_of_two_who_have_the_link_and_needs_no_rig_for_the_figure () {
   local link anna otto other pid
   "${call[@]}" --port 8085 </dev/null >anna.log 2>&1 &
   anna=$!
-  until_true 60 has_link anna.log
+  until_true has_link anna.log
   link=$(link_of anna.log 127.0.0.1)
   expect_error "wrong or missing token" "${call[@]}" --signal "${link%?}"
   "${call[@]}" --signal "$link" </dev/null >otto.log 2>&1 &
   otto=$!
-  until_true 60 grep -q "the other end is connected" anna.log
+  until_true grep -q "the other end is connected" anna.log
   expect_error "the call already has two participants" "${call[@]}" --signal "$link"
   "${call[@]}" --signal "$link&room=other" </dev/null >other.log 2>&1 &
   other=$!
-  until_true 60 grep -q "waiting for the other end" other.log
+  until_true grep -q "waiting for the other end" other.log
   stop_all $anna
   for pid in $otto $other; do wait "$pid" || fail "status $?: $(cat otto.log other.log)"; done
   net_close
@@ -375,7 +375,8 @@ stream.sendall(text("call", offer=first))
 answers.append(receive("answer"))
 assert len({user.search(answer)[1] for answer in answers}) == 2, "an answer of the old webrtcbin"
 run.terminate()
-assert run.wait() >= 0, run.returncode  # stopping three webrtcbins may take longer than its limit
+status = run.wait()  # on a busy machine, stopping three webrtcbins may take longer than its limit
+assert status == 0 or "an element blocks the pipeline" in open("run.log").read(), status
 END
   [ "$(grep -c "the other end left" run.log)" = 2 ] || fail "$(cat run.log)"
 }

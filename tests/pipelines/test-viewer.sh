@@ -22,16 +22,16 @@ open_viewer () { # arguments of the viewer
   rangecast-viewer "$@" >log.txt 2>&1 &
   pipeline=$!
   trap 'kill -KILL $pipeline 2>/dev/null || true' EXIT
-  until_true 60 window_id
+  until_true window_id
   window=$(cat window.txt)
-  until_true 60 first_picture
+  until_true first_picture
 }
 press () { xdotool key --window "$window" "$1"; }
 has_ended () { ! kill -0 "$pipeline" 2>/dev/null; }
 # The window is gone before xdotool lets the key go.
 quits_with () { # key
   press "$1" 2>/dev/null || true
-  until_true 60 has_ended
+  until_true has_ended
   wait "$pipeline" || fail "exit status $?: $(tail -n 5 log.txt)"
 }
 turned () { look after.png && ! cmp -s before.png after.png; }
@@ -39,7 +39,7 @@ turned () { look after.png && ! cmp -s before.png after.png; }
 snap () {
   rm -f rangecast-0001.png
   press s
-  until_true 60 test -s rangecast-0001.png
+  until_true test -s rangecast-0001.png
   mv rangecast-0001.png "$1"
 }
 # Whether two PNGs differ by no more than rounding.
@@ -105,31 +105,31 @@ looks_at_a_person () {
   open_viewer still.rcnc --size 320x240
   snap wide.png
   press p
-  until_true 60 grep -q 'wrote ./rangecast-0001.ply' log.txt
+  until_true grep -q 'wrote ./rangecast-0001.ply' log.txt
   press h
-  until_true 60 grep -q "hide or show a camera's view" log.txt
+  until_true grep -q "hide or show a camera's view" log.txt
   press 1
-  until_true 60 snap_differs wide.png
+  until_true snap_differs wide.png
   snap second.png
   press space # the same while paused
-  until_true 60 grep -q paused log.txt
+  until_true grep -q paused log.txt
   press 2
-  until_true 60 snap_differs second.png
+  until_true snap_differs second.png
   snap none.png
   press 0
-  until_true 60 snap_equals wide.png
+  until_true snap_equals wide.png
   press 7
-  until_true 60 grep -q 'no view 7' log.txt
+  until_true grep -q 'no view 7' log.txt
   xdotool mousemove --window "$window" 160 120 mousedown 1
   xdotool mousemove --window "$window" 120 120
   xdotool mousemove --window "$window" 80 120 mouseup 1
-  until_true 60 snap_differs wide.png
+  until_true snap_differs wide.png
   press r
-  until_true 60 snap_equals wide.png
+  until_true snap_equals wide.png
   xdotool windowsize "$window" 160 300
-  until_true 60 snap_has_size 160 300
+  until_true snap_has_size 160 300
   ask_to_close "$window"
-  until_true 60 has_ended
+  until_true has_ended
   wait "$pipeline" || fail "exit status $?: $(tail -n 5 log.txt)"
 }
 snap_has_size () { snap tall.png && [ "$(png_size tall.png)" = "$1 $2" ]; }
@@ -175,29 +175,29 @@ record_moving () {
 moves_in_time () {
   open_viewer moving.rcnc --size 320x240
   press space
-  until_true 60 grep -q paused log.txt
+  until_true grep -q paused log.txt
   press Left
-  until_true 60 grep -q '^0.0 of 10.0 s' log.txt
+  until_true grep -q '^0.0 of 10.0 s' log.txt
   snap first.png
   press period
-  until_true 60 snap_differs first.png
+  until_true snap_differs first.png
   snap second.png
   press period
-  until_true 60 snap_differs second.png
+  until_true snap_differs second.png
   press comma
-  until_true 60 snap_equals second.png
+  until_true snap_equals second.png
   press comma
-  until_true 60 snap_equals first.png
+  until_true snap_equals first.png
   press Right
-  until_true 60 snap_differs first.png
+  until_true snap_differs first.png
   press Left
-  until_true 60 snap_equals first.png
+  until_true snap_equals first.png
   press space
-  until_true 60 snap_differs first.png
+  until_true snap_differs first.png
   # all keys at once, and some that come while it ends
   for key in h Right space period comma Left 1 2 0 space Right Right p h r; do press $key; done
   xdotool key --window "$window" --delay 0 Right q s h 1 period 2>/dev/null || true
-  until_true 60 has_ended
+  until_true has_ended
   wait "$pipeline" || fail "exit status $?: $(tail -n 5 log.txt)"
   ! grep -i critical log.txt || fail "$(cat log.txt)"
 }
@@ -214,14 +214,14 @@ shows_a_stream () {
   sender=$!
   open_viewer --listen $((ports + 210)) --size 320x240
   trap 'kill -KILL $sender $pipeline 2>/dev/null || true' EXIT
-  until_true 60 snaps_alike # the view has settled
+  until_true snaps_alike # the view has settled
   press Right
-  until_true 60 snap_differs first.png
+  until_true snap_differs first.png
   press r
-  until_true 60 snap_equals first.png
+  until_true snap_equals first.png
   kill $sender
   press Right # after the sender has ended, too
-  until_true 60 snap_differs first.png
+  until_true snap_differs first.png
   quits_with Escape
 }
 snaps_alike () { press r; sleep 0.7; snap first.png && snap_equals first.png; }
@@ -254,7 +254,7 @@ complains () {
   python3 -c 'import socket, time
 s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(("0.0.0.0", '$((ports + 211))')); print("bound", flush=True); time.sleep(60)' >bound.txt &
   blocker=$!
-  until_true 60 test -s bound.txt
+  until_true test -s bound.txt
   expect_error "port $((ports + 211)): " rangecast-viewer --listen $((ports + 211))
   kill $blocker
 }
@@ -288,9 +288,9 @@ shows_and_turns () { # command...
   "$@" >log.txt 2>&1 &
   pipeline=$!
   trap 'kill -KILL $pipeline 2>/dev/null || true' EXIT
-  until_true 60 first_picture
+  until_true first_picture
   xdotool mousemove 160 120 mousedown 1 mousemove 120 120 mousemove 80 120 mouseup 1
-  until_true 60 turned
+  until_true turned
 }
 gst_play_shows () { shows_and_turns gst-play-1.0 --no-interactive still.rcnc; }
 playbin_shows () { shows_and_turns gst-launch-1.0 playbin "uri=file://$PWD/still.rcnc"; }

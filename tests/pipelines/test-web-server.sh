@@ -15,7 +15,7 @@ serve () {
   server=$!
   set +m
   trap 'kill -KILL -- -$server 2>/dev/null || true' EXIT
-  until_true 60 server_listens
+  until_true server_listens
   readarray -t links < <(grep '^http' links.txt)
 }
 server_listens () {
@@ -30,7 +30,7 @@ is_gone () { ! is_left "$1"; }
 stop_server () {
   local status=0 signal=${1:-INT}
   kill -"$signal" "$server"
-  until_true 60 is_gone "$server"
+  until_true is_gone "$server"
   wait "$server" || status=$?
   [ "$status" = $((128 + $(kill -l "$signal"))) ] || fail "rangecast serve ended with status $status: $(cat server.log)"
   trap - EXIT
@@ -259,7 +259,7 @@ test_server_ends_at_once_and_leaves_nothing () {
     serve
     rm -f watched.txt # of the signal before
     watch "${links[0]}" "" 1000000 >watched.txt 2>&1 &
-    until_true 60 grep -qs welcome watched.txt
+    until_true grep -qs welcome watched.txt
     stop_server $signal
     wait $! || fail "the client failed: $(cat watched.txt)"
     grep -q '^CLOSED 1001\|"end"' watched.txt || fail "$signal: $(cat watched.txt)"
@@ -316,7 +316,7 @@ test_demo_is_shown_in_browsers () {
   need_server
   local demo port
   start_demo $((ports + 10)) --web 0
-  until_true 40 grep -q '^http.*/rig$' demo.log
+  until_true grep -q '^http.*/rig$' demo.log
   port=$(sed -nE 's|^http://127\.0\.0\.1:([0-9]+)/$|\1|p' demo.log)
   [ -n "$port" ] || fail "$(cat demo.log)"
   curl -sSf -o server.json "http://127.0.0.1:$port/server.json"

@@ -33,9 +33,9 @@ open_window () {
     ! striprender name=r ! 'video/x-raw(memory:GLMemory),width=320,height=240' ! glimagesink >log.txt 2>&1 &
   pipeline=$!
   trap 'kill $pipeline || true' EXIT
-  until_true 60 window_id
+  until_true window_id
   window=$(cat window.txt)
-  until_true 60 first_picture
+  until_true first_picture
 }
 
 turned () { look after.png && ! cmp -s before.png after.png; }
@@ -45,11 +45,11 @@ drag_in_window () {
   xdotool mousemove --window "$window" 160 120 mousedown 1
   xdotool mousemove --window "$window" 120 120
   xdotool mousemove --window "$window" 80 120 mouseup 1
-  until_true 60 azimuth_is 45
-  until_true 60 turned
+  until_true azimuth_is 45
+  until_true turned
   xdotool key --window "$window" r
-  until_true 60 azimuth_is 0
-  until_true 60 first_picture_again
+  until_true azimuth_is 0
+  until_true first_picture_again
 }
 
 test_dragging_in_a_window_turns_the_view () { in_display drag_in_window; }
@@ -60,15 +60,15 @@ larger_than_before () { look after.png && [ "$(stat -c %s after.png)" -gt $(($(s
 resize_window () {
   open_window
   xdotool windowsize "$window" 480 360
-  until_true 60 larger_than_before
+  until_true larger_than_before
   xdotool mousemove --window "$window" 240 180 mousedown 1
   xdotool mousemove --window "$window" 160 180
   xdotool mousemove --window "$window" 80 180 mouseup 1
-  until_true 60 azimuth_is '\(60\|59\)\.[09]*[0-9]\{0,3\}'
+  until_true azimuth_is '\(60\|59\)\.[09]*[0-9]\{0,3\}'
   xdotool windowsize "$window" 320 240
   xdotool key --window "$window" r
-  until_true 60 azimuth_is 0
-  until_true 60 first_picture_again
+  until_true azimuth_is 0
+  until_true first_picture_again
 }
 
 test_resized_window_shows_the_whole_picture_and_can_be_dragged () { in_display resize_window; }
@@ -85,12 +85,12 @@ lose_the_sender () {
     ! 'video/x-raw(memory:GLMemory),width=320,height=240,framerate=10/1' ! glimagesink >log.txt 2>&1 &
   pipeline=$!
   trap 'kill $pipeline || true; kill $sender 2>/dev/null || true' EXIT
-  until_true 60 window_id
-  until_true 60 first_picture
+  until_true window_id
+  until_true first_picture
   kill $sender; wait $sender || true
   sleep 0.5 # what was under way
   look silent.png
-  until_true 60 turns_on
+  until_true turns_on
 }
 
 test_view_turns_on_when_the_network_falls_silent () {

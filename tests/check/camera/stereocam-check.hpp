@@ -348,8 +348,7 @@ private:
 
 /** PTS of all pads grow, and pictures with one PTS were taken together and say so. A pad that was
  *  held up may lack some that another has; they are counted as its overrun. On a busy machine a
- *  camera may take one late: then its number is that of its partner, as far as those of most pairs
- *  are.
+ *  camera may take one late: then the difference of the numbers of both is that of other pairs.
  *  @param apart  ns; how far moments of one pair may lie apart */
 inline void
 expect_pairs (CameraPipeline &p, int cameras, std::int64_t apart)
@@ -362,7 +361,7 @@ expect_pairs (CameraPipeline &p, int cameras, std::int64_t apart)
       others[picture.pts] = picture;
     std::size_t met = 0;
     std::map<std::int32_t, std::size_t> together; /* by difference of the numbers */
-    std::vector<std::int32_t> late;
+    std::map<GstClockTime, std::int32_t> late;    /* the same, by PTS */
     for (const SeenPicture &picture : left) {
       const auto found = others.find (picture.pts);
       if (found == others.end ())
@@ -375,13 +374,14 @@ expect_pairs (CameraPipeline &p, int cameras, std::int64_t apart)
       if (std::llabs (other.mark.taken_ns - picture.mark.taken_ns) < slowdown () * apart)
         together[numbers]++;
       else
-        late.push_back (numbers);
+        late[picture.pts] = numbers;
     }
     fail_unless (10 * late.size () <= met, "%d of %d pictures of %s were not taken with left's",
         int (late.size ()), int (met), kSides[side]);
-    for (const std::int32_t numbers : late)
-      fail_unless (
-          together[numbers] > 0, "%s was taken with another one than left's", kSides[side]);
+    for (const auto &[pts, numbers] : late)
+      fail_unless (together[numbers] > 0,
+          "PTS %" GST_TIME_FORMAT ": %s has a number %d greater than left's, and no other pair has",
+          GST_TIME_ARGS (pts), kSides[side], numbers);
     const guint64 lacking = p.stat ((std::string ("overrun-") + kSides[side]).c_str ());
     fail_unless (met + lacking >= left.size (), "%d of %d left pictures have a partner", int (met),
         int (left.size ()));
