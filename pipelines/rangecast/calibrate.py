@@ -2,13 +2,12 @@
 """calibrate: images of a chessboard or ChArUco board, from files or live, to a rig file."""
 
 import os
-import queue
 import re
+import select
 import signal
 import struct
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 from . import options
@@ -172,27 +171,20 @@ def print_result(text):
 
 def lines_of(child):
     """Of both outputs, each read by itself: in one pipe an error may begin in the middle of a line."""
-    lines = queue.Queue()
-
-    def read(output):
-        for line in output:
-            lines.put(line)
-        lines.put(None)
-
-    ended = 0
-    for output in (child.stdout, child.stderr):
-        threading.Thread(target=read, args=(output,), daemon=True).start()
-    while ended < 2:
-        line = lines.get()
-        if line is not None:
-            yield line
-        ended += line is None
+    unfinished = {output.fileno(): b"" for output in (child.stdout, child.stderr)}
+    while unfinished:
+        for output in select.select(list(unfinished), [], [])[0]:
+            data = os.read(output, 65536)
+            *lines, unfinished[output] = (unfinished[output] + (data or b"\n")).split(b"\n")
+            if not data:
+                del unfinished[output]
+            yield from (line.decode(errors="replace") for line in lines)
 
 
 def run_calibrate(args, launch):
     """Runs it with gst-launch-1.0 -m, whose lines are rigcalibrate's messages. Ctrl-C ends the stream, which calibrates; a second one ends that."""
     command = ["gst-launch-1.0", "-e", "-m", *launch.words]
-    child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True)
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
 
     def interrupt(*_):
         os.write(1, b"calibrating; Ctrl-C again cancels\n")  # print() may be at work
@@ -203,7 +195,7 @@ def run_calibrate(args, launch):
     signal.signal(signal.SIGTERM, lambda *_: (child.kill(), sys.exit(143)))
     result = error = False
     for line in lines_of(child):
-        text = line.rstrip("\n").replace("\\", "")
+        text = line.replace("\\", "")
         complaint = re.match(r"(?:(ERROR|WARNING): from element \S+|WARNING: erroneous pipeline): (.*)", text)
         if "rigcalibrate-coverage," in text:
             print_coverage(text)
