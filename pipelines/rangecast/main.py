@@ -66,9 +66,9 @@ def main():
     try:
         args, rest = parser.parse_known_args()
         if args.command == "convert" and not any(word.startswith("-") for word in rest):
-            args.files += rest  # after options
+            args.files += rest  # argparse leaves those after an option over
         elif rest:
-            parser.parse_args()  # says which
+            parser.error(f"unrecognized arguments: {' '.join(rest)}")
         if not args.command:
             parser.error(f"which command? {', '.join(COMMANDS)}; --help says what they do")
         set_up_environment()

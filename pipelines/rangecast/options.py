@@ -154,7 +154,7 @@ def output_file(text):
 
 def file_of_type(suffix):
     def check(text):
-        if Path(text).suffix != suffix:
+        if Path(text).suffix.lower() != suffix:
             raise Wrong(f"'{text}': use a name that ends in {suffix}")
         return output_file(text)
 

@@ -12,8 +12,15 @@ PATIENCE_S = 1.9  # for a process to end, and a video to be written to its end: 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
-def end_with_parent(prctl=ctypes.CDLL(None).prctl):
-    prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG: also if that one is killed
+def end_with(parent):
+    """For a child of the main thread, before it becomes another program: SIGTERM when the parent dies, even by SIGKILL."""
+
+    def prepare():
+        ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
+        if os.getppid() != parent:
+            os._exit(1)
+
+    return prepare
 
 
 class Processes:
@@ -57,7 +64,7 @@ class Processes:
     def spawn(self, name, popen, *command, **options):
         """In a group of its own: Ctrl-C reaches it once, from here."""
         self.held = True
-        self.running[name] = popen(*command, stdin=subprocess.DEVNULL, start_new_session=True, preexec_fn=end_with_parent, **options)
+        self.running[name] = popen(*command, stdin=subprocess.DEVNULL, start_new_session=True, preexec_fn=end_with(os.getpid()), **options)
         self.held = False
         if self.pending:
             self.handle(self.pending, None)
