@@ -139,9 +139,9 @@ launch_media_handle_message (GstRTSPMedia *media, GstMessage *message)
   return GST_RTSP_MEDIA_CLASS (launch_media_parent_class)->handle_message (media, message);
 }
 
-/* Version 1.22 stops a stream for everybody while all of its TCP viewers are slow, and forgets RTP
- * that waits together with RTCP until some transport has sent a message. This one is always ready,
- * and always has. */
+/* Version 1.22 stops a stream for everybody while all of its TCP viewers are slow, and does not
+ * look for RTP that waits beside RTCP until a transport reports that it has sent something. This
+ * transport always accepts data and reports it as sent. */
 static GstRTSPStreamTransport *
 make_discarding_transport (GstRTSPStream *stream)
 {

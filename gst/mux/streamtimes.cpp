@@ -2,6 +2,7 @@
 #include "streamtimes.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
 

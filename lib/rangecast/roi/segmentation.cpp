@@ -25,7 +25,7 @@ square (int side)
   return cv::getStructuringElement (cv::MORPH_RECT, cv::Size (side, side));
 }
 
-/* What a median finds in a mask of 0 and 255, in less time. */
+/* Equals cv::medianBlur for masks of 0 and 255, but is faster. */
 void
 find_majority (const cv::Mat &mask, cv::Mat &to, int side)
 {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -69,7 +70,7 @@ step (const std::uint8_t *cost, std::uint8_t *path, std::uint8_t *lowest, const 
   Lanes::at (lowest) = least;
 }
 
-/* Interleaves the bytes of 16 of two rows; with vectors of 32 bytes, of two such pairs. */
+/* Interleaves the bytes of two rows within each 16 of them. */
 template <typename B>
 inline void
 interleave (const B &a, const B &b, B &low, B &high)
@@ -86,8 +87,8 @@ interleave (const B &a, const B &b, B &low, B &high)
   }
 }
 
-/* Transposes kSide x kSide bytes in squares of 16 x 16, as many at once, one below the other, as a
- * vector has halves. Two rounds of four are the same for rows that are four apart. */
+/* Transposes kSide x kSide bytes in squares of 16 x 16; a vector of 32 bytes holds rows of two, one
+ * below the other. Interleaving rows i and i + 8 four times transposes a square. */
 template <typename Lanes>
 inline void
 transpose (

@@ -4,6 +4,9 @@
  */
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <cstring>
 #include <numbers>
 
 #include "symbol_model.hpp"
