@@ -60,21 +60,18 @@ write_sample (const std::string &path, const char *encoder, GstSample *sample)
     gst_message_unref (message);
 }
 
-/* There is no frame at first, and for a moment where a file starts over. */
+/* There is no frame at first, and for a moment where a file starts over: the picture is then the
+ * first one. */
 gboolean
 try_to_write_picture (gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
   GstSample *sample = nullptr;
   g_object_get (viewer.sink, "last-sample", &sample, nullptr);
-  if (sample) {
-    write_sample (free_name (viewer, "png"), "gldownload ! videoconvert ! pngenc", sample);
-    gst_sample_unref (sample);
-    return G_SOURCE_REMOVE;
-  }
-  if (viewer.patience-- > 0)
+  if (!sample)
     return G_SOURCE_CONTINUE;
-  g_printerr ("rangecast-viewer: no frame yet\n");
+  write_sample (free_name (viewer, "png"), "gldownload ! videoconvert ! pngenc", sample);
+  gst_sample_unref (sample);
   return G_SOURCE_REMOVE;
 }
 
@@ -90,7 +87,6 @@ last_frame_set (Viewer &viewer)
 void
 write_picture (Viewer &viewer)
 {
-  viewer.patience = 20;
   if (try_to_write_picture (&viewer))
     g_timeout_add (100, try_to_write_picture, &viewer);
 }

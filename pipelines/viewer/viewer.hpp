@@ -32,7 +32,6 @@ struct Viewer {
   GMainLoop *loop = nullptr;
   bool is_file = false;
   bool failed = false;
-  int patience = 0; /* retries that write_picture() has left */
   std::atomic<bool> seen_frames = false;
   std::optional<Playback> playback;
 
