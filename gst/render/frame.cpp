@@ -4,6 +4,7 @@
 #include <gstrange/gstrangestatus.hpp>
 #include <rangecast/base/guarded.hpp>
 #include <string>
+#include <utility>
 
 #include "striprenderprivate.hpp"
 
@@ -44,7 +45,7 @@ count_into (const rangecast::SurfaceScene &scene, RenderStats &stats)
     stats.strips += scene.result (i).strips;
     stats.isolated += scene.result (i).isolated;
     stats.triangles += scene.result (i).triangles;
-    stats.vertices += scene.vertices (i);
+    stats.vertices += scene.layers ()[i].vertices.size ();
   }
 }
 
@@ -96,8 +97,8 @@ home_frame (GstStripRenderPrivate *priv, const StripRenderSettings &settings,
       priv->scene, {orbit, layout.eyes ().front ().aspect, pts, settings.camera.home_requests});
 }
 
-/* Updates the panel of show-stats. @return whether it differs from the last one */
-bool
+/* Updates the panel of show-stats. */
+void
 update_panel (GstStripRender *self, GstClockTime frame_set_pts)
 {
   GstStripRenderPrivate *priv = self->priv;
@@ -113,18 +114,16 @@ update_panel (GstStripRender *self, GstClockTime frame_set_pts)
     stats = priv->stats;
   }
   count_into (priv->scene, stats);
-  if (!priv->stats_text.update (
+  if (priv->stats_text.update (
           stats, priv->scene.layers ().size (), latency, g_get_monotonic_time ()))
-    return false;
-  priv->stats_panel.draw (priv->stats_text.lines ());
-  return true;
+    priv->stats_panel.draw (priv->stats_text.lines ());
 }
 
 /* Makes a scene of the frame set and draws it. May throw.
  * @param repeated  the last picture showed the same frame set */
 Status
-draw (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool repeated,
-    Renderer::Result &result)
+draw (
+    GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool repeated, RenderResult &result)
 {
   GstStripRenderPrivate *priv = self->priv;
   const gstrange::RangeFrameMap frame (frame_set, GST_MAP_READ);
@@ -144,11 +143,11 @@ draw (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bool repeated,
   const auto &home = home_frame (priv, settings, orbit, GST_BUFFER_PTS (frame_set));
   RenderJob job = {&priv->scene, &settings, &home, orbit};
   if (settings.show_stats) {
-    job.panel_changed = update_panel (self, GST_BUFFER_PTS (frame_set));
+    update_panel (self, GST_BUFFER_PTS (frame_set));
     job.panel = priv->stats_panel.picture ();
   }
-  result = priv->renderer.draw (priv->context, job, out);
-  if (result.drawn) {
+  result = priv->backend->draw (job, out);
+  if (!result.failure) {
     std::lock_guard guard (priv->lock);
     priv->settings.camera.set_shown (result.matrices, home, result.width, result.height);
   }
@@ -162,15 +161,26 @@ strip_draw_frame (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bo
 {
   GstStripRenderPrivate *priv = self->priv;
   sync_values (self, GST_BUFFER_PTS (out));
-  Renderer::Result result;
+  RenderResult result;
   const Status status = rangecast::guarded (
       "striprender", [&] { return draw (self, frame_set, out, repeated, result); });
   if (!status.ok ())
     return gst_range_flow_return (GST_ELEMENT (self), status);
-  if (!result.drawn) {
-    GST_ELEMENT_ERROR (self, RESOURCE, WRITE,
-        ("OpenGL could not draw into the output: %s", result.reason), (nullptr));
-    return GST_FLOW_ERROR;
+  if (result.failure) {
+    bool may_go_on;
+    {
+      std::lock_guard guard (priv->lock);
+      may_go_on = priv->is_gl && priv->settings.backend == RenderBackendChoice::kAuto;
+    }
+    if (!may_go_on || std::exchange (priv->lost_opengl, true)) {
+      GST_ELEMENT_ERROR (
+          self, RESOURCE, WRITE, ("Could not draw into the output: %s", result.failure), (nullptr));
+      return GST_FLOW_ERROR;
+    }
+    GST_ELEMENT_WARNING (self, RESOURCE, FAILED,
+        ("Continuing with backend=software: %s", result.failure), (nullptr));
+    gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
 
   if (!repeated)

@@ -3,11 +3,10 @@
  * SECTION:element-rangerender
  * @title: rangerender
  *
- * Renders range images, raw or coded, as raw video: neighbourcodedec where needed, rangealign,
- * striprender and gldownload in one bin, which playbin, playbin3 and decodebin plug as the decoder.
- * Pictures stay in OpenGL memory if downstream accepts it. The elements inside are named `decoder`,
- * `align` and `render`; gst-launch-1.0 sets their properties with names such as
- * `render::auto-orbit=30`.
+ * Renders range images, raw or coded, as raw video: neighbourcodedec where needed, rangealign and
+ * striprender in one bin, which playbin, playbin3 and decodebin plug as the decoder. The elements
+ * inside are named `decoder`, `align` and `render`; gst-launch-1.0 sets their properties with names
+ * such as `render::auto-orbit=30`.
  *
  * ## Example launch lines
  * |[
@@ -21,8 +20,9 @@
  */
 #include <gst/gst.h>
 
-#include <gst/video/video.h>
 #include <gstrange/gstrangecaps.h>
+
+#include "opengl.hpp"
 
 GST_DEBUG_CATEGORY_STATIC (gst_range_render_debug);
 #define GST_CAT_DEFAULT gst_range_render_debug
@@ -39,9 +39,7 @@ struct _GstRangeRender {
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK,
     GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_CAPS));
 static GstStaticPadTemplate src_template =
-    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
-        GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE_WITH_FEATURES (
-            "memory:GLMemory", "RGBA") "; " GST_VIDEO_CAPS_MAKE ("RGBA")));
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (STRIP_CAPS));
 
 G_DEFINE_TYPE (GstRangeRender, gst_range_render, GST_TYPE_BIN)
 /* Above neighbourcodedec: decodebin3 plugs a single decoder, and video sinks want pictures. */
@@ -59,58 +57,6 @@ add (GstRangeRender *self, const char *factory, const char *name)
   else
     self->missing = factory;
   return element;
-}
-
-gboolean
-is_no_range_of_rates (GQuark field, GValue *value, gpointer)
-{
-  return field != g_quark_from_static_string ("framerate") ||
-         !GST_VALUE_HOLDS_FRACTION_RANGE (value);
-}
-
-/* Whether the ranges of frame rates in the caps together reach from 0 to the maximum. */
-bool
-has_all_rates (const GstCaps *caps)
-{
-  bool from_none = false, to_all = false;
-  for (guint i = 0; i < gst_caps_get_size (caps); i++) {
-    const GValue *rate = gst_structure_get_value (gst_caps_get_structure (caps, i), "framerate");
-    if (!rate || !GST_VALUE_HOLDS_FRACTION_RANGE (rate))
-      continue;
-    const GValue *min = gst_value_get_fraction_range_min (rate),
-                 *max = gst_value_get_fraction_range_max (rate);
-    from_none |= gst_value_get_fraction_numerator (min) == 0;
-    to_all |= gst_value_get_fraction_numerator (max) == G_MAXINT &&
-              gst_value_get_fraction_denominator (max) == 1;
-  }
-  return from_none && to_all;
-}
-
-/* playsink's deinterlace accepts frame rates [ 0, max/2 ] and [ max/2, max ]. gldownload puts both
- * together, which GStreamer 1.22 does not take for a subset of [ 0, max ], so that every
- * GstBaseTransform upstream warns. Ranges that are no limit are therefore removed. */
-gboolean
-query_downstream (GstPad *pad, GstObject *parent, GstQuery *query)
-{
-  const gboolean answered = gst_pad_query_default (pad, parent, query);
-  if (!answered || GST_QUERY_TYPE (query) != GST_QUERY_CAPS)
-    return answered;
-  GstCaps *filter = nullptr, *caps = nullptr;
-  gst_query_parse_caps (query, &filter);
-  gst_query_parse_caps_result (query, &caps);
-  caps = gst_caps_copy (caps);
-  const bool unlimited = has_all_rates (caps);
-  for (guint i = 0; unlimited && i < gst_caps_get_size (caps); i++)
-    gst_structure_filter_and_map_in_place (
-        gst_caps_get_structure (caps, i), is_no_range_of_rates, nullptr);
-  if (filter) {
-    GstCaps *wanted = gst_caps_intersect_full (filter, caps, GST_CAPS_INTERSECT_FIRST);
-    gst_caps_unref (caps);
-    caps = wanted;
-  }
-  gst_query_set_caps_result (query, caps);
-  gst_caps_unref (caps);
-  return TRUE;
 }
 
 void
@@ -232,19 +178,15 @@ gst_range_render_init (GstRangeRender *self)
 {
   GstElement *align = add (self, "rangealign", "align");
   GstElement *render = add (self, "striprender", "render");
-  GstElement *download = add (self, "gldownload", "download");
   if (self->missing)
     return;
   g_object_set (render, "fit", TRUE, "background-shade", 0.5, nullptr); /* for viewers */
-  gst_element_link_many (align, render, download, nullptr);
+  gst_element_link (align, render);
   self->align = align;
   self->sink = add_ghost_pad (self, align, "sink", &sink_template);
   gst_pad_set_event_function (self->sink, GST_DEBUG_FUNCPTR (handle_sink_event));
   gst_pad_set_query_function (self->sink, GST_DEBUG_FUNCPTR (answer_sink_query));
-  GstPad *src = add_ghost_pad (self, download, "src", &src_template);
-  GstProxyPad *inner = gst_proxy_pad_get_internal (GST_PROXY_PAD (src));
-  gst_pad_set_query_function (GST_PAD (inner), GST_DEBUG_FUNCPTR (query_downstream));
-  gst_object_unref (inner);
+  add_ghost_pad (self, render, "src", &src_template);
 }
 
 static void

@@ -3,7 +3,7 @@
  * SECTION:element-striprender
  * @title: striprender
  *
- * Renders range images with OpenGL without building a mesh. The virtual camera orbits the point
+ * Renders range images without building a mesh. The virtual camera orbits the point
  * that the rig's cameras look at, controlled by properties and by navigation events: left-drag
  * orbits, other buttons pan, the wheel, + and - zoom, arrows orbit, r and Home reset. With
  * #GstStripRender:fit it is centred on the content.
@@ -13,18 +13,18 @@
  *
  * ## Example launch line
  * |[
- * gst-launch-1.0 avatartestsrc ! rangealign ! striprender auto-orbit=30 ! glimagesink
+ * gst-launch-1.0 avatartestsrc ! rangealign ! striprender auto-orbit=30 ! autovideosink
  * gst-launch-1.0 avatartestsrc range-person-only=true ! striprender fit=true \
- *   background-shade=0.5 ! glimagesink
+ *   background-shade=0.5 ! autovideosink
  * ]|
  *
- * Without a display: `GST_GL_PLATFORM=egl GST_GL_WINDOW=egl-device`, and gldownload behind it.
+ * It draws into system memory with the CPU, or with OpenGL into OpenGL memory:
+ * #GstStripRender:backend.
  *
  * Since: 0.1
  */
 
 #include <algorithm>
-#include <exception>
 #include <gstrange/gstrangestatus.hpp>
 #include <utility>
 
@@ -34,13 +34,12 @@
 
 using rangecast::Status;
 
+GST_DEBUG_CATEGORY (strip_render_debug);
+
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
 static GstStaticPadTemplate src_template =
-    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
-        GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE_WITH_FEATURES (GST_CAPS_FEATURE_MEMORY_GL_MEMORY,
-            "RGBA") ", texture-target = (string) 2D, multiview-mode = "
-                    "(string) " STRIP_MULTIVIEW_MODES));
+    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (STRIP_CAPS));
 
 G_DEFINE_TYPE (GstStripRender, gst_strip_render, GST_TYPE_AGGREGATOR)
 GST_ELEMENT_REGISTER_DEFINE (
@@ -48,114 +47,103 @@ GST_ELEMENT_REGISTER_DEFINE (
 
 enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_CAMERA };
 
-/* ---- OpenGL ---- */
+/* ---- backends ---- */
 
 namespace {
 
-void
-stop_renderer (GstStripRenderPrivate *priv)
+bool
+is_gl (const GstCaps *caps)
 {
-  if (priv->context)
-    on_gl_thread (priv->context, [priv] { priv->renderer.stop (); });
-  gst_clear_object (&priv->context);
+  const GstCapsFeatures *features = gst_caps_get_features (caps, 0);
+  return gst_caps_features_contains (features, "memory:GLMemory");
 }
 
-/* Makes the renderer ready for pictures of the output's size. */
+/* What the backend may output for downstream's caps. Returns: (transfer full) */
+GstCaps *
+caps_of_backend (GstStripRender *self, GstCaps *downstream)
+{
+  static GstStaticCaps gl_caps = GST_STATIC_CAPS (STRIP_GL_CAPS),
+                       system_caps = GST_STATIC_CAPS (STRIP_SYSTEM_CAPS);
+  GstStripRenderPrivate *priv = self->priv;
+  GstCaps *gl = gst_static_caps_get (&gl_caps), *system = gst_static_caps_get (&system_caps);
+  RenderBackendChoice choice;
+  {
+    std::lock_guard guard (priv->lock);
+    choice = priv->settings.backend;
+  }
+  bool by_gl = choice == RenderBackendChoice::kOpenGl;
+  if (choice == RenderBackendChoice::kAuto && gst_caps_can_intersect (downstream, gl))
+    by_gl = !gst_caps_can_intersect (downstream, system) ||
+            (!priv->lost_opengl && priv->gl.is_fast (GST_ELEMENT (self)));
+  gst_caps_unref (by_gl ? system : gl);
+  return by_gl ? gl : system;
+}
+
+/* Makes what draws pictures of the output's caps. */
 bool
-start_renderer (GstStripRender *self, GError **error)
+start_backend (GstStripRender *self, GError **error)
 {
   GstStripRenderPrivate *priv = self->priv;
-  GstGLContext *context = priv->gl.get (GST_ELEMENT (self), error);
-  if (!context)
+  if (priv->is_gl)
+    priv->backend =
+        priv->gl.start (GST_ELEMENT (self), priv->out, std::move (priv->backend), error);
+  else
+    priv->backend = make_software_backend (priv->out);
+  if (!priv->backend)
     return false;
-  const bool is_new = context != priv->context;
-  if (is_new)
-    stop_renderer (priv);
-  gst_clear_object (&priv->context);
-  priv->context = context;
-  bool ready = false;
-  on_gl_thread (context, [&] {
-    try {
-      ready = (!is_new || priv->renderer.start (context, error)) &&
-              priv->renderer.set_output (context, priv->out, error);
-    } catch (const std::exception &failure) { /* must not pass through C */
-      g_set_error_literal (
-          error, GST_GL_CONTEXT_ERROR, GST_GL_CONTEXT_ERROR_FAILED, failure.what ());
-    }
-  });
-  if (!ready)
-    stop_renderer (priv);
-  return ready;
+  GST_INFO_OBJECT (self, "drawing with backend %s", priv->backend->name ());
+  std::lock_guard guard (priv->lock);
+  priv->stats.backend = priv->backend->name ();
+  return true;
 }
 
-struct PoolSizes {
-  guint size = 0, min = 0, max = 0; /* bytes of a buffer; numbers of buffers */
-};
-
-/* Configures a pool for OpenGL buffers of the query's caps. A pool that wants more than it is asked
- * for refuses, and has in its configuration what it would accept. @return whether it is configured
- */
+/* @return whether the pool can have such buffers of the query's caps */
 bool
-configure_pool (GstBufferPool *pool, GstQuery *query, PoolSizes &sizes)
+configure_pool (GstBufferPool *pool, GstQuery *query, guint size, guint min, guint max)
 {
   GstCaps *caps;
   gst_query_parse_allocation (query, &caps, nullptr);
   GstStructure *config = gst_buffer_pool_get_config (pool);
-  gst_buffer_pool_config_set_params (config, caps, sizes.size, sizes.min, sizes.max);
-  gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_VIDEO_META);
-  if (gst_query_find_allocation_meta (query, GST_GL_SYNC_META_API_TYPE, nullptr))
-    gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_GL_SYNC_META);
-  const bool accepted = gst_buffer_pool_set_config (pool, config);
-  config = gst_buffer_pool_get_config (pool);
-  const bool enough =
-      gst_buffer_pool_config_validate_params (config, caps, sizes.size, sizes.min, sizes.max);
-  gst_buffer_pool_config_get_params (config, nullptr, &sizes.size, &sizes.min, &sizes.max);
-  if (accepted || !enough) {
-    gst_structure_free (config);
-    return accepted;
-  }
+  gst_buffer_pool_config_set_params (config, caps, size, min, max);
+  if (is_gl (caps) || gst_query_find_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr))
+    gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_VIDEO_META);
+  if (is_gl (caps))
+    OpenGl::add_options (query, config);
   return gst_buffer_pool_set_config (pool, config);
 }
 
-/* Answers the query with downstream's pool of OpenGL buffers if that shares our context, else with
- * a new one. */
+/* Answers the query with downstream's pool if we can draw into its buffers, else with a new one. */
 bool
 choose_pool (GstStripRender *self, GstQuery *query)
 {
-  GstGLContext *context = self->priv->context;
-  const guint min_size = guint (GST_VIDEO_INFO_SIZE (&self->priv->out));
+  GstStripRenderPrivate *priv = self->priv;
   GstBufferPool *pool = nullptr;
-  PoolSizes offer;
+  guint size = 0, min = 0, max = 0;
   const bool offered = gst_query_get_n_allocation_pools (query) > 0;
   if (offered)
-    gst_query_parse_nth_allocation_pool (query, 0, &pool, &offer.size, &offer.min, &offer.max);
-  offer.size = std::max (offer.size, min_size);
-  PoolSizes sizes = offer;
-  const bool is_usable = pool && GST_IS_GL_BUFFER_POOL (pool) &&
-                         gst_gl_context_can_share (GST_GL_BUFFER_POOL (pool)->context, context);
-  if (!is_usable || !configure_pool (pool, query, sizes)) {
-    if (pool)
-      GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT " cannot be used; creating a pool", pool);
+    gst_query_parse_nth_allocation_pool (query, 0, &pool, &size, &min, &max);
+  size = std::max (size, guint (GST_VIDEO_INFO_SIZE (&priv->out)));
+  const bool is_usable = pool && (!priv->is_gl || priv->gl.can_use (pool));
+  if (!is_usable || !configure_pool (pool, query, size, min, max)) {
     gst_clear_object (&pool);
-    pool = gst_gl_buffer_pool_new (context);
-    sizes = {min_size, offer.min, 0};
-    if (!configure_pool (pool, query, sizes)) {
-      GST_DEBUG_OBJECT (self, "no pool of OpenGL buffers for these caps");
+    pool = priv->is_gl ? priv->gl.make_pool () : gst_video_buffer_pool_new ();
+    max = 0;
+    if (!configure_pool (pool, query, size, min, max)) {
       gst_object_unref (pool);
       return false;
     }
   }
   if (offered)
-    gst_query_set_nth_allocation_pool (query, 0, pool, sizes.size, sizes.min, sizes.max);
+    gst_query_set_nth_allocation_pool (query, 0, pool, size, min, max);
   else
-    gst_query_add_allocation_pool (query, pool, sizes.size, sizes.min, sizes.max);
+    gst_query_add_allocation_pool (query, pool, size, min, max);
   gst_object_unref (pool);
   return true;
 }
 
 } // namespace
 
-/* Frame sets are read on the CPU: upstream has no use for a pool of OpenGL memory. */
+/* Upstream has no use for a pool of pictures. */
 static gboolean
 gst_strip_render_propose_allocation (GstAggregator *, GstAggregatorPad *, GstQuery *, GstQuery *)
 {
@@ -171,7 +159,7 @@ gst_strip_render_decide_allocation (GstAggregator *aggregator, GstQuery *query)
        i++)
     gst_pad_push_event (aggregator->srcpad, tags); /* sends none twice */
   GError *error = nullptr;
-  const bool ready = start_renderer (self, &error) && choose_pool (self, query);
+  const bool ready = start_backend (self, &error) && choose_pool (self, query);
   if (error)
     GST_ELEMENT_ERROR (
         self, RESOURCE, NOT_FOUND, ("OpenGL cannot be used: %s", error->message), (nullptr));
@@ -244,7 +232,14 @@ gst_strip_render_update_src_caps (GstAggregator *aggregator, GstCaps *wanted, Gs
   GstStripRenderPrivate *priv = GST_STRIP_RENDER (aggregator)->priv;
   if (!priv->input)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
-  GstCaps *output = gst_static_pad_template_get_caps (&src_template);
+  auto self = GST_STRIP_RENDER (aggregator);
+  GstCaps *output = caps_of_backend (self, wanted);
+  if (gst_caps_is_empty (output)) {
+    gst_caps_unref (output);
+    GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
+        ("backend=opengl: striprender was built without OpenGL; use auto or software"), (nullptr));
+    return GST_FLOW_NOT_NEGOTIATED;
+  }
   *caps = strip_output_caps (priv->input, output, wanted);
   gst_caps_unref (output);
   return GST_FLOW_OK;
@@ -271,6 +266,7 @@ gst_strip_render_negotiated_src_caps (GstAggregator *aggregator, GstCaps *caps)
   }
   if (!gst_video_info_from_caps (&priv->out, caps))
     return FALSE;
+  priv->is_gl = is_gl (caps);
   {
     std::lock_guard guard (priv->lock);
     priv->rate = strip_output_rate (priv->input, caps);
@@ -408,6 +404,7 @@ gst_strip_render_start (GstAggregator *aggregator)
   GstStripRenderPrivate *priv = self->priv;
   priv->first_running = GST_CLOCK_TIME_NONE;
   priv->stats_text = {};
+  priv->lost_opengl = false;
   priv->fit.reset ();
   strip_reset_stream (self);
   priv->reporter.start (GST_ELEMENT (self), collect_stats);
@@ -435,21 +432,9 @@ gst_strip_render_stop (GstAggregator *aggregator)
   strip_reset_stream (self);
   gst_clear_caps (&self->priv->input);
   self->priv->scene.reset ();
-  stop_renderer (self->priv);
+  self->priv->backend.reset ();
+  self->priv->gl.close ();
   return TRUE;
-}
-
-static GstStateChangeReturn
-gst_strip_render_change_state (GstElement *element, GstStateChange transition)
-{
-  GlContext &gl = GST_STRIP_RENDER (element)->priv->gl;
-  if (transition == GST_STATE_CHANGE_NULL_TO_READY)
-    gl.open (element); /* neighbours share it; without a display, drawing is an error */
-  const GstStateChangeReturn result =
-      GST_ELEMENT_CLASS (gst_strip_render_parent_class)->change_state (element, transition);
-  if (transition == GST_STATE_CHANGE_READY_TO_NULL)
-    gl.close ();
-  return result;
 }
 
 /* ---- properties ---- */
@@ -463,16 +448,20 @@ gst_strip_render_set_property (GObject *object, guint id, const GValue *value, G
     priv->reporter.set_interval (g_value_get_uint (value));
     return;
   }
-  bool keep_changed;
+  bool keep_changed, backend_changed;
   {
     std::lock_guard guard (priv->lock);
     const bool before = priv->settings.keep_rate;
+    const RenderBackendChoice backend_before = priv->settings.backend;
     if (strip_properties ().set (priv->settings, id, value))
       priv->settings.strips_serial++;
     else if (!camera_properties ().set (priv->settings.camera, id, value))
       G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
     keep_changed = priv->settings.keep_rate != before;
+    backend_changed = priv->settings.backend != backend_before;
   }
+  if (backend_changed)
+    gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
   if (keep_changed)
     strip_update_latency (self);
 }
@@ -515,7 +504,7 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
   auto element_class = GST_ELEMENT_CLASS (klass);
   auto aggregator_class = GST_AGGREGATOR_CLASS (klass);
 
-  strip_render_category (); /* exists from here on, for GST_DEBUG */
+  GST_DEBUG_CATEGORY_INIT (strip_render_debug, "striprender", 0, "Strip renderer");
 
   object_class->set_property = gst_strip_render_set_property;
   object_class->get_property = gst_strip_render_get_property;
@@ -525,15 +514,14 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
   install_stats (object_class, PROP_STATS,
       "Counters since the element was started: frames, frame-sets, repeated, dropped, "
       "uploaded-total; of the last frame: points, vertices, triangles, strips, isolated, "
-      "uploaded-bytes");
+      "uploaded-bytes; backend: which one draws");
   StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   for (GstStaticPadTemplate *pad_template : {&sink_template, &src_template})
     gst_element_class_add_static_pad_template_with_gtype (
         element_class, pad_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Strip renderer", "Filter/Converter/Video",
-      "Renders range images with OpenGL without building a mesh", "gst-rangecast");
-  element_class->change_state = GST_DEBUG_FUNCPTR (gst_strip_render_change_state);
+      "Renders range images without building a mesh", "gst-rangecast");
   element_class->set_context = GST_DEBUG_FUNCPTR (gst_strip_render_set_context);
 
   aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_strip_render_update_src_caps);

@@ -2,7 +2,7 @@
 /**
  * plugin-rangerender:
  *
- * Renders range frame sets with OpenGL.
+ * Renders range frame sets.
  */
 #include <gst/gst.h>
 
@@ -18,6 +18,5 @@ plugin_init (GstPlugin *plugin)
   return registered;
 }
 
-GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, rangerender,
-    "Renders range frame sets with OpenGL", plugin_init, PACKAGE_VERSION, "LGPL", "gst-rangecast",
-    PACKAGE_ORIGIN)
+GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, rangerender, "Renders range frame sets",
+    plugin_init, PACKAGE_VERSION, "LGPL", "gst-rangecast", PACKAGE_ORIGIN)

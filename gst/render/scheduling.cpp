@@ -160,7 +160,7 @@ draw (GstStripRender *self, const Picture &picture, GstBuffer *&out)
 {
   GstStripRenderPrivate *priv = self->priv;
   GstBufferPool *pool = gst_aggregator_get_buffer_pool (GST_AGGREGATOR (self));
-  GstFlowReturn flow = pool && priv->context && gst_buffer_pool_set_active (pool, TRUE)
+  GstFlowReturn flow = pool && priv->backend && gst_buffer_pool_set_active (pool, TRUE)
                            ? gst_buffer_pool_acquire_buffer (pool, &out, nullptr)
                            : GST_FLOW_NOT_NEGOTIATED;
   gst_clear_object (&pool);

@@ -17,6 +17,21 @@ gst_strip_render_mode_get_type (void)
   return type;
 }
 
+GType
+gst_strip_render_backend_get_type (void)
+{
+  static const GType type = [] {
+    using Choice = RenderBackendChoice;
+    static const GEnumValue values[] = {
+        {int (Choice::kAuto),
+            "OpenGL where downstream accepts its memory and it is not itself software", "auto"},
+        {int (Choice::kSoftware), "The CPU, into system memory", "software"},
+        {int (Choice::kOpenGl), "OpenGL, into OpenGL memory", "opengl"}, {}};
+    return g_enum_register_static ("GstStripRenderBackend", values);
+  }();
+  return type;
+}
+
 PropertyTable<OrbitControl> &
 camera_properties ()
 {
@@ -90,6 +105,8 @@ strip_properties ()
           "tint-views", "Tint views", "Tint each point with the colour of its view", kControllable),
       P::enumeration<&S::strips, &Strips::mode> (
           "mode", "Mode", "Rendering mode", GST_TYPE_STRIP_RENDER_MODE, kControllable),
+      P::enumeration<&S::backend> ("backend", "Backend", "What draws; the one in use is in stats",
+          GST_TYPE_STRIP_RENDER_BACKEND, kMutablePlaying),
       P::number<&S::background> (
           "background", "Background", "Background colour, ARGB", 0, G_MAXUINT32, kControllable),
       P::number<&S::view_mask> ("view-mask", "View mask",

@@ -8,6 +8,8 @@
 #include "common/properties.hpp"
 #include "orbitcontrol.hpp"
 
+enum class RenderBackendChoice { kAuto, kSoftware, kOpenGl };
+
 /** striprender's properties. Any thread, under the element's lock. */
 struct StripRenderSettings {
   OrbitControl camera;
@@ -22,6 +24,7 @@ struct StripRenderSettings {
   double eye_distance_m = 0.063; ///< most people's
   double convergence_m = 0;      ///< 0: the camera target's distance
   bool keep_rate = false;        ///< even if it is the input's
+  RenderBackendChoice backend = RenderBackendChoice::kAuto;
   rangecast::StripSettings strips;
   guint strips_serial = 0; ///< changes with each property but the camera's
 };
@@ -33,3 +36,5 @@ PropertyTable<StripRenderSettings> &strip_properties ();
 
 GType gst_strip_render_mode_get_type (void);
 #define GST_TYPE_STRIP_RENDER_MODE (gst_strip_render_mode_get_type ())
+GType gst_strip_render_backend_get_type (void);
+#define GST_TYPE_STRIP_RENDER_BACKEND (gst_strip_render_backend_get_type ())

@@ -11,7 +11,7 @@ RenderStats::to_structure () const
       G_TYPE_UINT64, dropped, "points", G_TYPE_UINT64, points, "vertices", G_TYPE_UINT64, vertices,
       "triangles", G_TYPE_UINT64, triangles, "strips", G_TYPE_UINT64, strips, "isolated",
       G_TYPE_UINT64, isolated, "uploaded-bytes", G_TYPE_UINT64, uploaded_bytes, "uploaded-total",
-      G_TYPE_UINT64, uploaded_total, nullptr);
+      G_TYPE_UINT64, uploaded_total, "backend", G_TYPE_STRING, backend, nullptr);
 }
 
 namespace {
@@ -41,11 +41,7 @@ StatsText::update (const RenderStats &stats, std::size_t views, GstClockTime lat
         rate (stats.frame_sets, last_.frame_sets));
   print_line (lines_[1], "%" G_GUINT64_FORMAT " points of %u views", stats.points, guint (views));
   print_line (lines_[2], "%" G_GUINT64_FORMAT " triangles", stats.triangles);
-  if (last_us_ < 0)
-    lines_[3].clear ();
-  else
-    print_line (
-        lines_[3], "%.1f MB/s to OpenGL", rate (stats.uploaded_total, last_.uploaded_total) / 1e6);
+  print_line (lines_[3], "drawn with backend %s", stats.backend);
   if (GST_CLOCK_TIME_IS_VALID (latency))
     print_line (lines_[4], "latency %.0f ms", double (latency) / GST_MSECOND);
   else

@@ -16,6 +16,7 @@ struct RenderStats {
   guint64 dropped = 0;        ///< pictures not drawn because they would have been late
   guint64 uploaded_total = 0; ///< bytes
   guint64 points_total = 0;   ///< drawn
+  const char *backend = "";   ///< that draws
   /* of the last picture */
   guint64 points = 0, vertices = 0, triangles = 0, strips = 0, isolated = 0, uploaded_bytes = 0;
 

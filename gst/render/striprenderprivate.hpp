@@ -6,7 +6,6 @@
 
 #include <atomic>
 #include <gst/base/gstaggregator.h>
-#include <gst/gl/gl.h>
 #include <gst/video/video.h>
 
 #include <gstrange/gstrangeinfo.hpp>
@@ -15,12 +14,14 @@
 #include <rangecast/surface/view_fit.hpp>
 
 #include "caps.hpp"
-#include "category.hpp"
 #include "common/statsreporter.hpp"
-#include "glcontext.hpp"
-#include "renderer.hpp"
+#include "opengl.hpp"
+#include "picture.hpp"
 #include "settings.hpp"
 #include "stats.hpp"
+
+GST_DEBUG_CATEGORY_EXTERN (strip_render_debug);
+#define GST_CAT_DEFAULT strip_render_debug
 
 struct GstStripRenderPrivate {
   std::mutex lock; /* guards what follows; nothing is pushed, posted or queried with it */
@@ -33,15 +34,16 @@ struct GstStripRenderPrivate {
 
   GstAggregatorPad *sink = nullptr;
   GstPadChainFunction chain = nullptr; /* GstAggregator's, of that pad */
-  GlContext gl;                        /* has a lock of its own */
+  OpenGl gl;                           /* has a lock of its own */
   StatsReporter reporter;              /* has locks of its own */
 
-  /* Of the aggregator's thread, and on the OpenGL thread while that one waits for it. */
+  /* Of the aggregator's thread. */
   GstCaps *input = nullptr; /* the last ones that were accepted */
   gstrange::RangeInfo info; /* of these */
   GstVideoInfo out;
-  GstGLContext *context = nullptr; /* of the renderer, while it has objects */
-  Renderer renderer;
+  bool is_gl = false;       /* out is of OpenGL memory */
+  bool lost_opengl = false; /* its context; no other one is made */
+  std::unique_ptr<RenderBackend> backend;
   rangecast::SurfaceScene scene;
   rangecast::ViewFit fit;
   std::array<rangecast::RangeImage, rangecast::kMaxViews> visible; /* selected by view-mask */

@@ -3,10 +3,10 @@
 // of streams.
 
 // rangecast::Shader
-const COVERING = 0, BLEND_VERTEX = 6, BLEND_FRAGMENT = 7, FILL = 9, SUM = 10;
+const COVERING = 0, VERTEX = 1, FRAGMENT = 2, FINISH = 3, SUM = 4;
 // Floats of rc_camera_picture: those of the picture, and of each layer.
 export const HEAD = 18, LAYER = 29;
-const VERTEX = 12; // bytes of rangecast::BlendVertex
+const VERTEX_BYTES = 12; // of rangecast::SurfaceVertex
 
 class Program {
   constructor (gl, vertex, fragment) {
@@ -57,8 +57,8 @@ export class Renderer {
   // Also after the browser has lost the context and given it back.
   start () {
     const gl = this.gl;
-    this.blend = this.program (BLEND_VERTEX, BLEND_FRAGMENT);
-    this.finish = this.program (COVERING, FILL);
+    this.blend = this.program (VERTEX, FRAGMENT);
+    this.finish = this.program (COVERING, FINISH);
     this.sums = []; // by number of cells - 1
     this.nothing = gl.createVertexArray ();
     this.objects = new Map (); // by view-id
@@ -75,7 +75,7 @@ export class Renderer {
     this.layers = layers.map (({ id, vertices }) => {
       const objects = this.objectsOf (id);
       this.uploadVertices (objects, vertices);
-      return { objects, count: vertices.length / VERTEX };
+      return { objects, count: vertices.length / VERTEX_BYTES };
     });
   }
 
@@ -87,9 +87,9 @@ export class Renderer {
       gl.bindBuffer (gl.ARRAY_BUFFER, objects.buffer);
       for (const place of [0, 1, 2])
         gl.enableVertexAttribArray (place);
-      gl.vertexAttribPointer (0, 2, gl.SHORT, false, VERTEX, 0);
-      gl.vertexAttribPointer (1, 1, gl.UNSIGNED_SHORT, false, VERTEX, 4);
-      gl.vertexAttribPointer (2, 4, gl.UNSIGNED_BYTE, true, VERTEX, 8);
+      gl.vertexAttribPointer (0, 2, gl.SHORT, false, VERTEX_BYTES, 0);
+      gl.vertexAttribPointer (1, 1, gl.UNSIGNED_SHORT, false, VERTEX_BYTES, 4);
+      gl.vertexAttribPointer (2, 4, gl.UNSIGNED_BYTE, true, VERTEX_BYTES, 8);
       this.objects.set (id, objects);
     }
     return this.objects.get (id);
@@ -206,7 +206,7 @@ export class Renderer {
     this.gl.bindVertexArray (null);
   }
 
-  // As BlendPainter::draw (); the framebuffer has been cleared.
+  // As SurfacePainter::draw (); the framebuffer has been cleared.
   drawBlended (picture, width, height) {
     const gl = this.gl, [count, columns, rows] = picture.subarray (4, 7);
     if (count === 0)
@@ -265,7 +265,6 @@ export class Renderer {
     this.unbindTextures ();
   }
 
-  // In one pass: SwiftShader takes longer for two, of which depth tests would spare it most of the second.
   finishPicture (picture, height) {
     const gl = this.gl, program = this.finish, [x, y, columns, rows] = picture.subarray (8, 12);
     program.use ();
@@ -273,6 +272,7 @@ export class Renderer {
     gl.uniform4i (program.at ('u_part'), x, y, x + columns - 1, y + rows - 1);
     gl.uniform3fv (program.at ('u_shift'), picture.subarray (12, 15));
     gl.uniform1i (program.at ('u_reach'), picture[15]);
+    gl.uniform1i (program.at ('u_smooth'), 1);
     gl.uniform4fv (program.at ('u_background'), picture.subarray (0, 4));
     gl.uniform3f (program.at ('u_shade'), 0, height, 0);
     this.cover ();

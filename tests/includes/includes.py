@@ -15,7 +15,7 @@ from collections import defaultdict
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
 SOURCES = (".c", ".cpp", ".h", ".hpp")
-CORE = ("base", "geometry", "neighbourcode", "alignment", "overlap", "surface", "sync")
+CORE = ("base", "geometry", "neighbourcode", "alignment", "overlap", "surface", "render", "sync")
 RIGFILE = ("rigfile",)
 OVERLAY = ("overlay",)
 VISION = ("opencv", "stereo", "roi", "registration", "calibration")

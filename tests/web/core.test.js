@@ -280,7 +280,7 @@ test ('shaders are for WebGL2', () => {
   const core = new Core (wasm);
   for (let i = 0; i < 18; i++)
     assert.match (core.text (core.call ('rc_shader', i)), /^#version 300 es\n[^]*void main/);
-  assert.equal (core.call ('rc_shader', 18), 0);
+  assert.equal (core.call ('rc_shader', 12), 0);
 });
 
 // The dashboard (rig.*) is a page of its own.

@@ -16,27 +16,33 @@ constexpr std::int64_t kMaxAtlasPixels = std::int64_t{1} << 25;
 } // namespace
 
 void
-make_blend_atlas (
-    std::span<const double> alignments, const Roi &covered, int max_side, BlendAtlas &to)
+choose_cells (std::span<const double> alignments, std::size_t cells, std::vector<std::size_t> &to)
+{
+  to.resize (alignments.size ());
+  for (std::size_t i = 0; i < alignments.size (); i++) {
+    std::size_t rank = 0;
+    for (std::size_t k = 0; k < alignments.size (); k++)
+      rank += alignments[k] > alignments[i] || (alignments[k] == alignments[i] && k < i);
+    to[i] = std::min (rank, cells - 1);
+  }
+}
+
+void
+make_blend_atlas (std::span<const double> alignments, std::size_t max_cells, const Roi &covered,
+    int max_side, BlendAtlas &to)
 {
   const std::int64_t pixels = std::int64_t{covered.width} * covered.height;
   const int columns = max_side / covered.width, rows = max_side / covered.height;
   const auto fitting = static_cast<std::size_t> (std::max<std::int64_t> (
       std::min (std::int64_t{columns} * rows, kMaxAtlasPixels / pixels), 1));
-  to.cells = std::min ({alignments.size (), kMaxBlendCells, fitting});
+  to.cells = std::clamp<std::size_t> (alignments.size (), 1, std::min (max_cells, fitting));
   const int count = static_cast<int> (to.cells), used = std::min (count, columns);
   to.width = used * covered.width;
   to.height = (count + used - 1) / std::max (used, 1) * covered.height;
   for (int i = 0; i < count; i++)
     to.from_picture[static_cast<std::size_t> (i)] = {
         i % used * covered.width - covered.x, i / used * covered.height - covered.y};
-  to.cell_of.resize (alignments.size ());
-  for (std::size_t i = 0; i < alignments.size (); i++) {
-    std::size_t rank = 0;
-    for (std::size_t k = 0; k < alignments.size (); k++)
-      rank += alignments[k] > alignments[i] || (alignments[k] == alignments[i] && k < i);
-    to.cell_of[i] = std::min (rank, to.cells - 1);
-  }
+  choose_cells (alignments, to.cells, to.cell_of);
 }
 
 LayerPlace
@@ -47,15 +53,11 @@ place_layer (const Mat4 &clip_from_pixel, const Mat4 &clip_from_world, double ga
 }
 
 double
-inside_gap (const Mat4 &clip_from_world, const View &view)
+layer_gap (StripMode mode, const Mat4 &clip_from_world, const View &view)
 {
-  return kInsideGap_m * std::clamp (-2 * view_alignment (clip_from_world, view), 0.0, 1.0);
-}
-
-double
-strip_gap (const Mat4 &clip_from_world, const View &view)
-{
-  return kViewGap_m * (1 - view_alignment (clip_from_world, view));
+  const double along = view_alignment (clip_from_world, view);
+  return mode == StripMode::kBlend ? kInsideGap_m * std::clamp (-2 * along, 0.0, 1.0)
+                                   : kViewGap_m * (1 - along);
 }
 
 LayerAngles

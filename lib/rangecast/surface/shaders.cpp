@@ -21,111 +21,12 @@ vec4 background (vec2 at)
 }
 )";
 
-const char *const kBackgroundFragment = R"(
-out vec4 fragment;
-void main ()
-{
-  fragment = background (gl_FragCoord.xy);
-}
-)";
-
 const char *const kCoveringVertex = R"(
-uniform float u_covering_depth;
 void main ()
 {
-  gl_Position = vec4 (gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, u_covering_depth, 1.0);
+  gl_Position = vec4 (gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
 }
 )";
-
-const char *const kColourFragment = R"(
-precision highp float;
-in vec3 v_colour;
-out vec4 fragment;
-void main ()
-{
-  fragment = vec4 (v_colour, 1.0);
-}
-)";
-
-/* `vec4 clip_position (vec2 at, float depth)` of a view's pixel `at` (column, row of the ROI),
- * moved away from the viewer. */
-const char *const kClipPosition = R"(
-precision highp float;
-uniform mat4 u_clip_from_pixel; /* column, row and 1, all times depth, and 1 */
-uniform vec2 u_behind;
-vec4 clip_position (vec2 at, float depth)
-{
-  vec4 position = u_clip_from_pixel * vec4 (at * depth, depth, 1.0);
-  /* the depth of what is u_behind.y metres farther, in the same place of the picture */
-  position.z -= u_behind.x / (max (position.w, 0.0) + u_behind.y);
-  return position;
-}
-)";
-
-/* A vertex is the number of its pixel, whose depth and colour are fetched here. Vertices beside
- * their pixel follow the surface of it and its neighbours. */
-const char *const kStripVertex = R"(
-precision highp int;
-precision highp usampler2D;
-uniform usampler2D u_depth;
-uniform sampler2D u_colour;
-uniform ivec2 u_size; /* of the ROI; beyond it the textures hold older frames */
-uniform float u_focal; /* pixels */
-uniform float u_unit;
-uniform float u_step;
-uniform float u_point_size;
-layout (location = 0) in uint a_vertex;
-out vec3 v_colour;
-
-#if WITH_OFFSETS
-/* The growth of depth from the neighbour before `p`, if that is on the same surface. */
-bool has_rise (ivec2 p, ivec2 way, float depth, out float rise)
-{
-  ivec2 from = clamp (p - way, ivec2 (0), u_size - 1);
-  float before = float (texelFetch (u_depth, from, 0).r);
-  rise = depth - before;
-  return from != p && before > 0.0 && abs (rise) <= u_step * depth;
-}
-/* Surfaces are extended beyond their edges at 45 degrees at most: where they are seen at a grazing
- * angle, depth rises too fast to be trusted, and the extensions would be spikes. */
-const float kMaxSlope = 1.0;
-float slope (ivec2 p, ivec2 way, float offset, float depth)
-{
-  float limit = kMaxSlope * depth / u_focal, rise;
-#if BOTH_SIDES
-  float fall;
-  bool has_before = has_rise (p, way, depth, rise), has_after = has_rise (p, -way, depth, fall);
-  if (has_before && has_after)
-    return (rise - fall) * 0.5;
-  return clamp (has_before ? rise : has_after ? -fall : 0.0, -limit, limit);
-#else
-  int outward = offset > 0.0 ? 1 : -1;
-  return has_rise (p, outward * way, depth, rise) ? clamp (float (outward) * rise, -limit, limit) : 0.0;
-#endif
-}
-#endif
-
-void main ()
-{
-  ivec2 pixel = ivec2 (int (a_vertex & 8191u), int (a_vertex >> 13u & 8191u));
-  vec2 at = vec2 (pixel);
-  float depth = float (texelFetch (u_depth, pixel, 0).r);
-#if WITH_OFFSETS
-  ivec2 place = ivec2 (int (a_vertex >> 26u & 7u), int (a_vertex >> 29u));
-  vec2 offset = vec2 (place - 3) * 0.25;
-  at += offset;
-  if (offset.x != 0.0)
-    depth += offset.x * slope (pixel, ivec2 (1, 0), offset.x, depth);
-  if (offset.y != 0.0)
-    depth += offset.y * slope (pixel, ivec2 (0, 1), offset.y, depth);
-#endif
-  gl_Position = clip_position (at, depth);
-  gl_PointSize = max (1.0, u_point_size * depth * u_unit / (u_focal * gl_Position.w));
-  v_colour = texelFetch (u_colour, pixel, 0).rgb;
-}
-)";
-
-/* ---- mode kBlend ---- */
 
 /* Fourth roots of weights, from 0 to 1, fit into 8 bits. The inside of a surface weighs so little
  * that a sum tells a pixel in which all views show an inside from one in which a view shows an
@@ -139,7 +40,10 @@ float weight_of (float root)
 }
 )";
 
-const char *const kBlendVertex = R"(
+const char *const kVertex = R"(
+uniform mat4 u_clip_from_pixel; /* column, row and 1, all times depth, and 1 */
+uniform vec2 u_behind; /* moves away from the viewer */
+uniform float u_point_size; /* at a depth of 1 depth unit and a distance of 1, pixels */
 layout (location = 0) in vec2 a_place; /* quarters of a pixel */
 layout (location = 1) in float a_depth;
 layout (location = 2) in vec4 a_colour; /* and the square root of the weight */
@@ -151,7 +55,10 @@ const float kMinAngle = 0.03; /* square root of the minimum weight; the cosine's
 void main ()
 {
   vec2 at = 0.25 * a_place;
-  gl_Position = clip_position (at, a_depth);
+  gl_Position = u_clip_from_pixel * vec4 (at * a_depth, a_depth, 1.0);
+  /* the depth of what is u_behind.y metres farther, in the same place of the picture */
+  gl_Position.z -= u_behind.x / (max (gl_Position.w, 0.0) + u_behind.y);
+  gl_PointSize = max (1.0, u_point_size * a_depth / gl_Position.w);
   vec3 ray = vec3 ((at - u_lens.xy) * u_lens.zw, 1.0);
   float along = dot (normalize (ray), normalize (ray * a_depth * u_unit - u_viewer));
   float root = a_colour.a * max (along * along * along, kMinAngle);
@@ -159,7 +66,7 @@ void main ()
 }
 )";
 
-const char *const kBlendFragment = R"(
+const char *const kFragment = R"(
 in vec4 v_colour;
 out vec4 fragment;
 void main ()
@@ -200,11 +107,10 @@ void main ()
 }
 )";
 
-/* Without FILL, gaps stay as they are, and are marked in the depth buffer. Outlines are smoothed
- * over the four neighbours, which also closes cracks of one pixel between what two views draw.
- * Where no camera saw the outside of a surface, so that the inside of one behind shows through
- * (beside a nose, round glasses), small gaps take the colours around them, from the farther
- * surfaces: what a nearer one hides is theirs. */
+/* Outlines are smoothed over the four neighbours, which also closes cracks of one pixel between
+ * what two views draw. Where no camera saw the outside of a surface, so that the inside of one
+ * behind shows through (beside a nose, round glasses), small gaps take the colours around them,
+ * from the farther surfaces: what a nearer one hides is theirs. */
 const char *const kFinishFragment = R"(
 precision highp int;
 precision highp sampler2D;
@@ -213,10 +119,10 @@ uniform sampler2D u_depths;
 uniform vec3 u_shift; /* a, b, g of DepthShift */
 uniform ivec4 u_part; /* first and last pixel */
 uniform int u_reach; /* pixels: wider gaps are not filled */
+uniform bool u_smooth; /* false: pixels are as they were drawn */
 out vec4 fragment;
 /* Minimum of an outside of which no cell but one of eight has anything, less rounding. */
 const float kOutside = 0.5 * kMinOutside;
-#if FILL
 /* Nothing is drawn outside of the part; what textures hold there is of other pictures. */
 ivec2 within (ivec2 at)
 {
@@ -267,62 +173,42 @@ vec4 fill (ivec2 at)
   }
   return vec4 (sum.rgb / sum.a, share);
 }
-#endif
 /* Colour times weight, and weight. */
 vec4 weighted (ivec2 at)
 {
-  vec4 texel = texelFetch (u_sum, at, 0);
+  vec4 texel = texelFetch (u_sum, within (at), 0);
   float weight = weight_of (texel.a);
   return vec4 (texel.rgb * weight, weight);
 }
 void main ()
 {
   vec4 ground = background (gl_FragCoord.xy);
-  ivec2 at = ivec2 (gl_FragCoord.xy), first = u_part.xy, last = u_part.zw;
+  ivec2 at = ivec2 (gl_FragCoord.xy);
   vec4 sum = weighted (at);
-  vec4 west = weighted (ivec2 (max (at.x - 1, first.x), at.y));
-  vec4 east = weighted (ivec2 (min (at.x + 1, last.x), at.y));
-  vec4 north = weighted (ivec2 (at.x, max (at.y - 1, first.y)));
-  vec4 south = weighted (ivec2 (at.x, min (at.y + 1, last.y)));
+  vec4 west = weighted (at - ivec2 (1, 0)), east = weighted (at + ivec2 (1, 0));
+  vec4 north = weighted (at - ivec2 (0, 1)), south = weighted (at + ivec2 (0, 1));
   vec4 weights = vec4 (west.a, east.a, north.a, south.a);
   float covered = dot (vec4 (greaterThan (weights, vec4 (0.0))), vec4 (1.0));
   /* a pixel that is drawn: from 1/2 where none beside it is; one that is not: up to 1/2, or a crack */
   float coverage = sum.a > 0.0 ? 0.5 + 0.125 * covered : covered > 2.0 ? 1.0 : 0.125 * covered;
+  if (!u_smooth)
+    coverage = sum.a > 0.0 ? 1.0 : 0.0;
   float heaviest = sum.a;
   if (sum.a <= 0.0) {
     sum = west + east + north + south;
     heaviest = max (max (west.a, east.a), max (north.a, south.a));
   }
   bool is_gap = heaviest > 0.0 && heaviest < weight_of (kOutside);
-#if FILL
   if (is_gap) {
     vec4 filled = fill (at);
     sum = vec4 (mix (sum.rgb / sum.a, filled.rgb, filled.a), 1.0);
   }
-#else
-  gl_FragDepth = is_gap ? 1.0 : 0.0;
-#endif
   float behind = (1.0 - coverage) * ground.a;
   float alpha = coverage + behind;
   vec3 colour = coverage * sum.rgb / max (sum.a, 1e-15) + behind * ground.rgb;
   fragment = alpha > 0.0 ? vec4 (colour / alpha, alpha) : ground;
 }
 )";
-
-/* Strips extend beyond their ends, away from them; rectangles on all four sides; points do not. */
-std::string
-strip_vertex_shader (bool with_offsets, bool both_sides)
-{
-  return "#define WITH_OFFSETS " + std::to_string (with_offsets) + "\n#define BOTH_SIDES " +
-         std::to_string (both_sides) + "\n" + kClipPosition + kStripVertex;
-}
-
-std::string
-finish_shader (bool fill)
-{
-  return "#define FILL " + std::to_string (fill) + kBackgroundFunction + kBlendWeights +
-         kFinishFragment;
-}
 
 } // namespace
 
@@ -332,24 +218,12 @@ shader_source (Shader shader)
   switch (shader) {
     case Shader::kCoveringVertex:
       return kCoveringVertex;
-    case Shader::kColourFragment:
-      return kColourFragment;
-    case Shader::kBackgroundFragment:
-      return std::string (kBackgroundFunction) + kBackgroundFragment;
-    case Shader::kStripVertex:
-      return strip_vertex_shader (true, false);
-    case Shader::kRectangleVertex:
-      return strip_vertex_shader (true, true);
-    case Shader::kPointVertex:
-      return strip_vertex_shader (false, false);
-    case Shader::kBlendVertex:
-      return std::string (kBlendWeights) + kClipPosition + kBlendVertex;
-    case Shader::kBlendFragment:
-      return std::string (kBlendWeights) + kBlendFragment;
+    case Shader::kVertex:
+      return std::string (kBlendWeights) + kVertex;
+    case Shader::kFragment:
+      return std::string (kBlendWeights) + kFragment;
     case Shader::kFinishFragment:
-      return finish_shader (false);
-    case Shader::kFillFragment:
-      return finish_shader (true);
+      return std::string (kBackgroundFunction) + kBlendWeights + kFinishFragment;
     case Shader::kSumFragment:
       break;
   }

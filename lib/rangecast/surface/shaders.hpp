@@ -10,20 +10,14 @@ namespace rangecast {
 
 /** Shaders, each of one stage. */
 enum class Shader : unsigned {
-  kCoveringVertex,     ///< three vertices without attributes that cover the viewport
-  kColourFragment,     ///< the colour of v_colour
-  kBackgroundFragment, ///< background-shade
-  kStripVertex,        ///< StripVertex of mode kStrips
-  kRectangleVertex,    ///< of mode kRectangles
-  kPointVertex,        ///< of mode kPoints
-  kBlendVertex,        ///< BlendVertex, pass 1: each view into its cell
-  kBlendFragment,
-  kFinishFragment, ///< pass 3: the picture; depth is 1 where pass 4 is needed, else 0
-  kFillFragment,   ///< pass 4: the picture with small gaps filled
+  kCoveringVertex, ///< three vertices without attributes that cover the viewport
+  kVertex,         ///< SurfaceVertex, pass 1: each view into its cell
+  kFragment,
+  kFinishFragment, ///< pass 3: the picture, with smooth outlines and small gaps filled
   kSumFragment,    ///< pass 2: colours of one cell added up by weight; see sum_shader()
 };
 
-/** Greatest number of cells that pass 2 of mode kBlend adds up. */
+/** Greatest number of cells that pass 2 adds up. */
 inline constexpr std::size_t kMaxBlendCells = 8;
 inline constexpr std::size_t kShaders =
     static_cast<std::size_t> (Shader::kSumFragment) + kMaxBlendCells;

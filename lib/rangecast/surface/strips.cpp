@@ -462,22 +462,23 @@ build_strips (const ConstRangeImage &image, const StripSettings &settings,
 }
 
 void
-make_blend_vertices (const ConstRangeImage &image, const BlendPlanes &planes,
-    std::span<const StripVertex> strips, int reach, std::vector<BlendVertex> &to)
+make_vertices (const ConstRangeImage &image, const BlendPlanes *planes,
+    std::span<const StripVertex> strips, int reach, std::vector<SurfaceVertex> &to)
 {
   std::array<std::int16_t, 8> offsets; /* by StripPlace */
   for (int i = 0; i < 8; i++)
     offsets[static_cast<std::size_t> (i)] = static_cast<std::int16_t> (
-        i == kBehind ? 0 : std::clamp (i - int (kCentre), -reach, reach));
+        planes && i == kBehind ? 0 : std::clamp (i - int (kCentre), -reach, reach));
   to.resize (strips.size ());
   for (std::size_t i = 0; i < strips.size (); i++) {
     const StripVertex v = strips[i];
     const int x = static_cast<int> (v & 8191), y = static_cast<int> (v >> 13 & 8191);
     const std::uint32_t across = v >> 26 & 7, down = v >> 29;
-    const std::size_t at = static_cast<std::size_t> (y) * static_cast<std::size_t> (planes.width) +
-                           static_cast<std::size_t> (x);
-    Rgbx colour = planes.colour[at];
-    colour.x = across == kBehind ? 0 : planes.weight[at];
+    const std::size_t at =
+        static_cast<std::size_t> (y) * static_cast<std::size_t> (image.depth.width) +
+        static_cast<std::size_t> (x);
+    Rgbx colour = planes ? planes->colour[at] : image.colour.at (x, y);
+    colour.x = !planes ? 255 : across == kBehind ? 0 : planes->weight[at];
     to[i] = {static_cast<std::int16_t> (4 * x + offsets[across]),
         static_cast<std::int16_t> (4 * y + offsets[down]), image.depth.at (x, y), 0, colour};
   }

@@ -38,13 +38,11 @@ inline constexpr double kMergeColour = 1.5;       ///< levels
 inline constexpr double kMergeCopyDepth = 0.004;
 inline constexpr double kMergeCopyColour = 12;
 
-/** A vertex that the GPU unprojects itself: the pixel whose depth and colour it has, and where
- *  about that pixel it lies. Bits 0-12: column, 13-25: row (both of the ROI), 26-28: horizontal,
- *  29-31: vertical StripPlace. */
+/** A vertex by the pixel whose depth and colour it has, and by where about that pixel it lies. Bits
+ *  0-12: column, 13-25: row (both of the ROI), 26-28: horizontal, 29-31: vertical StripPlace. */
 using StripVertex = std::uint32_t;
 
-/** Offset of a vertex from its pixel, along the surface of the pixel and its neighbours: quarters
- * of a pixel, counted from 3. */
+/** Offset of a vertex from its pixel, at the pixel's depth: quarters of a pixel, counted from 3. */
 enum StripPlace : std::uint32_t {
   kFarBefore = 0, ///< three quarters: an end of a band, so that it meets what another camera saw
   kBefore = 1,    ///< half a pixel left or up: the edge of the pixel
@@ -54,12 +52,6 @@ enum StripPlace : std::uint32_t {
   kFarAfter = 6,
   kFullAfter = 7, ///< a whole pixel: behind a nearer surface that begins there
 };
-/** The offset in pixels. */
-constexpr float
-strip_offset (StripPlace place)
-{
-  return 0.25f * (static_cast<float> (place) - 3);
-}
 /** Greatest number of pixels in a row that one piece replaces. */
 inline constexpr int kMaxPieceLength = 32;
 /** Greatest number of pixels, in a row or a column, behind which a hidden surface is bridged. */
@@ -108,19 +100,19 @@ struct StripResult {
 void build_strips (const ConstRangeImage &image, const StripSettings &settings,
     std::vector<StripVertex> &to, StripResult &result, const BlendPlanes *planes = nullptr);
 
-/** A vertex of mode kBlend with all its attributes. */
-struct BlendVertex {
+/** A vertex with all its attributes. */
+struct SurfaceVertex {
   std::int16_t x, y;    ///< quarters of a pixel; (0, 0) is the centre of the ROI's first pixel
   std::uint16_t depth;  ///< depth units
   std::uint16_t unused; ///< 0
   Rgbx colour;          ///< x is the square root of the weight, 255 = 1; 0: the minimum weight
 };
 
-/** Makes vertices of those that build_strips() made in mode kBlend.
- *  @param planes   of the image
+/** Makes vertices of those that build_strips() made.
+ *  @param planes   of the image, or nullptr: all weights are 1
  *  @param reach    quarters of a pixel that a vertex may lie beside its own, at most
  *  @param[out] to  replaced; keeps its memory */
-void make_blend_vertices (const ConstRangeImage &image, const BlendPlanes &planes,
-    std::span<const StripVertex> strips, int reach, std::vector<BlendVertex> &to);
+void make_vertices (const ConstRangeImage &image, const BlendPlanes *planes,
+    std::span<const StripVertex> strips, int reach, std::vector<SurfaceVertex> &to);
 
 } // namespace rangecast

@@ -56,14 +56,14 @@ SurfaceScene::build_view (std::size_t which, const SurfaceSettings &settings)
   const ConstRangeImage &image = views_[which].image;
   const bool blends = settings.strips.mode == StripMode::kBlend;
   const bool is_reduced = reduced_ >> which & 1;
-  const int reach = is_reduced ? 1 : 2; /* beyond the last pixels, quarters of a pixel */
+  /* Beyond the last pixels, quarters of a pixel. */
+  const int reach = is_reduced ? 1 : blends ? 2 : 4;
   results_[which] = {};
   if (blends)
     make_blend_planes ({views_.data (), count_}, which, settings.strips.depth_step, memory.planes);
-  build_strips (
-      image, settings.strips, memory.vertices, results_[which], blends ? &memory.planes : nullptr);
-  if (blends)
-    make_blend_vertices (image, memory.planes, memory.vertices, reach, memory.blend_vertices);
+  const BlendPlanes *planes = blends ? &memory.planes : nullptr;
+  build_strips (image, settings.strips, memory.strips, results_[which], planes);
+  make_vertices (image, planes, memory.strips, reach, memory.vertices);
   if (is_reduced)
     results_[which].points = memory.reduced.points ();
 }
@@ -75,7 +75,6 @@ SurfaceScene::build (std::span<const RangeImage> images, const SurfaceSettings &
   const std::uint64_t reduced = views_against (images, settings, orbit);
   const bool built = same_frame_set && reduced == reduced_ && complete_ &&
                      count_ == images.size () && built_with_ == settings.serial;
-  const bool blends = settings.strips.mode == StripMode::kBlend;
   complete_ = false; /* what follows may throw */
   count_ = images.size ();
   reduced_ = reduced;
@@ -95,13 +94,8 @@ SurfaceScene::build (std::span<const RangeImage> images, const SurfaceSettings &
       views_[i] = memory_[i].reduced.reduce (views_[i]);
   }
   in_parallel (built ? 0 : images.size (), 0, [&] (std::size_t i) { build_view (i, settings); });
-  for (std::size_t i = 0; i < images.size (); i++) {
-    layers_[i] = {views_[i].image, views_[i].view, {}};
-    if (blends)
-      layers_[i].blend_vertices = memory_[i].blend_vertices;
-    else
-      layers_[i].vertices = memory_[i].vertices;
-  }
+  for (std::size_t i = 0; i < images.size (); i++)
+    layers_[i] = {views_[i].image, views_[i].view, memory_[i].vertices};
   if (!built) {
     hull_.clear ();
     for (const SurfaceLayer &layer : layers ())

@@ -14,12 +14,11 @@
 
 namespace rangecast {
 
-/** One view of a frame set as OpenGL draws it. */
+/** One view of a frame set as it is drawn: a triangle strip, or points. */
 struct SurfaceLayer {
   ConstRangeImage image;
   const View *view;
-  std::span<const StripVertex> vertices;
-  std::span<const BlendVertex> blend_vertices = {}; ///< mode kBlend, instead
+  std::span<const SurfaceVertex> vertices;
 };
 
 /** What the vertices of a scene depend on beside the frame set. */
@@ -53,21 +52,17 @@ public:
   /** Changes with each build() that does not keep everything; never 0. */
   [[nodiscard]] std::uint64_t serial () const { return serial_; }
   [[nodiscard]] std::span<const SurfaceLayer> layers () const { return {layers_.data (), count_}; }
-  /** Counters of a layer of the last build(), and its vertices before they got attributes. */
+  /** Counters of a layer of the last build(). */
   [[nodiscard]] const StripResult &result (std::size_t layer) const { return results_[layer]; }
-  [[nodiscard]] std::size_t vertices (std::size_t layer) const
-  {
-    return memory_[layer].vertices.size ();
-  }
   /** World points around all points of the frame set. */
   [[nodiscard]] std::span<const Vec3> hull () const { return hull_; }
 
 private:
   struct ViewMemory {
-    std::vector<StripVertex> vertices;
+    std::vector<StripVertex> strips;
+    std::vector<SurfaceVertex> vertices;
     std::vector<Rgbx> tinted;
     BlendPlanes planes;
-    std::vector<BlendVertex> blend_vertices;
     ReducedView reduced;
   };
   std::uint64_t views_against (std::span<const RangeImage> images, const SurfaceSettings &settings,

@@ -107,7 +107,8 @@ write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from
     alignments.push_back (rangecast::view_alignment (clip_from_world, layer.view));
   const bool any = !covered.empty () && !alignments.empty ();
   if (any)
-    rangecast::make_blend_atlas (alignments, covered, std::max ({max_side, width, height}), atlas);
+    rangecast::make_blend_atlas (alignments, rangecast::kMaxBlendCells, covered,
+        std::max ({max_side, width, height}), atlas);
   to.clear ();
   write (to, {(colour >> 16) / 255.0, (colour >> 8 & 255) / 255.0, (colour & 255) / 255.0, 1});
   write (to, {any ? double (atlas.cells) : 0, double (atlas.width), double (atlas.height), 0});
@@ -117,9 +118,9 @@ write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from
                  double (rangecast::mirrors (clip_from_world)), double (scene.layers.size ())});
   for (std::size_t i = 0; i < scene.layers.size (); i++) {
     const auto &[view, roi] = scene.layers[i];
-    const rangecast::LayerPlace place =
-        rangecast::place_layer (rangecast::clip_from_pixel (clip_from_world, view, roi),
-            clip_from_world, rangecast::inside_gap (clip_from_world, view));
+    const rangecast::LayerPlace place = rangecast::place_layer (
+        rangecast::clip_from_pixel (clip_from_world, view, roi), clip_from_world,
+        rangecast::layer_gap (rangecast::StripMode::kBlend, clip_from_world, view));
     const rangecast::LayerAngles angles = rangecast::layer_angles (clip_from_world, view, roi);
     const std::size_t cell = any ? atlas.cell_of[i] : 0;
     to.insert (to.end (), place.clip_from_pixel.begin (), place.clip_from_pixel.end ());

@@ -100,7 +100,7 @@ RC_EXPORT (rc_layers) std::uint32_t rc_layers ()
   return current ? std::uint32_t (s.surfaces.layers ().size ()) : 0;
 }
 
-/** @return a record of a layer: view-id, address and bytes of its vertices (BlendVertex); nullptr
+/** @return a record of a layer: view-id, address and bytes of its vertices (SurfaceVertex); nullptr
  * if there is none */
 RC_EXPORT (rc_layer) const double *rc_layer (std::uint32_t index)
 {
@@ -109,8 +109,8 @@ RC_EXPORT (rc_layer) const double *rc_layer (std::uint32_t index)
     return nullptr;
   const SurfaceLayer &layer = scene ().surfaces.layers ()[index];
   record[0] = double (layer.view->id);
-  record[1] = double (reinterpret_cast<std::uintptr_t> (layer.blend_vertices.data ()));
-  record[2] = double (layer.blend_vertices.size_bytes ());
+  record[1] = double (reinterpret_cast<std::uintptr_t> (layer.vertices.data ()));
+  record[2] = double (layer.vertices.size_bytes ());
   return record;
 }
 

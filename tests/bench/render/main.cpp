@@ -32,7 +32,8 @@ const char *const kUsage =
     "nearest\n"
     "camera, four places each. Depth is exact; or stereo: matched, freed of the background, coded\n"
     "and decoded, filtered by the cylinder, as in the demo; or noise: exact and 3 mm of smooth\n"
-    "noise. Mode strips-merged: strips of exact depth through the neighbour code, whose runs of\n"
+    "noise. Modes with -software draw on the CPU, all others with OpenGL. Mode strips-merged: "
+    "strips of exact depth through the neighbour code, whose runs of\n"
     "equal pixels (colour threshold 8) become longer pieces; blend-held: strips of a frame set "
     "that\n"
     "is there already, as the second eye's, or while a stream stalls. Peers: grid, a plain grid\n"
@@ -94,7 +95,7 @@ struct Job {
   std::string json, pictures, mode, depth; /* mode, depth: empty, or the only one */
   std::vector<RenderRow> rows;
   GstGLContext *context = nullptr;
-  StripPainter painter, held_painter;
+  SurfacePainter painter, held_painter;
   Status status;
 };
 
@@ -113,14 +114,15 @@ orbit_at (double azimuth_deg)
   return orbit;
 }
 
-RenderPicture
+SurfacePicture
 make_picture (const FrameSet &set, double azimuth_deg)
 {
   const SceneFrame frame = scene_frame (set.rig);
   std::vector<Vec3> hull;
   for (const RangeImage &image : set.images)
     append_hull (image, *set.rig.find (image.view_id), hull);
-  RenderPicture picture = {};
+  SurfacePicture picture = {};
+  picture.background[3] = 0;
   const Orbit orbit = orbit_at (azimuth_deg);
   picture.clip_from_world =
       orbit_matrices (frame, orbit, double (kWidth) / kHeight, true, {}, hull).clip_from_world;
@@ -139,14 +141,16 @@ make_ways (Job &job, Kind &kind)
   const auto strips = [&] (const char *name, const FrameSet &set, StripMode mode) {
     StripSettings settings;
     settings.mode = mode;
-    kind.ways.push_back (make_strip_way (name, job.painter, set, settings));
+    kind.ways.push_back (make_strip_way (name, &job.painter, set, settings));
+    kind.ways.push_back (make_strip_way (std::string (name) + "-software", nullptr, set, settings));
   };
   for (const auto &[name, mode] : kModes)
     strips (name, kind.set, mode);
   if (!kind.coded.images.empty ()) { /* of exact depth */
     strips ("strips-merged", kind.coded, StripMode::kStrips);
     StripSettings settings;
-    kind.ways.push_back (make_strip_way ("blend-held", job.held_painter, kind.set, settings, true));
+    kind.ways.push_back (
+        make_strip_way ("blend-held", &job.held_painter, kind.set, settings, true));
   }
   for (auto [name, peer] : {std::pair{"grid", Peer::kGrid}, {"point-cloud", Peer::kPoints}}) {
     GError *error = nullptr;
@@ -184,7 +188,7 @@ void
 time_all (
     Job &job, const Kind &kind, Target &target, double azimuth_deg, std::vector<RenderRow> &rows)
 {
-  const RenderPicture picture = make_picture (kind.set, azimuth_deg);
+  const SurfacePicture picture = make_picture (kind.set, azimuth_deg);
   std::vector<std::vector<double>> processor (rows.size ()), total (rows.size ());
   for (int round = -1; round < job.rounds; round++) /* the first one allocates */
     for (std::size_t i = 0; i < rows.size (); i++) {
@@ -214,7 +218,7 @@ judge (Job &job, const Kind &kind, Target &target, const std::vector<Shot> &shot
   for (const Shot &shot : shots) {
     kind.ways[i]->build (orbit_at (shot.azimuth_deg));
     target.draw (*kind.ways[i], make_picture (kind.set, shot.azimuth_deg));
-    const cv::Mat rgba = target.read ();
+    const cv::Mat rgba = target.read (*kind.ways[i]);
     score.add (shot, rgba);
     const std::string path = job.pictures + "/" + row.depth + "-" + row.mode + "-" +
                              std::to_string (int (shot.azimuth_deg)) + ".png";
@@ -327,7 +331,8 @@ main (int argc, char **argv)
   options.text ("--pictures", job.pictures);
   if (const auto status = options.parse (argc, argv))
     return *status;
-  std::vector<const char *> modes{"strips-merged", "blend-held", "grid", "point-cloud"};
+  std::vector<const char *> modes{"strips-merged", "strips-merged-software", "blend-held", "grid",
+      "point-cloud", "blend-software", "strips-software", "rectangles-software", "points-software"};
   for (const auto &[name, mode] : kModes)
     modes.push_back (name);
   if (!is_one_of ("--mode", job.mode, modes) ||

@@ -4,7 +4,6 @@
 #include <rangecast/base/parallel.hpp>
 #include <rangecast/surface/orbit.hpp>
 
-#include "render/glhelpers.hpp"
 #include "ways.hpp"
 
 using namespace rangecast;
@@ -24,6 +23,16 @@ void main ()
   gl_Position = u_clip_from_world * vec4 (a_position, 1.0);
   gl_PointSize = max (1.0, u_point_size / gl_Position.w);
   v_colour = a_colour.rgb;
+}
+)";
+
+const char *const kFragmentShader = R"(
+precision highp float;
+in vec3 v_colour;
+out vec4 fragment;
+void main ()
+{
+  fragment = vec4 (v_colour, 1.0);
 }
 )";
 
@@ -56,8 +65,7 @@ public:
 
   bool start (GstGLContext *context, GError **error)
   {
-    shader_ = make_shader (context, kVertexShader,
-        rangecast::shader_source (rangecast::Shader::kColourFragment).c_str (), error);
+    shader_ = make_shader (context, kVertexShader, kFragmentShader, error);
     if (!shader_)
       return false;
     gl_ = context->gl_vtable;
@@ -88,7 +96,7 @@ public:
     });
   }
 
-  guint64 draw (const RenderPicture &picture) override
+  guint64 draw (const SurfacePicture &picture) override
   {
     begin (picture);
     guint64 bytes = 0;
@@ -122,7 +130,7 @@ public:
   }
 
 private:
-  void begin (const RenderPicture &picture)
+  void begin (const SurfacePicture &picture)
   {
     gl_->Viewport (0, 0, picture.width, picture.height);
     gl_->ClearColor (0, 0, 0, 0);

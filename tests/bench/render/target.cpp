@@ -26,11 +26,13 @@ Target::~Target ()
 }
 
 guint64
-Target::draw (Way &way, const RenderPicture &picture)
+Target::draw (Way &way, const rangecast::SurfacePicture &picture)
 {
+  if (way.own_picture ())
+    return way.draw (picture);
   struct Job {
     Way &way;
-    const RenderPicture &picture;
+    const rangecast::SurfacePicture &picture;
     guint64 bytes;
   } job = {way, picture, 0};
   GstMapInfo map; /* so that reading it back knows of the change */
@@ -49,8 +51,10 @@ Target::draw (Way &way, const RenderPicture &picture)
 }
 
 cv::Mat
-Target::read () const
+Target::read (const Way &way) const
 {
+  if (const cv::Mat *own = way.own_picture ())
+    return own->clone ();
   GstMapInfo map;
   gst_memory_map (GST_MEMORY_CAST (memory_), &map, GST_MAP_READ);
   const cv::Mat rgba = cv::Mat (kHeight, kWidth, CV_8UC4, map.data).clone ();

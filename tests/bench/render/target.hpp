@@ -17,9 +17,9 @@ public:
 
   [[nodiscard]] bool usable () const { return memory_ && framebuffer_; }
   /** Draws once. @return bytes uploaded; the GPU has finished */
-  guint64 draw (Way &way, const RenderPicture &picture);
-  /** CV_8UC4, RGBA */
-  [[nodiscard]] cv::Mat read () const;
+  guint64 draw (Way &way, const rangecast::SurfacePicture &picture);
+  /** What a way drew last; CV_8UC4, RGBA */
+  [[nodiscard]] cv::Mat read (const Way &way) const;
 
 private:
   GstGLContext *context_;

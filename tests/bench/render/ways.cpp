@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "ways.hpp"
 
-#include <rangecast/surface/surface_scene.hpp>
+#include <rangecast/render/software_renderer.hpp>
 
 using namespace rangecast;
 
@@ -10,7 +10,7 @@ namespace {
 
 class StripWay : public Way {
 public:
-  StripWay (std::string name, StripPainter &painter, const FrameSet &set,
+  StripWay (std::string name, SurfacePainter *painter, const FrameSet &set,
       const StripSettings &settings, bool held)
       : Way (std::move (name)), painter_ (painter), set_ (set), held_ (held)
   {
@@ -23,28 +23,40 @@ public:
     scene_.build (set_.images, settings_, orbit, held_);
     vertices_ = triangles_ = 0;
     for (std::size_t i = 0; i < scene_.layers ().size (); i++) {
-      vertices_ += scene_.vertices (i);
+      vertices_ += scene_.layers ()[i].vertices.size ();
       triangles_ += scene_.result (i).triangles;
     }
   }
 
-  guint64 draw (const RenderPicture &picture) override
+  guint64 draw (const SurfacePicture &picture) override
   {
-    RenderPicture own = picture;
+    SurfacePicture own = picture;
     own.mode = settings_.strips.mode;
-    own.depth_step = settings_.strips.depth_step;
+    if (!painter_) {
+      pixels_.create (picture.height, picture.width, CV_8UC4);
+      renderer_.draw (own, scene_.layers (),
+          {reinterpret_cast<Rgbx *> (pixels_.data), pixels_.cols, pixels_.rows,
+              std::ptrdiff_t (pixels_.step)});
+      return 0;
+    }
     const bool uploads = uploaded_ != scene_.serial () || !held_;
-    const guint64 bytes = uploads ? painter_.upload (scene_.layers ()) : 0;
+    const guint64 bytes = uploads ? painter_->upload (scene_.layers ()) : 0;
     uploaded_ = scene_.serial ();
-    painter_.draw (own, scene_.layers ());
+    painter_->draw (own, scene_.layers ());
     return bytes;
   }
 
+  [[nodiscard]] const cv::Mat *own_picture () const override
+  {
+    return painter_ ? nullptr : &pixels_;
+  }
   [[nodiscard]] std::size_t vertices () const override { return vertices_; }
   [[nodiscard]] std::size_t triangles () const override { return triangles_; }
 
 private:
-  StripPainter &painter_;
+  SurfacePainter *const painter_;
+  SoftwareRenderer renderer_;
+  cv::Mat pixels_;
   const FrameSet &set_;
   const bool held_;
   SurfaceSettings settings_;
@@ -56,7 +68,7 @@ private:
 } // namespace
 
 std::unique_ptr<Way>
-make_strip_way (std::string name, StripPainter &painter, const FrameSet &set,
+make_strip_way (std::string name, SurfacePainter *painter, const FrameSet &set,
     const StripSettings &settings, bool held)
 {
   return std::make_unique<StripWay> (std::move (name), painter, set, settings, held);

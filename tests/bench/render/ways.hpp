@@ -4,8 +4,10 @@
 #include <memory>
 #include <string>
 
+#include <opencv2/core.hpp>
+
 #include "frames.hpp"
-#include "render/strippainter.hpp"
+#include "render/surfacepainter.hpp"
 
 namespace bench {
 
@@ -19,8 +21,11 @@ public:
 
   /** @param orbit  from where it will be drawn */
   virtual void build (const rangecast::Orbit &orbit) = 0;
-  /** Draws into the bound framebuffer, in the GL thread. @return bytes uploaded */
-  virtual guint64 draw (const RenderPicture &picture) = 0;
+  /** Draws into the bound framebuffer, in the GL thread, or in software into own_picture().
+   *  @return bytes uploaded */
+  virtual guint64 draw (const rangecast::SurfacePicture &picture) = 0;
+  /** CV_8UC4, RGBA; nullptr: draws with OpenGL */
+  [[nodiscard]] virtual const cv::Mat *own_picture () const { return nullptr; }
   [[nodiscard]] virtual std::size_t vertices () const = 0;
   [[nodiscard]] virtual std::size_t triangles () const = 0;
   [[nodiscard]] const std::string &name () const { return name_; }
@@ -30,9 +35,10 @@ private:
 };
 
 /** striprender's own, in one of its modes. The frame set must stay.
- *  @param held  only the first picture is of a new frame set: later ones are what a stream that
- *               stalls, or the second eye, costs. Nobody else may use that painter. */
-std::unique_ptr<Way> make_strip_way (std::string name, StripPainter &painter, const FrameSet &set,
+ *  @param painter  nullptr: in software
+ *  @param held     only the first picture is of a new frame set: later ones are what a stream that
+ *                  stalls, or the second eye, costs. Nobody else may use that painter. */
+std::unique_ptr<Way> make_strip_way (std::string name, SurfacePainter *painter, const FrameSet &set,
     const rangecast::StripSettings &settings, bool held = false);
 
 /** What others do, from a vertex buffer of places and colours that the CPU unprojects into: one GL

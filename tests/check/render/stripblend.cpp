@@ -197,4 +197,4 @@ stripblend_suite (void)
   return s;
 }
 
-RENDER_CHECK_MAIN (stripblend);
+GST_CHECK_MAIN (stripblend);

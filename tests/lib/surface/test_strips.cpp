@@ -35,6 +35,13 @@ struct Drawing {
   ConstRangeImage image () { return {0, {0, 0, width, height}, depth.view (), colour.view (), 0}; }
 };
 
+/* The offset in pixels. */
+constexpr float
+strip_offset (StripPlace place)
+{
+  return 0.25f * (static_cast<float> (place) - 3);
+}
+
 struct Vertex {
   int x, y;
   StripPlace horizontal, vertical;

@@ -147,7 +147,7 @@ TEST (BlendAtlas, cells_lie_beside_each_other_and_views_of_the_viewers_direction
       for (std::size_t i = 0; i < views; i++)
         alignments.push_back (0.1 * double (i)); /* the last one looks most as the viewer does */
       BlendAtlas atlas;
-      make_blend_atlas (alignments, covered, max_side, atlas);
+      make_blend_atlas (alignments, kMaxBlendCells, covered, max_side, atlas);
       ASSERT_GE (atlas.cells, 1u);
       ASSERT_LE (atlas.cells, std::min (views, kMaxBlendCells));
       EXPECT_LE (std::max (atlas.width, atlas.height), std::max (max_side, covered.width));
@@ -185,7 +185,7 @@ TEST (ReducedView, every_second_pixel_stays_where_it_was)
     }
 }
 
-TEST (BlendVertices, carry_their_pixel_and_reach_no_farther_than_asked)
+TEST (SurfaceVertices, carry_their_pixel_and_reach_no_farther_than_asked)
 {
   const View view = camera ();
   const Patch patch;
@@ -197,8 +197,8 @@ TEST (BlendVertices, carry_their_pixel_and_reach_no_farther_than_asked)
   StripResult result;
   build_strips (image, {}, strips, result, &planes);
   for (const int reach : {0, 1, 2}) {
-    std::vector<BlendVertex> vertices;
-    make_blend_vertices (image, planes, strips, reach, vertices);
+    std::vector<SurfaceVertex> vertices;
+    make_vertices (image, &planes, strips, reach, vertices);
     ASSERT_EQ (vertices.size (), strips.size ());
     int farthest = 0;
     for (std::size_t i = 0; i < strips.size (); i++) {
