@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 # Source it, in any POSIX shell: makes the elements, programs and libraries of the build tree known to GStreamer, Python and
-# pkg-config (installed ones are found without it) and selects OpenGL without a display where there is none. Reports a missing or
-# incomplete build. Shells other than Bash and zsh do not tell where it lies: source it in the top folder of the tree there.
+# pkg-config (installed ones are found without it). Reports a missing or incomplete build. Shells other than Bash and zsh do not tell where it lies: source it in the top folder of the tree there.
 
 rangecast_top=${BASH_SOURCE:-$0}
 rangecast_top=$(cd "$(dirname "$rangecast_top")/.." && pwd)
@@ -20,8 +19,5 @@ if [ -d "$rangecast_top/build/gst" ]; then
     echo "env.sh: $rangecast_top/build is incomplete: run $rangecast_top/setup.sh" >&2 # as setup.sh --demo builds it
 elif ! gst-inspect-1.0 --exists --atleast-version=0.0.0 neighbourcodeenc 2>/dev/null; then # it asks for 1.0 otherwise
   echo "env.sh: gst-rangecast is neither built nor installed: run $rangecast_top/setup.sh" >&2
-fi
-if [ -z "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
-  export GST_GL_PLATFORM="${GST_GL_PLATFORM:-egl}" GST_GL_WINDOW="${GST_GL_WINDOW:-egl-device}"
 fi
 unset rangecast_top

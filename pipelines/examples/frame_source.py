@@ -4,7 +4,7 @@
 capture(), which draws a waving surface, and cameras().
 
 usage: frame_source.py [--sink LAUNCH] [--frames N] [--fps FPS] [--live]
-       LAUNCH: elements that take video/x-range, by default "rangealign ! striprender ! glimagesink"
+       LAUNCH: elements that take video/x-range, by default "rangealign ! striprender ! videoconvert ! autovideosink"
 needs: PyGObject, NumPy, the Gst overrides (Debian: python3-gst-1.0 python3-numpy); docs/guide/python.md
 """
 import argparse
@@ -48,7 +48,7 @@ def capture(number):
 
 def main():
     parser = argparse.ArgumentParser(description="Feeds NumPy arrays to a pipeline.")
-    parser.add_argument("--sink", default="rangealign ! striprender ! glimagesink", metavar="LAUNCH")
+    parser.add_argument("--sink", default="rangealign ! striprender ! videoconvert ! autovideosink", metavar="LAUNCH")
     parser.add_argument("--frames", type=int, default=300, metavar="N")
     parser.add_argument("--fps", type=Fraction, default=Fraction(30))
     parser.add_argument("--live", action="store_true", help="time stamps of arrival instead of N / FPS")

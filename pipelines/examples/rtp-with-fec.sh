@@ -6,4 +6,4 @@ exec gst-launch-1.0 avatartestsrc is-live=true range-person-only=true ! neighbou
   ! rtpulpfecenc percentage=25 pt=122 ! identity drop-probability=0.03 ! udpsink host=127.0.0.1 port=7000 sync=false \
   udpsrc port=7000 buffer-size=4194304 caps=$caps ! rtpneighbourcodeguard ! rtpstorage size-time=500000000 \
   ! rtpjitterbuffer latency=100 do-lost=true ! rtpulpfecdec pt=122 ! rtpneighbourcodedepay ! neighbourcodedec ! rangealign \
-  ! striprender ! 'video/x-raw(memory:GLMemory),width=640,height=480' ! glimagesink
+  ! striprender ! 'video/x-raw,width=640,height=480' ! videoconvert ! autovideosink

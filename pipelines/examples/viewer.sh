@@ -4,4 +4,4 @@
 caps=application/x-rtp,media=video,clock-rate=90000,encoding-name=X-NEIGHBOUR-CODE,payload=96
 exec gst-launch-1.0 udpsrc port=7000 buffer-size=4194304 caps=$caps ! rtpneighbourcodeguard ! rtpjitterbuffer latency=30 \
   ! rtpneighbourcodedepay ! queue leaky=downstream max-size-buffers=4 ! neighbourcodedec ! rangealign \
-  ! striprender ! 'video/x-raw(memory:GLMemory),width=640,height=480' ! glimagesink sync=false
+  ! striprender ! 'video/x-raw,width=640,height=480' ! videoconvert ! autovideosink sync=false

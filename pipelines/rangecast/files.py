@@ -12,7 +12,6 @@ from .hosts import size_caps
 from .images import TYPES, is_pattern, list_images, make_folder, play_images, read_image, read_images
 from .launch import Fail, Launch, fail_unless, has_display
 
-GL = "video/x-raw(memory:GLMemory)"
 
 
 def audio_file_of(recording):
@@ -97,10 +96,10 @@ def build_play(args):
     audio = audio_file_of(args.file)
     fail_unless(args.video or args.print or has_display(), "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --video")
     launch = Launch("filesrc", f"location={args.file}", "!", "neighbourcodeparse", "!", "neighbourcodedec", "!", "rangealign")
-    launch.add("!", "striprender", "fit=true", "background-shade=0.5", f"auto-orbit={args.orbit}", "!", size_caps(args.output_size, media=GL))
+    launch.add("!", "striprender", "fit=true", "background-shade=0.5", f"auto-orbit={args.orbit}", "!", size_caps(args.output_size, media="video/x-raw" if args.video else "video/x-raw(ANY)"))
     with_audio = audio != args.file and Path(audio).is_file() and args.speaker != ["none"]
     if args.video:
-        launch.add(*"! gldownload ! videoconvert ! vp8enc deadline=1 cpu-used=8 ! queue ! webmmux name=video".split())
+        launch.add(*"! videoconvert ! vp8enc deadline=1 cpu-used=8 ! queue ! webmmux name=video".split())
         launch.add("!", "filesink", f"location={args.video}")
         launch.option("--drop-empty", args.video)
     else:
@@ -170,7 +169,7 @@ def convert_recording(args, file, out):
 
 
 def draw(args, out, snapshot=False):
-    words = ["striprender", f"azimuth={args.turn}", "!", size_caps(args.output_size, media=GL), *"! gldownload ! videoconvert ! pngenc".split()]
+    words = ["striprender", f"azimuth={args.turn}", "!", size_caps(args.output_size, media="video/x-raw"), *"! videoconvert ! pngenc".split()]
     return words + (["snapshot=true"] if snapshot else []) + ["!", "filesink", f"location={out}"]
 
 

@@ -205,7 +205,7 @@ def present(args, launch, receive_audio, probe=()):
     launch.add("!", "queue", "max-size-buffers=4", "leaky=downstream", "!", "neighbourcodedec", "name=decoder")
     launch.add("!", "queue", "max-size-buffers=1", "leaky=downstream", "!", "rangealign")
     launch.add("!", "striprender", "name=view", f"auto-orbit={args.orbit}", *args.render)
-    launch.add("!", size_caps(args.output_size, media="video/x-raw(memory:GLMemory)"), "!", "gldownload")
+    launch.add("!", size_caps(args.output_size, media="video/x-raw"))
     launch.add(*"! identity name=rendered ! tee name=frames".split())
     # Without audio, frames are shown as soon as they are drawn, else when they are due.
     sync = f"sync={str(bool(receive_audio)).lower()}"

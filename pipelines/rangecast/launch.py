@@ -23,16 +23,13 @@ def fail_unless(condition, message):
 
 
 def set_up_environment():
-    """Plugins and programs of the build tree, where there is one, and OpenGL without a display where there is none."""
+    """Plugins and programs of the build tree, where there is one."""
     build = Path(__file__).resolve().parents[2] / "build"
     if (build / "gst").is_dir():
         prepend("GST_PLUGIN_PATH", build / "gst")
         prepend("PATH", build / "tests" / "simulators")
         prepend("PATH", build / "pipelines")
         os.environ.setdefault("GST_REGISTRY", str(build / "registry.bin"))
-    if not has_display():
-        os.environ.setdefault("GST_GL_PLATFORM", "egl")
-        os.environ.setdefault("GST_GL_WINDOW", "egl-device")
     fail_unless(shutil.which("rangecast-run"), "rangecast-run not found: run setup.sh, or add its folder to PATH")
 
 

@@ -37,7 +37,7 @@ set_picture_size (Viewer &viewer, int width, int height)
 {
   GstCaps *caps = gst_caps_new_simple (
       "video/x-raw", "width", G_TYPE_INT, width, "height", G_TYPE_INT, height, nullptr);
-  gst_caps_set_features (caps, 0, gst_caps_features_new ("memory:GLMemory", nullptr));
+  gst_caps_set_features (caps, 0, gst_caps_features_new_any ());
   g_object_set (viewer.size, "caps", caps, nullptr);
   gst_caps_unref (caps);
 }

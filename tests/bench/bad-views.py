@@ -58,7 +58,7 @@ def record(name, rig='rig.yaml', depth=lambda d: d, colour=lambda c: c):
 def picture(recording, corrections):
     launch(f'filesrc location={recording}.rcnc ! neighbourcodeparse ! neighbourcodedec ! rangealign corrections={corrections} '
            f'! striprender azimuth={AZIMUTH} elevation=5 background=0x00ffffff '
-           f'! video/x-raw(memory:GLMemory),width={SIZE},height={SIZE} ! gldownload ! video/x-raw,format=RGBA ! pngenc ! multifilesink location=p%02d.png')
+           f'! video/x-raw,width={SIZE},height={SIZE} ! video/x-raw,format=RGBA ! pngenc ! multifilesink location=p%02d.png')
     p = cv2.imread(f'p{FRAMES - 1:02d}.png', -1).astype(float)
     return p[..., :3] * p[..., 3:] / 255 + 255 - p[..., 3:], p[..., 3] > 127
 

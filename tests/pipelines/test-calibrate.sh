@@ -8,7 +8,6 @@ calibrate () { rangecast calibrate "$@"; }
 export -f calibrate
 
 test_thirteen_pairs_become_a_rig_that_stereodepth_reads () {
-  need_gl
   need_boards
   calibrate --left "$boards/left%02d.jpg" --right "$boards/right%02d.jpg" --columns 9 --rows 6 \
     --square 0.025 --near 0.2 --far 1 --out rig.yaml --stills stills >report.txt
@@ -53,7 +52,6 @@ pack_boards () {
 }
 
 test_webcam_calibrates_first_and_packed_pictures_give_the_rig_of_separate_ones () {
-  need_gl
   need_boards
   pack_boards
   calibrate --side-by-side 'packed-%02d.png' --near 0.2 --far 1 --out rig.yaml >report.txt
@@ -80,7 +78,6 @@ simulate_webcam () {
 }
 
 test_webcam_learns_the_background_before_it_writes_a_picture () {
-  need_gl
   simulate_webcam
   rangecast webcam --rig rig.yaml --source "$simulated" --settle 3 --learn 4 --png person.png >said.txt
   [ "$(grep -c "leave the field of view now" said.txt)$(grep -c "learning the background from 4" said.txt)" = 11 ] || fail "$(cat said.txt)"

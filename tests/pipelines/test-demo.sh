@@ -26,14 +26,12 @@ END
 }
 
 test_demo_renders_the_built_in_figure () {
-  need_gl
   rangecast demo --frames 15 --fps 8 --size 160x120 --out demo
   check_report demo 15 4
   check_picture demo/avatar.png
 }
 
 test_demo_renders_a_model_with_large_packets () {
-  need_gl
   need_data lps_head/LeePerrySmith.glb
   rangecast demo --input "avatar=$data/lps_head/LeePerrySmith.glb" --views 2 --frames 10 --fps 8 --size 160x120 --loop 4 --mtu 8900 --out demo
   check_report demo 10 2
@@ -41,7 +39,6 @@ test_demo_renders_a_model_with_large_packets () {
 }
 
 test_demo_plays_recorded_pairs () {
-  need_gl
   # The hosts begin together, whether or not the viewer is there: the recording goes on after the background.
   local view
   mkdir pairs
@@ -55,7 +52,6 @@ test_demo_plays_recorded_pairs () {
 }
 
 test_demo_takes_pictures_with_cameras () {
-  need_gl
   command -v fake-cameras >/dev/null || skip "built without Aravis"
   rangecast demo --input cameras --views 2 --frames 10 --fps 6 --size 160x120 --out demo
   check_report demo 10 2
@@ -75,7 +71,6 @@ test_demo_says_what_is_wrong () {
 }
 
 test_demo_ends_all_hosts_when_one_is_killed () {
-  need_gl
   rangecast demo --views 2 --frames 500 --fps 8 --size 160x120 --out demo >demo.log 2>&1 &
   local demo=$!
   host () { pgrep -f "rangecast-run .*$PWD/demo/log/camera1.json" >host.txt; }
@@ -87,7 +82,6 @@ test_demo_ends_all_hosts_when_one_is_killed () {
 }
 
 test_interrupted_demo_ends_all_hosts () {
-  need_gl
   rangecast demo --views 2 --frames 500 --fps 8 --size 160x120 --out demo >demo.log 2>&1 &
   local demo=$!
   host () { pgrep -f "rangecast-run .*$PWD/demo/log/viewer.json" >host.txt; }
@@ -105,7 +99,6 @@ test_interrupted_demo_ends_all_hosts () {
 hosts_run () { pgrep -f -- "--report $PWD/demo/log" >hosts.txt; }
 hosts_are_gone () { ! hosts_run; }
 test_hosts_end_with_a_demo_that_is_killed () {
-  need_gl
   rangecast demo --no-video --views 2 --frames 1000 --size 160x120 --out demo >demo.txt 2>&1 &
   until_true hosts_run
   kill -KILL $!

@@ -11,10 +11,9 @@ test_links_and_named_pages_exist () {
 # As they stand in README.md, but for a window, which a picture in memory replaces, and an end.
 test_launch_lines_of_the_readme_run () {
   local line depths
-  need_gl
   awk '/^```/ { inside = !inside; next } inside' "$source_dir/README.md" | sed -e ':a' -e '/\\$/N; s/\\\n//; ta' | grep '^gst-launch-1.0 ' >lines
   [ "$(wc -l <lines)" = 6 ] || fail "expected six launch lines: $(cat lines)"
-  sed -i -e 's/is-live=true/num-buffers=5/; s/ glimagesink$/ fakesink/; s/ playbin .*/& video-sink=fakesink/' lines
+  sed -i -e 's/is-live=true/num-buffers=5/; s/ autovideosink$/ fakesink/; s/ playbin .*/& video-sink=fakesink/' lines
   while read -r line; do
     timeout 60 bash -c "$line" >launch.log 2>&1 || fail "$line: $(tail -n 5 launch.log)"
     ! grep -q '^WARNING' launch.log || fail "$line: $(cat launch.log)"
@@ -35,7 +34,6 @@ print(len({struct.unpack_from("<f", points, i * size + 8)[0] for i in range(coun
 # Sender and receiver of coded frame sets, one after the other.
 test_recipes_of_coded_streams_run () {
   local sender receiver sending
-  need_gl
   grep -E '^gst-launch-1.0 .*(shm|srt)s' "$source_dir/docs/guide/recipes.md" |
     sed -e "s,/tmp/avatar,$PWD/avatar,; s/ glimagesink/ fakesink num-buffers=10/" >lines
   [ "$(wc -l <lines)" = 4 ] || fail "expected four lines: $(cat lines)"

@@ -42,7 +42,7 @@ for page in "$pages"/*.md; do
   case $name in
     stereocamsrc) need='need_command fake-cameras' ;;
     rigcalibrate) need='need_boards' ;;
-    striprender | rangerender | rangemux | neighbourcodeenc | neighbourcodedec | neighbourcodeparse | rtpneighbourcodeguard) need=need_gl ;;
+    striprender) need=need_gl ;;
     *) need=: ;;
   esac
   eval "test_launch_lines_of_$name () { $need; run_page $name; }"

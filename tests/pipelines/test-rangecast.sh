@@ -222,7 +222,6 @@ test_bash_completes_commands_and_options () {
 }
 
 test_a_film_of_a_stream_that_did_not_come_is_not_left () {
-  need_gl
   rangecast view --listen 20400 --video film.webm --output-size 160x120 >viewer.log 2>&1 &
   until_true takes_interrupt $!
   until_true test -e film.webm

@@ -49,7 +49,6 @@ start_viewer () { # port options...
 has_claps () { [ "$(claps seen.log 2>/dev/null | wc -l)" -ge "$1" ]; }
 
 test_audio_is_in_sync_with_loss_and_encryption_and_after_a_restart () {
-  need_gl
   export_rig 1
   (umask 077 && head -c 30 /dev/urandom | od -An -tx1 | tr -d ' \n' >studio.key)
   local p=$((ports + 50)) relay before
@@ -81,7 +80,6 @@ play_claps () {
   claps played.log
 }
 test_recording_has_speech_in_step_with_the_picture () {
-  need_gl
   export_rig 1
   local p=$((ports + 150)) recorder
   rangecast record talk.rcnc --listen $((p + 20)) --audio-port $((p + 22)) >record.log 2>&1 &
@@ -217,7 +215,6 @@ test_wrong_options_are_named () {
 # ---- several hosts ----
 
 test_speech_reaches_all_hosts_of_a_multicast_group () {
-  need_gl
   net_need
   net_open
   export_rig 1
@@ -262,7 +259,6 @@ link_of () { sed -n "s,\(https*://\).*\(:[0-9]*/#token=.*\),\1$2\2,p" "$1" | hea
 has_claps_of () { [ "$(claps_of "$1")" -ge "$2" ]; }
 
 test_call_has_picture_and_sound_both_ways () {
-  need_gl
   gst-inspect-1.0 --exists webrtcdsp || skip "no webrtcdsp (Debian package gstreamer1.0-plugins-bad)"
   open_two_hosts
   export_rig 1

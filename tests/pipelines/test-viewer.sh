@@ -281,7 +281,6 @@ test_missing_display_is_named () {
   need_program
   : >empty.rcnc
   expect_error "no display" env -u DISPLAY -u WAYLAND_DISPLAY rangecast-viewer empty.rcnc
-  expect_error "GST_GL_WINDOW" env DISPLAY=:99 GST_GL_WINDOW=egl-device rangecast-viewer empty.rcnc
 }
 
 shows_and_turns () { # command...
@@ -307,7 +306,6 @@ test_players_show_a_recording_and_turn_with_the_mouse () {
 
 test_discoverer_names_the_code () {
   command -v gst-discoverer-1.0 >/dev/null || skip "no gst-discoverer-1.0 (Debian package gstreamer1.0-plugins-base-apps)"
-  need_gl
   record_still
   gst-discoverer-1.0 -v still.rcnc >found.txt
   grep -q 'Duration: 0:00:00.[78]' found.txt || fail "$(cat found.txt)"

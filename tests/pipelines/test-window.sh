@@ -30,7 +30,7 @@ in_display () {
 # A figure that stands still in a window of 320x240: what changes is the mouse's doing.
 open_window () {
   gst-launch-1.0 -v avatartestsrc is-live=true motion=0 noise=0 ! video/x-range,width=320,height=240,framerate=10/1 \
-    ! striprender name=r ! 'video/x-raw(memory:GLMemory),width=320,height=240' ! glimagesink >log.txt 2>&1 &
+    ! striprender name=r ! 'video/x-raw,width=320,height=240' ! glimagesink >log.txt 2>&1 &
   pipeline=$!
   trap 'kill $pipeline || true' EXIT
   until_true window_id
@@ -82,7 +82,7 @@ lose_the_sender () {
   sender=$!
   gst-launch-1.0 udpsrc "port=$((ports + 70))" buffer-size=4194304 "caps=$rtp_caps" ! rtpjitterbuffer latency=50 \
     ! rtpneighbourcodedepay ! neighbourcodedec ! striprender auto-orbit=60 \
-    ! 'video/x-raw(memory:GLMemory),width=320,height=240,framerate=10/1' ! glimagesink >log.txt 2>&1 &
+    ! 'video/x-raw,width=320,height=240,framerate=10/1' ! glimagesink >log.txt 2>&1 &
   pipeline=$!
   trap 'kill $pipeline || true; kill $sender 2>/dev/null || true' EXIT
   until_true window_id
