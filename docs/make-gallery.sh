@@ -44,7 +44,7 @@ sheet () {
     read -ra render <<<"${panel#*|}"
     places+=("sink_$i::xpos=$((404 * i))")
     chain+=(sets. ! queue ! rangealign ! "${filter[@]}" ! striprender "${render[@]}"
-      ! 'video/x-raw(memory:GLMemory),width=400,height=400' ! gldownload ! queue ! "sheet.sink_$i")
+      ! 'video/x-raw,width=400,height=400' ! queue ! "sheet.sink_$i")
     i=$((i + 1))
   done
   gst-launch-1.0 -q filesrc "location=$recording" ! neighbourcodeparse ! neighbourcodedec ! tee name=sets "${chain[@]}" \
@@ -56,7 +56,7 @@ sheet () {
 
 film () { # FILE
   gst-launch-1.0 -q avatartestsrc "${figure[@]}" noise=0 views=6 num-buffers=36 range-person-only=true ! "$range" ! queue ! rangealign \
-    ! striprender auto-orbit=120 elevation=5 distance=0.9 ! 'video/x-raw(memory:GLMemory),width=400,height=400' ! gldownload \
+    ! striprender auto-orbit=120 elevation=5 distance=0.9 ! 'video/x-raw,width=400,height=400' \
     ! videoconvert ! pngenc ! multifilesink location=orbit-%05d.png
   ffmpeg -v error -y -framerate 12 -i orbit-%05d.png -c:v libwebp_anim -quality 85 -loop 0 "$out/$1"
 }

@@ -16,7 +16,7 @@ video () {
   echo "filesrc location=$recording/$1.mp4 ! decodebin ! videorate drop-only=true ! videoscale method=bilinear2 ! videoconvert \
     ! video/x-raw,width=640,height=400,framerate=10/1,format=GRAY8"
 }
-panel='video/x-raw(memory:GLMemory),width=320,height=200 ! gldownload ! videoconvert ! queue'
+panel='video/x-raw,width=320,height=200 ! videoconvert ! queue'
 
 rangecast import "$recording/calib.json" --out rig.yaml --size 1280x800 --scale 0.5 --near 1 --far 4
 # shellcheck disable=SC2046
