@@ -278,7 +278,7 @@ test ('a damaged scene is refused', () => {
 
 test ('shaders are for WebGL2', () => {
   const core = new Core (wasm);
-  for (let i = 0; i < 18; i++)
+  for (let i = 0; i < 12; i++)
     assert.match (core.text (core.call ('rc_shader', i)), /^#version 300 es\n[^]*void main/);
   assert.equal (core.call ('rc_shader', 12), 0);
 });
