@@ -277,7 +277,8 @@ private:
       }
   }
 
-  /* Draws the pixels whose centres lie in the triangle or on its edges. */
+  /* Draws the pixels whose centres lie in the triangle, or on one of its edges that no neighbour
+   * draws: of an edge's two directions one counts. */
   template <typename L>
   void draw_triangle (const Target &to, const Vertex *strip, bool is_odd) const
   {
@@ -315,6 +316,10 @@ private:
       return Plane<float>{way_x * (y - p->y) - way_y * (x - p->x), -way_y, way_x};
     };
     const Plane<float> of_a = edge (b, c), of_b = edge (c, a), of_c = edge (a, b);
+    const auto least = [] (const Plane<float> &e) { /* steps are 1/256 */
+      return e.right < 0 || (e.right == 0 && e.down > 0) ? 0 : 1 / 512.f;
+    };
+    const float least_a = least (of_a), least_b = least (of_b), least_c = least (of_c);
     const float share = 1 / area;
     const auto plane = [&] (const auto &at_a, const auto &at_b, const auto &at_c) {
       const auto to_b = (at_b - at_a) * share, to_c = (at_c - at_a) * share;
@@ -337,9 +342,10 @@ private:
                   near_line = nearness.begin + n * nearness.down;
       for (int column = 0; column <= last - first; column += L::kLanes) {
         const F right_by = __builtin_convertvector(lanes + column, F);
-        const I inside = (edge_a + of_a.right * right_by >= 0) &
-                         (edge_b + of_b.right * right_by >= 0) &
-                         (edge_c + of_c.right * right_by >= 0) & (lanes + column <= last - first);
+        const I inside = (edge_a + of_a.right * right_by >= least_a) &
+                         (edge_b + of_b.right * right_by >= least_b) &
+                         (edge_c + of_c.right * right_by >= least_c) &
+                         (lanes + column <= last - first);
         const F here = near_line + nearness.right * right_by;
         F &nearest = L::at (to.nearness + line + column);
         const I drawn = inside & (here > nearest);
