@@ -185,22 +185,13 @@ strip_draw_frame (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bo
 
   if (!repeated)
     priv->reporter.passed (GST_ELEMENT (self), frame_set);
-  guint64 points;
-  {
-    std::lock_guard guard (priv->lock);
-    RenderStats &stats = priv->stats;
-    count_into (priv->scene, stats);
-    stats.uploaded_bytes = result.uploaded;
-    stats.uploaded_total += result.uploaded;
-    stats.points_total += stats.points;
-    stats.frames++;
-    stats.repeated += repeated;
-    points = stats.points;
-  }
-  GST_LOG_OBJECT (self,
-      "frame of %" GST_TIME_FORMAT " shows frame set of %" GST_TIME_FORMAT
-      "%s: %u views, %" G_GUINT64_FORMAT " points, %" G_GUINT64_FORMAT " bytes uploaded",
-      GST_TIME_ARGS (GST_BUFFER_PTS (out)), GST_TIME_ARGS (GST_BUFFER_PTS (frame_set)),
-      repeated ? " again" : "", guint (priv->scene.layers ().size ()), points, result.uploaded);
+  std::lock_guard guard (priv->lock);
+  RenderStats &stats = priv->stats;
+  count_into (priv->scene, stats);
+  stats.uploaded_bytes = result.uploaded;
+  stats.uploaded_total += result.uploaded;
+  stats.points_total += stats.points;
+  stats.frames++;
+  stats.repeated += repeated;
   return GST_FLOW_OK;
 }

@@ -107,8 +107,8 @@ configure_pool (GstBufferPool *pool, GstQuery *query, guint size, guint min, gui
   gst_buffer_pool_config_set_params (config, caps, size, min, max);
   if (is_gl (caps) || gst_query_find_allocation_meta (query, GST_VIDEO_META_API_TYPE, nullptr))
     gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_VIDEO_META);
-  if (is_gl (caps))
-    OpenGl::add_options (query, config);
+  if (is_gl (caps)) /* its other contexts wait for our commands */
+    gst_buffer_pool_config_add_option (config, "GstBufferPoolOptionGLSyncMeta");
   return gst_buffer_pool_set_config (pool, config);
 }
 

@@ -291,10 +291,3 @@ OpenGl::make_pool ()
 {
   return gst_gl_buffer_pool_new (context_);
 }
-
-void
-OpenGl::add_options (GstQuery *query, GstStructure *config)
-{
-  if (gst_query_find_allocation_meta (query, GST_GL_SYNC_META_API_TYPE, nullptr))
-    gst_buffer_pool_config_add_option (config, GST_BUFFER_POOL_OPTION_GL_SYNC_META);
-}

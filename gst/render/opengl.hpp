@@ -37,8 +37,6 @@ public:
   bool can_use (GstBufferPool *pool);
   /** Returns: (transfer full): of buffers of OpenGL memory, after start() */
   GstBufferPool *make_pool ();
-  /** Whether the query's allocation wants GstGLSyncMeta. */
-  static void add_options (GstQuery *query, GstStructure *config);
 
 private:
   bool open (GstElement *element);
@@ -66,6 +64,5 @@ public:
   }
   bool can_use (GstBufferPool *) { return false; }
   GstBufferPool *make_pool () { return nullptr; }
-  static void add_options (GstQuery *, GstStructure *) {}
 };
 #endif
