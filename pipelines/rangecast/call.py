@@ -37,7 +37,7 @@ def add_call(parser):
     parser.add_argument("--no-echo-cancel", action="store_true", help="for headphones: do not filter the microphone (webrtcdsp)")
     parser.add_argument("--no-window", dest="window", action="store_false", help="show nothing")
     add_camera_options(parser)
-    parser.set_defaults(run_hosts=call, input="cameras", orbit="0", render=[], output_size=(640, 480), video=None)
+    parser.set_defaults(run_hosts=call, input="cameras", orbit="0", render=[], output_size=(640, 480), video=None, camera=None)
 
 
 def build_call(args, link, ports):

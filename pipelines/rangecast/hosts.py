@@ -186,7 +186,7 @@ def build_parent(args):
 
 
 def add_view(parser):
-    options.add(parser, "--video", "--window", "--orbit", "--render", "--speaker", "--output-size")
+    options.add(parser, "--video", "--window", "--camera", "--orbit", "--render", "--speaker", "--output-size")
     options.add_receiver(parser)
     parser.set_defaults(build=build_view)
 
@@ -214,6 +214,9 @@ def present(args, launch, receive_audio, probe=()):
     if args.window:
         fail_unless(has_display() or args.print, "--window: no display: neither DISPLAY nor WAYLAND_DISPLAY is set")
         launch.add(*show, "videoconvert", "!", "autovideosink", sync)
+    if args.camera:
+        sink = f"v4l2sink device={args.camera}" if Path(args.camera).is_char_device() else f"filesink location={args.camera}"
+        launch.add(*show, *"videoconvert ! video/x-raw,format=YUY2 !".split(), *sink.split(" "), sync)
     if args.video:
         launch.add(*"frames. ! queue max-size-buffers=8 leaky=downstream ! videoconvert ! vp8enc deadline=1 cpu-used=8".split())
         launch.add(*"target-bitrate=2000000 keyframe-max-dist=60 ! webmmux name=video ! filesink".split(), f"location={args.video}")

@@ -152,6 +152,12 @@ def output_file(text):
     return text
 
 
+def device(text):
+    if not Path(text).exists():
+        raise Wrong(f"no device '{text}': is v4l2loopback loaded?")
+    return text
+
+
 def file_of_type(suffix):
     def check(text):
         if Path(text).suffix.lower() != suffix:
@@ -212,6 +218,7 @@ SHARED = {
     "--key": dict(type=key_file, metavar="FILE", help="encrypt all streams (SRTP) with the key in FILE: 60 hexadecimal digits"),
     "--threads": dict(type=number(1, 1024), metavar="N", help="maximum number of CPU cores for stereo matching"),
     "--window": dict(action="store_true", help="show it in a window"),
+    "--camera": dict(type=device, metavar="DEVICE", help="be a camera for other programs: a v4l2loopback device, or a pipe for raw YUY2"),
     "--multicast": dict(type=group, metavar="GROUP", help="receive from this multicast group"),
     "--interface": dict(type=interface, metavar="IF", help="network interface of the multicast group (default: the system's choice)"),
     "--ttl": dict(type=number(0, 255), metavar="N", default=1, help="multicast TTL: routers to pass, plus one (default 1: this network)"),

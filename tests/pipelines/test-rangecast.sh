@@ -221,6 +221,21 @@ test_bash_completes_commands_and_options () {
   [ "${COMPREPLY[*]}" = --multicast ] || fail "${COMPREPLY[*]}"
 }
 
+# A pipe stands for a v4l2loopback device.
+test_another_program_sees_the_avatar_as_a_camera () {
+  mkfifo camera
+  gst-launch-1.0 -q avatartestsrc is-live=true views=1 range-person-only=true ! video/x-range,width=160,height=120,framerate=15/1 \
+    ! neighbourcodeenc ! rtpneighbourcodepay ! udpsink host=127.0.0.1 port=20402 &
+  rangecast view --listen 20402 --camera camera --output-size 160x120 >viewer.log 2>&1 &
+  timeout 60 head -c 115200 camera >frames.yuv # three frames of YUY2
+  kill %1 %2
+  [ "$(stat -c %s frames.yuv)" = 115200 ] || fail "$(stat -c %s frames.yuv) bytes: $(tail -n 5 viewer.log)"
+  python3 -c 'import sys
+luma = open("frames.yuv", "rb").read()[76800::2]
+sys.exit(max(luma) - min(luma) < 60)' || fail "nothing is to be seen"
+  expect_error "is v4l2loopback loaded" rangecast view --listen 20402 --camera /dev/video99
+}
+
 test_a_film_of_a_stream_that_did_not_come_is_not_left () {
   rangecast view --listen 20400 --video film.webm --output-size 160x120 >viewer.log 2>&1 &
   until_true takes_interrupt $!
