@@ -40,12 +40,13 @@ floats (const typename L::U &values)
   return __builtin_convertvector((typename L::I)values, typename L::F);
 }
 
-/* Whole numbers of 0 to 255 and a fraction. */
+/* Slivers may yield a little less than 0 or more than 255. */
 template <typename L>
 typename L::U
 bytes (const typename L::F &values)
 {
-  return (typename L::U) __builtin_convertvector(values + 0.5f, typename L::I);
+  const typename L::F zero{}, most = zero + 255, low = values > 0 ? values : zero;
+  return (typename L::U) __builtin_convertvector((low < most ? low : most) + 0.5f, typename L::I);
 }
 
 /* 0, 1, 2, ... */
@@ -200,7 +201,7 @@ private:
       root = root > kMinOutside ? root : F{} + kMinOutside;
       F nearness = 1 / (w + gap);
       const F reach = x * x + y * y;
-      /* not before the near plane, and not so far aside that edges would not be exact */
+      /* not before the near plane, and not so far aside that sixteenths get lost */
       L::keep_where (nearness, (row (2) >= -w) & (w > 0) & (reach < 1e9f));
       for (int l = 0; l < n; l++) {
         const std::size_t i = begin + static_cast<std::size_t> (l);

@@ -28,22 +28,22 @@ struct SurfacePicture {
   Mat4 clip_from_world;
   StripMode mode = StripMode::kBlend;
   float background[4] = {0, 0, 0, 1}; ///< R, G, B, A, straight, 0 to 1
-  float background_shade = 0;  ///< share by which the colour is lighter in the first row and darker
-                               ///< in the last one
-  float point_size = 1;        ///< mode kPoints: in footprints of a pixel
-  float pixels_per_unit = 1;   ///< pixels that a length of 1 at a distance of 1 covers
-  bool back_faces = false;     ///< mode kStrips: draws both sides; mode kBlend always does
-  double blend_range_m = 0.02; ///< mode kBlend: metres behind the nearest surface within which
-                               ///< views are blended
-  int width = 0, height = 0;   ///< of the whole output, pixels
-  Roi part;                    ///< of it that the picture fills
+  float background_shade = 0; ///< share by which the colour is lighter in the first row and darker
+                              ///< in the last one
+  float point_size = 1;       ///< mode kPoints: in footprints of a pixel
+  float pixels_per_unit = 1;  ///< pixels that a length of 1 at a distance of 1 covers
+  bool back_faces = false;    ///< mode kStrips: draws both sides; mode kBlend always does
+  double blend_range_m = kBlendRange_m; ///< mode kBlend: metres behind the nearest surface within
+                                        ///< which views are blended
+  int width = 0, height = 0;            ///< of the whole output, pixels
+  Roi part;                             ///< of it that the picture fills
   Roi covered; ///< of that: all pixels that may show something, and a margin of at least one pixel
 
   /** Whether triangles seen from behind are left out: noise turns many a single rectangle over. */
   [[nodiscard]] bool culls () const { return mode == StripMode::kStrips && !back_faces; }
 };
 
-/** Pass 1: each view is drawn into a cell of one framebuffer of its own, or, but in mode kBlend,
+/** Pass 1: each view is drawn into a cell of one framebuffer of its own; in modes other than kBlend
  * all into one. Cells are as large as the part of the picture that may be covered. With more views
  * than cells, those that look least as the viewer does share the last one, where the nearest
  * surface counts. */
