@@ -215,8 +215,8 @@ def present(args, launch, receive_audio, probe=()):
         fail_unless(has_display() or args.print, "--window: no display: neither DISPLAY nor WAYLAND_DISPLAY is set")
         launch.add(*show, "videoconvert", "!", "autovideosink", sync)
     if args.camera:
-        sink = f"v4l2sink device={args.camera}" if Path(args.camera).is_char_device() else f"filesink location={args.camera}"
-        launch.add(*show, *"videoconvert ! video/x-raw,format=YUY2 !".split(), *sink.split(" "), sync)
+        sink = ["v4l2sink", f"device={args.camera}"] if Path(args.camera).is_char_device() else ["filesink", f"location={args.camera}"]
+        launch.add(*show, *"videoconvert ! video/x-raw,format=YUY2 !".split(), *sink, sync)
     if args.video:
         launch.add(*"frames. ! queue max-size-buffers=8 leaky=downstream ! videoconvert ! vp8enc deadline=1 cpu-used=8".split())
         launch.add(*"target-bitrate=2000000 keyframe-max-dist=60 ! webmmux name=video ! filesink".split(), f"location={args.video}")

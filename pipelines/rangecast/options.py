@@ -153,7 +153,7 @@ def output_file(text):
 
 
 def device(text):
-    if not Path(text).exists():
+    if not (Path(text).is_char_device() or Path(text).is_fifo()):
         raise Wrong(f"no device '{text}': is v4l2loopback loaded?")
     return text
 
