@@ -5,13 +5,18 @@
 
 namespace {
 
-/* The frame rate of caps with one structure, else nullptr. */
+/* The frame rate that all structures of caps have, else nullptr. */
 const GValue *
 frame_rate (const GstCaps *caps)
 {
-  return caps && gst_caps_get_size (caps) == 1
-             ? gst_structure_get_value (gst_caps_get_structure (caps, 0), "framerate")
-             : nullptr;
+  const GValue *rate = nullptr;
+  for (guint i = 0; caps && i < gst_caps_get_size (caps); i++) {
+    const GValue *own = gst_structure_get_value (gst_caps_get_structure (caps, i), "framerate");
+    if (!own || (rate && gst_value_compare (rate, own) != GST_VALUE_EQUAL))
+      return nullptr;
+    rate = own;
+  }
+  return rate;
 }
 
 GstCaps *

@@ -180,6 +180,7 @@ strip_draw_frame (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bo
     GST_ELEMENT_WARNING (self, RESOURCE, FAILED,
         ("Continuing with backend=software: %s", result.failure), (nullptr));
     gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
+    priv->discont = true;
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <cstring>
 #include <exception>
-#include <string_view>
 #include <utility>
 
 #include "striprenderprivate.hpp"
@@ -45,17 +44,10 @@ fatal_error (const GstGLFuncs *gl)
 {
   constexpr GLenum kContextLost = 0x0507; /* of OpenGL 4.5 and OpenGL ES 3.2 */
   constexpr int kMaxErrors = 8; /* several may be queued; a lost context may report indefinitely */
-  for (int i = 0; i < kMaxErrors; i++)
-    switch (gl->GetError ()) {
-      case GL_NO_ERROR:
-        return nullptr;
-      case kContextLost:
-        return "OpenGL's context is lost";
-      case GL_OUT_OF_MEMORY:
-        return "OpenGL is out of memory";
-      default:
-        break;
-    }
+  GLenum error = gl->GetError ();
+  for (int i = 1; i < kMaxErrors && error != GL_NO_ERROR; i++, error = gl->GetError ())
+    if (error == kContextLost || error == GL_OUT_OF_MEMORY)
+      return error == kContextLost ? "OpenGL's context is lost" : "OpenGL is out of memory";
   return nullptr;
 }
 
@@ -158,10 +150,9 @@ private:
   {
     const GstGLFuncs *gl = context_->gl_vtable;
     const auto panel = make_panel (job.panel, eye, panel_);
-    const int border = kPanelBorder * std::max (1, (eye.height + 240) / 480);
     gl->BindTexture (GL_TEXTURE_2D, memory->tex_id);
-    gl->TexSubImage2D (GL_TEXTURE_2D, 0, eye.x + border, eye.y + border, panel.width, panel.height,
-        GL_RGBA, GL_UNSIGNED_BYTE, panel.data);
+    gl->TexSubImage2D (GL_TEXTURE_2D, 0, eye.x + kPanelBorder, eye.y + kPanelBorder, panel.width,
+        panel.height, GL_RGBA, GL_UNSIGNED_BYTE, panel.data);
     gl->BindTexture (GL_TEXTURE_2D, 0);
     result.uploaded += panel_.size () * sizeof (rangecast::Rgbx);
   }
@@ -248,20 +239,19 @@ OpenGl::get (GstElement *element, GError **error)
 bool
 OpenGl::is_fast (GstElement *element)
 {
-  GError *error = nullptr;
-  GstGLContext *context = get (element, &error);
-  std::string_view renderer;
+  constexpr const char *kSlow[] = {"llvmpipe", "softpipe", "swrast", "SwiftShader", "Software"};
+  GstGLContext *context = get (element, nullptr);
+  bool fast = false;
   if (context)
     on_gl_thread (context, [&] {
-      renderer = reinterpret_cast<const char *> (context->gl_vtable->GetString (GL_RENDERER));
+      const auto name =
+          reinterpret_cast<const char *> (context->gl_vtable->GetString (GL_RENDERER));
+      fast = name && has_shaders (context) && std::ranges::none_of (kSlow, [&] (const char *slow) {
+        return std::strstr (name, slow) != nullptr;
+      });
+      GST_INFO_OBJECT (element, "OpenGL renderer: %s", name);
     });
-  GST_INFO_OBJECT (element, "OpenGL: %s", error ? error->message : std::string (renderer).c_str ());
-  g_clear_error (&error);
-  constexpr std::string_view kSlow[] = {
-      "llvmpipe", "softpipe", "swrast", "SwiftShader", "Software"};
-  return context && std::ranges::none_of (kSlow, [&] (std::string_view name) {
-    return renderer.find (name) != std::string_view::npos;
-  });
+  return fast;
 }
 
 std::unique_ptr<RenderBackend>

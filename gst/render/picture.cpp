@@ -25,13 +25,13 @@ MultiviewLayout::MultiviewLayout (const GstVideoInfo &info)
   switch (GST_VIDEO_INFO_MULTIVIEW_MODE (&info)) {
     case GST_VIDEO_MULTIVIEW_MODE_SIDE_BY_SIDE:
       first.aspect *= half ? 1 : 0.5;
-      first.width = width / 2;
+      first.width = (width + 1) / 2;
       second = first;
       second.x = width - second.width;
       break;
     case GST_VIDEO_MULTIVIEW_MODE_TOP_BOTTOM:
       first.aspect *= half ? 1 : 2;
-      first.height = height / 2;
+      first.height = (height + 1) / 2;
       second = first;
       second.y = height - second.height;
       break;
@@ -89,8 +89,10 @@ make_picture (const RenderJob &job, const EyeViewport &viewport, const GstVideoI
   /* What one camera sees is open at the back, where there is nothing else to see. */
   picture.back_faces = job.scene->rig_views () == 1;
   picture.blend_range_m = settings.blend_range_m;
-  picture.covered = rangecast::covered_part (
-      picture.clip_from_world, job.scene->hull (), info.width, info.height, picture.part);
+  picture.covered = picture.part;
+  if (picture.mode != rangecast::StripMode::kPoints) /* which may be of any size */
+    picture.covered = rangecast::covered_part (
+        picture.clip_from_world, job.scene->hull (), info.width, info.height, picture.part);
   return picture;
 }
 
@@ -99,8 +101,8 @@ make_panel (
     const ImageView<const Rgbx> &panel, const EyeViewport &viewport, std::vector<Rgbx> &memory)
 {
   const int scale = std::max (1, (viewport.height + 240) / 480),
-            width = std::clamp (viewport.width - kPanelBorder * scale, 0, panel.width * scale),
-            height = std::clamp (viewport.height - kPanelBorder * scale, 0, panel.height * scale);
+            width = std::clamp (viewport.width - kPanelBorder, 0, panel.width * scale),
+            height = std::clamp (viewport.height - kPanelBorder, 0, panel.height * scale);
   memory.resize (std::size_t (width) * std::size_t (height));
   const ImageView<Rgbx> to = {
       memory.data (), width, height, std::ptrdiff_t (sizeof (Rgbx)) * width};
@@ -148,9 +150,9 @@ private:
   void paste_panel (const RenderJob &job, const EyeViewport &eye, const ImageView<Rgbx> &pixels)
   {
     const auto panel = make_panel (job.panel, eye, panel_);
-    const int border = kPanelBorder * std::max (1, (eye.height + 240) / 480);
     for (int y = 0; y < panel.height; y++)
-      std::copy_n (panel.row (y), panel.width, pixels.row (eye.y + border + y) + eye.x + border);
+      std::copy_n (
+          panel.row (y), panel.width, pixels.row (eye.y + kPanelBorder + y) + eye.x + kPanelBorder);
   }
 
   const GstVideoInfo info_;

@@ -105,8 +105,9 @@ strip_properties ()
           "tint-views", "Tint views", "Tint each point with the colour of its view", kControllable),
       P::enumeration<&S::strips, &Strips::mode> (
           "mode", "Mode", "Rendering mode", GST_TYPE_STRIP_RENDER_MODE, kControllable),
-      P::enumeration<&S::backend> ("backend", "Backend", "What draws; the one in use is in stats",
-          GST_TYPE_STRIP_RENDER_BACKEND, kMutablePlaying),
+      P::enumeration<&S::backend> ("backend", "Backend",
+          "Renderer; the one in use is reported in stats", GST_TYPE_STRIP_RENDER_BACKEND,
+          kMutablePlaying),
       P::number<&S::background> (
           "background", "Background", "Background colour, ARGB", 0, G_MAXUINT32, kControllable),
       P::number<&S::view_mask> ("view-mask", "View mask",

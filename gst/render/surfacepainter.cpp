@@ -48,12 +48,6 @@ make_library_shader (GstGLContext *context, Shader vertex, Shader fragment, GErr
 
 } // namespace
 
-bool
-is_gles (GstGLContext *context)
-{
-  return gst_gl_context_check_gl_version (context, GST_GL_API_GLES2, 3, 0);
-}
-
 GstGLShader *
 make_shader (
     GstGLContext *context, const std::string &vertex, const std::string &fragment, GError **error)
@@ -75,9 +69,8 @@ make_shader (
 bool
 SurfacePainter::start (GstGLContext *context, GError **error)
 {
-  constexpr auto kDesktop = GstGLAPI (GST_GL_API_OPENGL3 | GST_GL_API_OPENGL);
   context_ = context;
-  if (!is_gles (context) && !gst_gl_context_check_gl_version (context, kDesktop, 3, 3)) {
+  if (!has_shaders (context)) {
     g_set_error (error, GST_GL_CONTEXT_ERROR, GST_GL_CONTEXT_ERROR_OLD_LIBS,
         "it is older than OpenGL 3.3 or OpenGL ES 3.0");
     return false;

@@ -11,7 +11,18 @@
 #include <vector>
 
 /** Whether the context is one of OpenGL ES 3.0 or later. On the OpenGL thread, as all here. */
-bool is_gles (GstGLContext *context);
+inline bool
+is_gles (GstGLContext *context)
+{
+  return gst_gl_context_check_gl_version (context, GST_GL_API_GLES2, 3, 0);
+}
+/** Whether it is that, or OpenGL 3.3 or later. */
+inline bool
+has_shaders (GstGLContext *context)
+{
+  constexpr auto kDesktop = GstGLAPI (GST_GL_API_OPENGL3 | GST_GL_API_OPENGL);
+  return is_gles (context) || gst_gl_context_check_gl_version (context, kDesktop, 3, 3);
+}
 /** Compiles and links sources without a version line, for OpenGL 3.3 or OpenGL ES 3.0.
  *  Returns: (transfer full): or nullptr, with the compiler's log in `error` */
 GstGLShader *make_shader (

@@ -5,8 +5,6 @@
 
 #include <gst/gl/gl.h>
 #include <gst/video/navigation.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <string>
 #include <vector>
@@ -31,8 +29,10 @@ opengl_works ()
 }
 
 #define SKIP_WITHOUT_OPENGL()                                                                      \
-  if (!opengl_works ())                                                                            \
-  RANGECAST_SKIP ("no OpenGL context")
+  do {                                                                                             \
+    if (!opengl_works ())                                                                          \
+      RANGECAST_SKIP ("no OpenGL context");                                                        \
+  } while (0)
 
 struct RenderOptions {
   const char *properties = "";                 ///< of striprender
