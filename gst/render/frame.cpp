@@ -139,7 +139,7 @@ draw (
   const GstClockTime running = strip_running_time (self, GST_BUFFER_PTS (out));
   const auto orbit = settings.camera.at (orbit_time (priv, running));
   priv->scene.build (visible_images (self, frame.views (), settings.view_mask),
-      {settings.strips, settings.tint_views, settings.strips_serial}, orbit, repeated);
+      {settings.strips, settings.tint_views}, orbit, repeated);
   const auto &home = home_frame (priv, settings, orbit, GST_BUFFER_PTS (frame_set));
   RenderJob job = {&priv->scene, &settings, &home, orbit};
   if (settings.show_stats) {

@@ -45,8 +45,6 @@ G_DEFINE_TYPE (GstStripRender, gst_strip_render, GST_TYPE_AGGREGATOR)
 GST_ELEMENT_REGISTER_DEFINE (
     striprender, "striprender", GST_RANK_NONE, gst_strip_render_get_type ())
 
-enum : guint { PROP_STATS = 1, PROP_STATS_INTERVAL, PROP_CAMERA };
-
 /* ---- backends ---- */
 
 namespace {
@@ -267,11 +265,16 @@ gst_strip_render_negotiated_src_caps (GstAggregator *aggregator, GstCaps *caps)
   if (!gst_video_info_from_caps (&priv->out, caps))
     return FALSE;
   priv->is_gl = is_gl (caps);
+  const FrameRate rate = priv->rate = strip_output_rate (priv->input, caps);
+  bool keep_rate;
   {
     std::lock_guard guard (priv->lock);
-    priv->rate = strip_output_rate (priv->input, caps);
+    keep_rate = priv->settings.keep_rate;
   }
-  strip_update_latency (self);
+  const bool own = rate.n > 0 && (!rate.is_inputs || keep_rate) &&
+                   gst_util_fraction_compare (rate.n, rate.d, kMaxFrameRate, 1) <= 0;
+  priv->period = own ? gst_util_uint64_scale (GST_SECOND, guint64 (rate.d), guint64 (rate.n)) : 0;
+  gst_aggregator_set_latency (aggregator, priv->period, priv->period);
   return TRUE;
 }
 
@@ -290,6 +293,8 @@ gst_strip_render_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, G
       return accepted;
     }
     case GST_EVENT_SEGMENT: {
+      if (refuse_bytes (pad, event))
+        return FALSE;
       const GstSegment *segment;
       gst_event_parse_segment (event, &segment);
       strip_drain (self);
@@ -342,15 +347,15 @@ bool
 handle_navigation (GstStripRender *self, GstEvent *event)
 {
   GstStripRenderPrivate *priv = self->priv;
-  OrbitControl before, after;
+  StripRenderSettings before, after;
   bool handled;
   {
     std::lock_guard guard (priv->lock);
-    before = priv->settings.camera;
+    before = priv->settings;
     handled = priv->settings.camera.handle (event);
-    after = priv->settings.camera;
+    after = priv->settings;
   }
-  camera_properties ().notify_changes (G_OBJECT (self), before, after);
+  strip_properties ().notify_changes (G_OBJECT (self), before, after);
   return handled;
 }
 
@@ -366,8 +371,20 @@ gst_strip_render_src_event (GstAggregator *aggregator, GstEvent *event)
     gst_event_unref (event);
     return TRUE;
   }
-  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS || GST_EVENT_TYPE (event) == GST_EVENT_LATENCY)
-    strip_handle_timing_event (self, event);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_LATENCY) {
+    GstClockTime latency;
+    gst_event_parse_latency (event, &latency);
+    self->priv->pipeline_latency = GST_CLOCK_TIME_IS_VALID (latency) ? latency : 0;
+  } else if (GST_EVENT_TYPE (event) == GST_EVENT_QOS) {
+    GstQOSType type;
+    GstClockTimeDiff diff;
+    GstClockTime time;
+    gst_event_parse_qos (event, &type, nullptr, &diff, &time);
+    if (diff > 0 && type != GST_QOS_TYPE_THROTTLE)
+      diff *= 2; /* to catch up, instead of being just as late again; as GstVideoDecoder */
+    if (GST_CLOCK_TIME_IS_VALID (time))
+      self->priv->earliest = diff < 0 && GstClockTime (-diff) > time ? 0 : time + diff;
+  }
   return GST_AGGREGATOR_CLASS (gst_strip_render_parent_class)->src_event (aggregator, event);
 }
 
@@ -397,6 +414,12 @@ collect_stats (GstElement *element)
                .late = stats.dropped}}};
 }
 
+static GstStructure *
+make_stats (const GstStripRenderPrivate *priv)
+{
+  return priv->stats.to_structure ();
+}
+
 static gboolean
 gst_strip_render_start (GstAggregator *aggregator)
 {
@@ -410,8 +433,6 @@ gst_strip_render_start (GstAggregator *aggregator)
   priv->reporter.start (GST_ELEMENT (self), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->stats = {};
-  priv->rate = {};
-  priv->overrun = 0;
   priv->pipeline_latency = 0;
   priv->settings.camera.release ();
   return TRUE;
@@ -437,64 +458,11 @@ gst_strip_render_stop (GstAggregator *aggregator)
   return TRUE;
 }
 
-/* ---- properties ---- */
-
-static void
-gst_strip_render_set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  auto self = GST_STRIP_RENDER (object);
-  GstStripRenderPrivate *priv = self->priv;
-  if (id == PROP_STATS_INTERVAL) {
-    priv->reporter.set_interval (g_value_get_uint (value));
-    return;
-  }
-  bool keep_changed, backend_changed;
-  {
-    std::lock_guard guard (priv->lock);
-    const bool before = priv->settings.keep_rate;
-    const RenderBackendChoice backend_before = priv->settings.backend;
-    if (strip_properties ().set (priv->settings, id, value))
-      priv->settings.strips_serial++;
-    else if (!camera_properties ().set (priv->settings.camera, id, value))
-      G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-    keep_changed = priv->settings.keep_rate != before;
-    backend_changed = priv->settings.backend != backend_before;
-  }
-  if (backend_changed)
-    gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
-  if (keep_changed)
-    strip_update_latency (self);
-}
-
-static void
-gst_strip_render_get_property (GObject *object, guint id, GValue *value, GParamSpec *pspec)
-{
-  GstStripRenderPrivate *priv = GST_STRIP_RENDER (object)->priv;
-  std::lock_guard guard (priv->lock);
-  if (id == PROP_STATS)
-    g_value_take_boxed (value, priv->stats.to_structure ());
-  else if (id == PROP_STATS_INTERVAL)
-    g_value_set_uint (value, priv->reporter.interval ());
-  else if (!camera_properties ().get (priv->settings.camera, id, value) &&
-           !strip_properties ().get (priv->settings, id, value))
-    G_OBJECT_WARN_INVALID_PROPERTY_ID (object, id, pspec);
-}
-
-static GstFlowReturn
-gst_strip_render_chain (GstPad *pad, GstObject *parent, GstBuffer *frame_set)
-{
-  auto self = GST_STRIP_RENDER (parent);
-  strip_drop_late (self);
-  return self->priv->chain (pad, parent, frame_set);
-}
-
 static void
 gst_strip_render_init (GstStripRender *self)
 {
-  GstStripRenderPrivate *priv = self->priv = new GstStripRenderPrivate;
-  priv->sink = add_sink_pad (GST_ELEMENT (self), "sink");
-  priv->chain = GST_PAD_CHAINFUNC (priv->sink);
-  gst_pad_set_chain_function (GST_PAD (priv->sink), GST_DEBUG_FUNCPTR (gst_strip_render_chain));
+  self->priv = new GstStripRenderPrivate;
+  self->priv->sink = add_sink_pad (GST_ELEMENT (self), "sink");
 }
 
 static void
@@ -506,16 +474,11 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
 
   GST_DEBUG_CATEGORY_INIT (strip_render_debug, "striprender", 0, "Strip renderer");
 
-  object_class->set_property = gst_strip_render_set_property;
-  object_class->get_property = gst_strip_render_get_property;
   object_class->finalize = delete_private<GstStripRender>;
-  strip_properties ().install (
-      object_class, camera_properties ().install (object_class, PROP_CAMERA));
-  install_stats (object_class, PROP_STATS,
+  install_properties<GstStripRender, strip_properties, make_stats> (object_class,
       "Counters since the element was started: frames, frame-sets, repeated, dropped, "
       "uploaded-total; of the last frame: points, vertices, triangles, strips, isolated, "
       "uploaded-bytes; backend: which one draws");
-  StatsReporter::install (object_class, PROP_STATS_INTERVAL);
 
   for (GstStaticPadTemplate *pad_template : {&sink_template, &src_template})
     gst_element_class_add_static_pad_template_with_gtype (

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* When striprender draws. GstAggregator waits for frame sets, live also for the clock, and calls
- * aggregate() on the source pad's thread. There are two modes:
+ * aggregate() on the source pad's thread, as all of this is. There are two modes:
  *
  * One picture per frame set, if the output has the input's frame rate or none: a picture has the
- * times of its frame set; a late one is skipped.
+ * times of its frame set. Live, one that is late is skipped if the next frame set is there.
  *
  * A frame rate of its own, if downstream requested another one than the input's, or keep-rate is
  * set: pictures are at whole multiples of the period, counted from stream position 0. A picture
@@ -23,36 +23,12 @@ namespace {
 /* Longer durations and gaps are errors of the stream, and not filled with pictures. */
 constexpr GstClockTime kMaxGap = 60 * GST_SECOND;
 
-/* The streaming thread needs it, too. */
-GstSegment
-segment_of (GstStripRender *self)
-{
-  GstAggregatorPad *sink = self->priv->sink;
-  GST_OBJECT_LOCK (sink);
-  const GstSegment segment = sink->segment;
-  GST_OBJECT_UNLOCK (sink);
-  return segment;
-}
-
-/* ns from one picture to the next; 0: one per frame set. With the lock. */
+/* ns from one picture to the next; 0: one per frame set. */
 GstClockTime
-period_of (const GstStripRenderPrivate *priv)
+own_period (const GstStripRenderPrivate *priv)
 {
-  const FrameRate &rate = priv->rate;
-  const bool own = rate.n > 0 && (!rate.is_inputs || priv->settings.keep_rate) &&
-                   gst_util_fraction_compare (rate.n, rate.d, kMaxFrameRate, 1) <= 0;
-  return own ? gst_util_uint64_scale (GST_SECOND, guint64 (rate.d), guint64 (rate.n)) : 0;
-}
-
-/* The same; 0 for reverse segments and those not in time, too. */
-GstClockTime
-own_period (GstStripRender *self)
-{
-  const GstSegment segment = segment_of (self);
-  if (segment.format != GST_FORMAT_TIME || segment.rate <= 0)
-    return 0;
-  std::lock_guard guard (self->priv->lock);
-  return period_of (self->priv);
+  const GstSegment &segment = priv->sink->segment;
+  return segment.format == GST_FORMAT_TIME && segment.rate > 0 ? priv->period : 0;
 }
 
 /* The first picture at a stream position or after it. */
@@ -63,24 +39,11 @@ first_picture (const FrameRate &rate, GstClockTime from)
   return gst_util_uint64_scale (gst_util_uint64_scale_ceil (from, n, second), second, n);
 }
 
-GstClockTime
-running_now (GstStripRender *self)
-{
-  return gst_element_get_current_running_time (GST_ELEMENT (self));
-}
-
-bool
-is_live (GstStripRender *self)
-{
-  return GST_CLOCK_TIME_IS_VALID (gst_aggregator_get_latency (GST_AGGREGATOR (self)));
-}
-
 /* ---- late pictures ---- */
 
 bool
 is_late (GstStripRender *self, GstClockTime running)
 {
-  std::lock_guard guard (self->priv->lock);
   const GstClockTime earliest = self->priv->earliest;
   return GST_CLOCK_TIME_IS_VALID (earliest) && GST_CLOCK_TIME_IS_VALID (running) &&
          running <= earliest;
@@ -88,16 +51,15 @@ is_late (GstStripRender *self, GstClockTime running)
 
 /* ns by which a live picture misses its time and the latency; 0 if it does not. */
 GstClockTime
-lateness_at (GstStripRender *self, GstClockTime running, GstClockTime now)
+lateness_at (GstStripRender *self, GstClockTime running)
 {
-  const GstClockTime latency = gst_aggregator_get_latency (GST_AGGREGATOR (self));
+  const GstClockTime now = gst_element_get_current_running_time (GST_ELEMENT (self)),
+                     latency = gst_aggregator_get_latency (GST_AGGREGATOR (self));
   if (!GST_CLOCK_TIME_IS_VALID (running) || !GST_CLOCK_TIME_IS_VALID (now) ||
       !GST_CLOCK_TIME_IS_VALID (latency))
     return 0;
   /* A sink without a queue before it blocks this thread for the pipeline's latency. */
-  std::lock_guard guard (self->priv->lock);
-  const GstClockTime last = running + std::max (latency, self->priv->pipeline_latency);
-  return now - std::min (now, last);
+  return now - std::min (now, running + std::max (latency, self->priv->pipeline_latency.load ()));
 }
 
 /* Counts pictures that are not drawn because they would be late, and posts a QOS message with the
@@ -106,59 +68,36 @@ void
 drop_pictures (GstStripRender *self, guint64 count, GstClockTime pts, GstClockTime duration)
 {
   GstStripRenderPrivate *priv = self->priv;
-  const GstClockTime running = strip_running_time (self, pts);
-  GstClockTime earliest;
+  const GstClockTime running = strip_running_time (self, pts), earliest = priv->earliest;
+  const bool live = GST_CLOCK_TIME_IS_VALID (gst_aggregator_get_latency (GST_AGGREGATOR (self)));
   guint64 drawn, dropped;
   {
     std::lock_guard guard (priv->lock);
     dropped = priv->stats.dropped += count;
     drawn = priv->stats.frames;
-    earliest = priv->earliest;
   }
   priv->discont = true;
   GST_DEBUG_OBJECT (self,
       "dropping %" G_GUINT64_FORMAT " late frame(s) from running time %" GST_TIME_FORMAT, count,
       GST_TIME_ARGS (running));
   GstMessage *message = gst_message_new_qos (
-      GST_OBJECT (self), is_live (self), running, strip_stream_time (self, pts), pts, duration);
+      GST_OBJECT (self), live, running, strip_stream_time (self, pts), pts, duration);
   if (GST_CLOCK_TIME_IS_VALID (earliest))
     gst_message_set_qos_values (message, GST_CLOCK_DIFF (running, earliest), 1.0, 1000000);
   gst_message_set_qos_stats (message, GST_FORMAT_BUFFERS, drawn, dropped);
   gst_element_post_message (GST_ELEMENT (self), message);
 }
 
-/* Pictures that take longer to draw than is left of their period would all be late, so the latency
- * grows. A few slow pictures do not count (shaders are compiled, the machine is busy); latency
- * never shrinks again, because each change interrupts playback. */
-void
-adapt_latency (GstStripRender *self, GstClockTime period, GstClockTime took)
-{
-  constexpr int kMinSlowPictures = 5;
-  GstStripRenderPrivate *priv = self->priv;
-  const GstClockTime rest = period - period / 4;
-  priv->slow_pictures = took > rest + priv->overrun ? priv->slow_pictures + 1 : 0;
-  if (priv->slow_pictures < kMinSlowPictures)
-    return;
-  priv->slow_pictures = 0;
-  {
-    std::lock_guard guard (priv->lock);
-    priv->overrun = std::min<GstClockTime> (took + took / 8 - rest, GST_SECOND);
-  }
-  strip_update_latency (self);
-}
-
 /* ---- drawing ---- */
 
-struct Picture {
-  GstBuffer *frame_set;
-  GstClockTime pts, duration;
-  bool repeated; /* the last one showed the same frame set */
-};
-
+/* Draws a picture of a frame set and pushes it.
+ * @param repeated  the last one showed the same frame set */
 GstFlowReturn
-draw (GstStripRender *self, const Picture &picture, GstBuffer *&out)
+draw (GstStripRender *self, GstBuffer *frame_set, GstClockTime pts, GstClockTime duration,
+    bool repeated)
 {
   GstStripRenderPrivate *priv = self->priv;
+  GstBuffer *out = nullptr;
   GstBufferPool *pool = gst_aggregator_get_buffer_pool (GST_AGGREGATOR (self));
   GstFlowReturn flow = pool && priv->backend && gst_buffer_pool_set_active (pool, TRUE)
                            ? gst_buffer_pool_acquire_buffer (pool, &out, nullptr)
@@ -166,19 +105,20 @@ draw (GstStripRender *self, const Picture &picture, GstBuffer *&out)
   gst_clear_object (&pool);
   if (flow != GST_FLOW_OK)
     return flow;
-  GST_BUFFER_PTS (out) = picture.pts;
-  GST_BUFFER_DURATION (out) = picture.duration;
-  const GstClockTime capture = gst_range_buffer_get_capture_time (picture.frame_set);
+  GST_BUFFER_PTS (out) = pts;
+  GST_BUFFER_DURATION (out) = duration;
+  const GstClockTime capture = gst_range_buffer_get_capture_time (frame_set);
   if (GST_CLOCK_TIME_IS_VALID (capture))
     gst_range_buffer_set_capture_time (out, capture);
-  if (priv->discont.exchange (false))
+  if (std::exchange (priv->discont, false))
     GST_BUFFER_FLAG_SET (out, GST_BUFFER_FLAG_DISCONT);
-  flow = strip_draw_frame (self, picture.frame_set, out, picture.repeated);
-  if (flow != GST_FLOW_OK)
-    gst_clear_buffer (&out);
-  else
-    priv->segment_sent = true; /* with the picture */
-  return flow;
+  flow = strip_draw_frame (self, frame_set, out, repeated);
+  if (flow != GST_FLOW_OK) {
+    gst_buffer_unref (out);
+    return flow;
+  }
+  priv->segment_sent = true; /* with the picture */
+  return gst_aggregator_finish_buffer (GST_AGGREGATOR (self), out);
 }
 
 /* Forwards a gap. */
@@ -213,24 +153,22 @@ draw_each (GstStripRender *self)
 {
   GstStripRenderPrivate *priv = self->priv;
   gst_clear_buffer (&priv->frame_set);
+  priv->next = GST_CLOCK_TIME_NONE;
   GstBuffer *in = gst_aggregator_pad_pop_buffer (priv->sink);
   if (!in)
     return gst_aggregator_pad_is_eos (priv->sink) ? GST_FLOW_EOS : GST_AGGREGATOR_FLOW_NEED_DATA;
-  const GstClockTime pts = GST_BUFFER_PTS (in), duration = GST_BUFFER_DURATION (in);
+  const GstClockTime pts = GST_BUFFER_PTS (in), duration = GST_BUFFER_DURATION (in),
+                     running = strip_running_time (self, pts);
   GstFlowReturn flow = GST_AGGREGATOR_FLOW_NEED_DATA;
   if (gstrange::is_gap (in)) {
     push_gap (self, in);
-  } else if (count_frame_set (priv); is_late (self, strip_running_time (self, pts))) {
+  } else if (count_frame_set (priv);
+             is_late (self, running) ||
+             (gst_aggregator_pad_has_buffer (priv->sink) && lateness_at (self, running) > 0)) {
     drop_pictures (self, 1, pts, duration);
   } else {
-    if (GST_BUFFER_IS_DISCONT (in))
-      priv->discont = true;
-    GstBuffer *out = nullptr;
-    flow = draw (self, {in, pts, duration, false}, out);
-    if (flow == GST_FLOW_OK)
-      flow = gst_aggregator_finish_buffer (GST_AGGREGATOR (self), out);
-    if (GST_CLOCK_TIME_IS_VALID (pts)) /* for the case that downstream requests a rate */
-      priv->next = pts + 1;
+    priv->discont |= bool (GST_BUFFER_IS_DISCONT (in));
+    flow = draw (self, in, pts, duration, false);
   }
   gst_buffer_unref (in);
   return flow;
@@ -238,81 +176,68 @@ draw_each (GstStripRender *self)
 
 /* Draws the next picture if it is in time. */
 GstFlowReturn
-draw_next (GstStripRender *self, GstClockTime period)
+draw_next (GstStripRender *self)
 {
   GstStripRenderPrivate *priv = self->priv;
   const GstClockTime pts = priv->next, running = strip_running_time (self, pts);
   priv->next = first_picture (priv->rate, pts + 1);
   if (!GST_CLOCK_TIME_IS_VALID (running))
     return GST_AGGREGATOR_FLOW_NEED_DATA;
-  const GstClockTime now = running_now (self), lateness = lateness_at (self, running, now);
-  if (lateness > 0) {
-    const guint64 more = lateness / period;
-    drop_pictures (self, more + 1, pts, period);
-    priv->next = first_picture (priv->rate, priv->next + more * period);
+  const GstClockTime lateness = lateness_at (self, running);
+  if (lateness > 0 || is_late (self, running)) {
+    const guint64 more = lateness / priv->period;
+    drop_pictures (self, more + 1, pts, priv->period);
+    priv->next = first_picture (priv->rate, priv->next + more * priv->period);
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
-  if (is_late (self, running)) {
-    drop_pictures (self, 1, pts, period);
-    return GST_AGGREGATOR_FLOW_NEED_DATA;
-  }
-  GstBuffer *out = nullptr;
-  const GstFlowReturn flow =
-      draw (self, {priv->frame_set, pts, period, std::exchange (priv->is_built, true)}, out);
-  if (flow != GST_FLOW_OK)
-    return flow;
-  if (is_live (self) && GST_CLOCK_TIME_IS_VALID (now))
-    adapt_latency (self, period, running_now (self) - now);
-  return gst_aggregator_finish_buffer (GST_AGGREGATOR (self), out);
+  return draw (self, priv->frame_set, pts, priv->period, std::exchange (priv->is_built, true));
 }
 
 /* ---- output frame rate ---- */
 
-/* Whether the next picture, or that after a gap, is to show a frame set. */
+/* Whether the next picture, or that after a gap, is to show a frame set. One without a time is
+ * shown once. */
 bool
-is_due (const GstStripRenderPrivate *priv, GstBuffer *frame_set, GstClockTime period)
+is_due (const GstStripRenderPrivate *priv, GstBuffer *frame_set)
 {
-  const bool timed = GST_BUFFER_PTS_IS_VALID (frame_set);
-  const GstClockTime pts = timed ? GST_BUFFER_PTS (frame_set) : priv->follows, next = priv->next;
-  return !priv->frame_set || gstrange::is_gap (frame_set) || pts <= next + period / 4 ||
-         (pts - next > kMaxGap && next >= priv->end);
+  if (!priv->frame_set || gstrange::is_gap (frame_set))
+    return true;
+  if (!GST_BUFFER_PTS_IS_VALID (frame_set))
+    return priv->is_built;
+  const GstClockTime pts = GST_BUFFER_PTS (frame_set), next = priv->next;
+  return pts <= next + priv->period / 4 || (pts - next > kMaxGap && next >= priv->end);
 }
 
 /* @param frame_set  transfer full */
 void
-take (GstStripRender *self, GstBuffer *frame_set, GstClockTime period)
+take (GstStripRender *self, GstBuffer *frame_set)
 {
   GstStripRenderPrivate *priv = self->priv;
-  const GstSegment &segment = priv->sink->segment;
-  GstClockTime begin = GST_BUFFER_PTS (frame_set), duration = GST_BUFFER_DURATION (frame_set);
-  if (!GST_CLOCK_TIME_IS_VALID (begin))
-    begin = priv->frame_set ? priv->follows : segment.start;
-  const GstClockTime running = strip_running_time (self, begin), now = running_now (self);
-  const bool is_ahead = GST_CLOCK_TIME_IS_VALID (running) && GST_CLOCK_TIME_IS_VALID (now) &&
-                        is_live (self) && running > now + kMaxGap;
-  if (gstrange::is_gap (frame_set) || is_ahead || begin >= G_MAXINT64) {
-    if (is_ahead)
-      GST_WARNING_OBJECT (self, "dropping a frame set whose time is far ahead of the clock");
-    else if (gstrange::is_gap (frame_set) && !priv->frame_set) /* a sink may wait for data */
+  const GstClockTime pts = GST_BUFFER_PTS (frame_set), start = priv->sink->segment.start,
+                     begin = GST_CLOCK_TIME_IS_VALID (pts) ? pts
+                             : priv->frame_set             ? priv->next
+                                                           : start;
+  if (gstrange::is_gap (frame_set) || begin >= G_MAXINT64) {
+    if (!priv->frame_set) /* a sink may wait for data */
       push_gap (self, frame_set);
     gst_buffer_unref (frame_set);
     return;
   }
   count_frame_set (priv);
+  GstClockTime duration = GST_BUFFER_DURATION (frame_set);
   if (!GST_CLOCK_TIME_IS_VALID (duration) || duration == 0)
     duration = priv->info.frame_duration ();
   if (!GST_CLOCK_TIME_IS_VALID (duration) || duration == 0)
-    duration = period;
-  gst_buffer_replace (&priv->frame_set, frame_set);
-  gst_buffer_unref (frame_set);
-  priv->is_built = false;
+    duration = priv->period;
   duration = std::min (duration, kMaxGap);
-  priv->follows = begin + duration;
-  priv->end = priv->follows - std::min (period, duration) / 4; /* ends are not exact */
+  gst_clear_buffer (&priv->frame_set);
+  priv->frame_set = frame_set;
+  priv->is_built = false;
+  priv->end = begin + duration - std::min (priv->period, duration) / 4; /* ends are not exact */
   if (!GST_CLOCK_TIME_IS_VALID (priv->next) || begin > priv->next + kMaxGap ||
-      (begin + kMaxGap < priv->next && !is_live (self)))
-    priv->next = first_picture (
-        priv->rate, std::max<GstClockTime> (begin - std::min (begin, period / 4), segment.start));
+      begin + kMaxGap < priv->next)
+    priv->next =
+        first_picture (priv->rate, std::max (begin - std::min (begin, priv->period / 4), start));
 }
 
 /* Whether the newest frame set is to be shown once more if no other follows. */
@@ -323,22 +248,22 @@ has_more (const GstStripRenderPrivate *priv)
 }
 
 GstFlowReturn
-draw_by_rate (GstStripRender *self, GstClockTime period, bool timeout)
+draw_by_rate (GstStripRender *self, bool timeout)
 {
   GstStripRenderPrivate *priv = self->priv;
   if (GST_CLOCK_TIME_IS_VALID (priv->next)) /* the rate may be another */
     priv->next = first_picture (priv->rate, priv->next);
   while (GstBuffer *head = gst_aggregator_pad_peek_buffer (priv->sink)) {
-    const bool due = is_due (priv, head, period);
+    const bool due = is_due (priv, head);
     gst_buffer_unref (head);
     if (!due)
-      return draw_next (self, period);
+      return draw_next (self);
     if (GstBuffer *popped = gst_aggregator_pad_pop_buffer (priv->sink))
-      take (self, popped, period);
+      take (self, popped);
   }
   if (gst_aggregator_pad_is_eos (priv->sink))
-    return has_more (priv) ? draw_next (self, period) : GST_FLOW_EOS;
-  return timeout && priv->frame_set ? draw_next (self, period) : GST_AGGREGATOR_FLOW_NEED_DATA;
+    return has_more (priv) ? draw_next (self) : GST_FLOW_EOS;
+  return timeout && priv->frame_set ? draw_next (self) : GST_AGGREGATOR_FLOW_NEED_DATA;
 }
 
 } // namespace
@@ -347,8 +272,8 @@ GstFlowReturn
 gst_strip_render_aggregate (GstAggregator *aggregator, gboolean timeout)
 {
   auto self = GST_STRIP_RENDER (aggregator);
-  const GstClockTime period = own_period (self);
-  const GstFlowReturn flow = period > 0 ? draw_by_rate (self, period, timeout) : draw_each (self);
+  const GstFlowReturn flow =
+      own_period (self->priv) > 0 ? draw_by_rate (self, timeout) : draw_each (self);
   if (flow == GST_FLOW_EOS)
     self->priv->reporter.finish ();
   return flow;
@@ -359,46 +284,26 @@ gst_strip_render_get_next_time (GstAggregator *aggregator)
 {
   auto self = GST_STRIP_RENDER (aggregator);
   GstStripRenderPrivate *priv = self->priv;
-  const GstClockTime period = own_period (self);
+  const GstClockTime period = own_period (priv);
   if (period == 0 || !priv->frame_set)
     return GST_CLOCK_TIME_NONE;
   const GstClockTime running = strip_running_time (self, priv->next);
   if (!GST_CLOCK_TIME_IS_VALID (running))
     return GST_CLOCK_TIME_NONE;
   /* GstAggregator adds the latency, which includes a period. */
-  const GstClockTime due = running + period / 4, own = period + priv->overrun;
-  return due - std::min (due, own);
+  const GstClockTime due = running + period / 4;
+  return due - std::min (due, period);
 }
 
 void
 strip_drain (GstStripRender *self)
 {
   GstStripRenderPrivate *priv = self->priv;
-  const GstClockTime period = own_period (self);
-  while (period > 0 && has_more (priv))
-    if (const GstFlowReturn flow = draw_next (self, period);
+  while (own_period (priv) > 0 && has_more (priv))
+    if (const GstFlowReturn flow = draw_next (self);
         flow != GST_FLOW_OK && flow != GST_AGGREGATOR_FLOW_NEED_DATA)
       break;
   gst_clear_buffer (&priv->frame_set);
-}
-
-void
-strip_drop_late (GstStripRender *self)
-{
-  GstStripRenderPrivate *priv = self->priv;
-  GstBuffer *waiting =
-      own_period (self) == 0 ? gst_aggregator_pad_peek_buffer (priv->sink) : nullptr;
-  if (!waiting)
-    return;
-  const GstClockTime running = strip_running_time (self, GST_BUFFER_PTS (waiting));
-  const bool late =
-      !gstrange::is_gap (waiting) && lateness_at (self, running, running_now (self)) > 0;
-  gst_buffer_unref (waiting);
-  if (GstBuffer *dropped = late ? gst_aggregator_pad_pop_buffer (priv->sink) : nullptr) {
-    count_frame_set (priv);
-    drop_pictures (self, 1, GST_BUFFER_PTS (dropped), GST_BUFFER_DURATION (dropped));
-    gst_buffer_unref (dropped);
-  }
 }
 
 void
@@ -407,48 +312,9 @@ strip_reset_stream (GstStripRender *self)
   GstStripRenderPrivate *priv = self->priv;
   gst_clear_buffer (&priv->frame_set);
   priv->next = GST_CLOCK_TIME_NONE;
-  priv->slow_pictures = 0;
   priv->segment_sent = false;
   priv->discont = true;
-  std::lock_guard guard (priv->lock);
   priv->earliest = GST_CLOCK_TIME_NONE;
-}
-
-/* ---- QoS and latency ---- */
-
-void
-strip_update_latency (GstStripRender *self)
-{
-  GstClockTime own;
-  {
-    std::lock_guard guard (self->priv->lock);
-    const GstClockTime period = period_of (self->priv);
-    own = period > 0 ? period + self->priv->overrun : 0;
-  }
-  gst_aggregator_set_latency (GST_AGGREGATOR (self), own, own);
-}
-
-void
-strip_handle_timing_event (GstStripRender *self, GstEvent *event)
-{
-  GstStripRenderPrivate *priv = self->priv;
-  if (GST_EVENT_TYPE (event) == GST_EVENT_LATENCY) {
-    GstClockTime latency;
-    gst_event_parse_latency (event, &latency);
-    std::lock_guard guard (priv->lock);
-    priv->pipeline_latency = GST_CLOCK_TIME_IS_VALID (latency) ? latency : 0;
-    return;
-  }
-  GstQOSType type;
-  GstClockTimeDiff diff;
-  GstClockTime time;
-  gst_event_parse_qos (event, &type, nullptr, &diff, &time);
-  if (!GST_CLOCK_TIME_IS_VALID (time))
-    return;
-  if (diff > 0 && type != GST_QOS_TYPE_THROTTLE)
-    diff *= 2; /* to catch up, instead of being just as late again; as GstVideoDecoder */
-  std::lock_guard guard (priv->lock);
-  priv->earliest = diff < 0 && GstClockTime (-diff) > time ? 0 : time + GstClockTime (diff);
 }
 
 /* ---- times ---- */
@@ -456,17 +322,11 @@ strip_handle_timing_event (GstStripRender *self, GstEvent *event)
 GstClockTime
 strip_running_time (GstStripRender *self, GstClockTime pts)
 {
-  const GstSegment segment = segment_of (self);
-  if (segment.format != GST_FORMAT_TIME) /* then nothing has a time */
-    return GST_CLOCK_TIME_NONE;
-  return gst_segment_to_running_time (&segment, GST_FORMAT_TIME, pts);
+  return gst_segment_to_running_time (&self->priv->sink->segment, GST_FORMAT_TIME, pts);
 }
 
 GstClockTime
 strip_stream_time (GstStripRender *self, GstClockTime pts)
 {
-  const GstSegment segment = segment_of (self);
-  if (segment.format != GST_FORMAT_TIME)
-    return GST_CLOCK_TIME_NONE;
-  return gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, pts);
+  return gst_segment_to_stream_time (&self->priv->sink->segment, GST_FORMAT_TIME, pts);
 }

@@ -32,45 +32,36 @@ gst_strip_render_backend_get_type (void)
   return type;
 }
 
-PropertyTable<OrbitControl> &
-camera_properties ()
-{
-  using S = OrbitControl;
-  using rangecast::Orbit;
-  using rangecast::Vec3;
-  using P = PropertyTable<S>;
-  static P table = {
-      P::number<&S::orbit, &Orbit::azimuth_deg> ("azimuth", "Azimuth",
-          "Camera angle around the scene in degrees, positive to the right of the first view", -360,
-          360, kControllable),
-      P::number<&S::orbit, &Orbit::elevation_deg> ("elevation", "Elevation",
-          "Camera angle above the first view in degrees", -89, 89, kControllable),
-      P::number<&S::orbit, &Orbit::distance_m> ("distance", "Distance",
-          "Distance of the camera from its target in metres (0 = as the first view)", 0, 1000,
-          kControllable),
-      P::number<&S::orbit, &Orbit::fov_deg> ("field-of-view", "Field of view",
-          "Vertical field of view in degrees (0 = as the first view)", 0, 170, kControllable),
-      P::number<&S::orbit, &Orbit::pan, &Vec3::x> ("pan-x", "Pan x",
-          "Shift of the camera target to the first view's right in metres", -1000, 1000,
-          kControllable),
-      P::number<&S::orbit, &Orbit::pan, &Vec3::y> ("pan-y", "Pan y",
-          "Shift of the camera target upwards in metres", -1000, 1000, kControllable),
-      P::number<&S::orbit, &Orbit::pan, &Vec3::z> ("pan-z", "Pan z",
-          "Shift of the camera target towards the first view in metres", -1000, 1000,
-          kControllable),
-      P::number<&S::auto_orbit> ("auto-orbit", "Auto orbit",
-          "Speed of automatic rotation in degrees per second", -3600, 3600, kControllable),
-  };
-  return table;
-}
-
 PropertyTable<StripRenderSettings> &
 strip_properties ()
 {
   using S = StripRenderSettings;
+  using rangecast::Orbit;
+  using rangecast::Vec3;
   using Strips = rangecast::StripSettings;
   using P = PropertyTable<S>;
   static P table = {
+      P::number<&S::camera, &OrbitControl::orbit, &Orbit::azimuth_deg> ("azimuth", "Azimuth",
+          "Camera angle around the scene in degrees, positive to the right of the first view", -360,
+          360, kControllable),
+      P::number<&S::camera, &OrbitControl::orbit, &Orbit::elevation_deg> ("elevation", "Elevation",
+          "Camera angle above the first view in degrees", -89, 89, kControllable),
+      P::number<&S::camera, &OrbitControl::orbit, &Orbit::distance_m> ("distance", "Distance",
+          "Distance of the camera from its target in metres (0 = as the first view)", 0, 1000,
+          kControllable),
+      P::number<&S::camera, &OrbitControl::orbit, &Orbit::fov_deg> ("field-of-view",
+          "Field of view", "Vertical field of view in degrees (0 = as the first view)", 0, 170,
+          kControllable),
+      P::number<&S::camera, &OrbitControl::orbit, &Orbit::pan, &Vec3::x> ("pan-x", "Pan x",
+          "Shift of the camera target to the first view's right in metres", -1000, 1000,
+          kControllable),
+      P::number<&S::camera, &OrbitControl::orbit, &Orbit::pan, &Vec3::y> ("pan-y", "Pan y",
+          "Shift of the camera target upwards in metres", -1000, 1000, kControllable),
+      P::number<&S::camera, &OrbitControl::orbit, &Orbit::pan, &Vec3::z> ("pan-z", "Pan z",
+          "Shift of the camera target towards the first view in metres", -1000, 1000,
+          kControllable),
+      P::number<&S::camera, &OrbitControl::auto_orbit> ("auto-orbit", "Auto orbit",
+          "Speed of automatic rotation in degrees per second", -3600, 3600, kControllable),
       P::number<&S::strips, &Strips::depth_step> ("depth-step", "Depth step",
           "Depth difference, as a fraction of depth, beyond which neighbouring pixels are not "
           "joined",
@@ -100,14 +91,14 @@ strip_properties ()
       P::boolean<&S::keep_rate> ("keep-rate", "Keep rate",
           "Output at the negotiated frame rate even if it is the input's, repeating frames while a "
           "live stream stalls",
-          kMutablePlaying),
+          kMutableReady),
       P::boolean<&S::tint_views> (
           "tint-views", "Tint views", "Tint each point with the colour of its view", kControllable),
       P::enumeration<&S::strips, &Strips::mode> (
           "mode", "Mode", "Rendering mode", GST_TYPE_STRIP_RENDER_MODE, kControllable),
       P::enumeration<&S::backend> ("backend", "Backend",
           "Renderer; the one in use is reported in stats", GST_TYPE_STRIP_RENDER_BACKEND,
-          kMutablePlaying),
+          kMutableReady),
       P::number<&S::background> (
           "background", "Background", "Background colour, ARGB", 0, G_MAXUINT32, kControllable),
       P::number<&S::view_mask> ("view-mask", "View mask",

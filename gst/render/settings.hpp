@@ -26,12 +26,8 @@ struct StripRenderSettings {
   bool keep_rate = false;        ///< even if it is the input's
   RenderBackendChoice backend = RenderBackendChoice::kAuto;
   rangecast::StripSettings strips;
-  guint strips_serial = 0; ///< changes with each property but the camera's
 };
 
-/** The camera's properties: strips do not depend on them. */
-PropertyTable<OrbitControl> &camera_properties ();
-/** The other properties. */
 PropertyTable<StripRenderSettings> &strip_properties ();
 
 GType gst_strip_render_mode_get_type (void);

@@ -27,20 +27,19 @@ struct GstStripRenderPrivate {
   std::mutex lock; /* guards what follows; nothing is pushed, posted or queried with it */
   StripRenderSettings settings;
   RenderStats stats;
-  FrameRate rate;                              /* of the output's caps */
-  GstClockTime earliest = GST_CLOCK_TIME_NONE; /* running time up to which pictures are late */
-  GstClockTime pipeline_latency = 0;           /* from the LATENCY event */
-  GstClockTime overrun = 0; /* latency for drawing that takes longer than a period */
 
+  /* From downstream's QOS and LATENCY events: running time up to which pictures are late, ns. */
+  std::atomic<GstClockTime> earliest = GST_CLOCK_TIME_NONE, pipeline_latency = 0;
   GstAggregatorPad *sink = nullptr;
-  GstPadChainFunction chain = nullptr; /* GstAggregator's, of that pad */
-  OpenGl gl;                           /* has a lock of its own */
-  StatsReporter reporter;              /* has locks of its own */
+  OpenGl gl;              /* has a lock of its own */
+  StatsReporter reporter; /* has locks of its own */
 
   /* Of the aggregator's thread. */
   GstCaps *input = nullptr; /* the last ones that were accepted */
   gstrange::RangeInfo info; /* of these */
   GstVideoInfo out;
+  FrameRate rate;           /* of out */
+  GstClockTime period = 0;  /* ns from one picture to the next; 0: one per frame set */
   bool is_gl = false;       /* out is of OpenGL memory */
   bool lost_opengl = false; /* its context; no other one is made */
   std::unique_ptr<RenderBackend> backend;
@@ -55,11 +54,9 @@ struct GstStripRenderPrivate {
   GstBuffer *frame_set = nullptr;          /* the newest one */
   bool is_built = false;                   /* the scene has its strips */
   GstClockTime end = 0;                    /* of the frame set */
-  GstClockTime follows = 0;                /* the next frame set, if it has no time */
   GstClockTime next = GST_CLOCK_TIME_NONE; /* of the next picture */
-  int slow_pictures = 0; /* the last ones that took longer than a period and `overrun` */
   bool segment_sent = false;
-  std::atomic<bool> discont = true; /* there is no picture right before the next one */
+  bool discont = true; /* there is no picture right before the next one */
 };
 
 G_DECLARE_FINAL_TYPE (GstStripRender, gst_strip_render, GST, STRIP_RENDER, GstAggregator)
@@ -69,22 +66,13 @@ struct _GstStripRender {
   GstStripRenderPrivate *priv;
 };
 
-/** @name scheduling.cpp: which frame set is drawn when. On the aggregator's thread unless they say
- * otherwise @{ */
+/** @name scheduling.cpp: which frame set is drawn when. On the aggregator's thread @{ */
 GstFlowReturn gst_strip_render_aggregate (GstAggregator *aggregator, gboolean timeout);
 GstClockTime gst_strip_render_get_next_time (GstAggregator *aggregator);
 /** Pushes the pictures that the newest frame set still has to show, and forgets it. */
 void strip_drain (GstStripRender *self);
-/** Live, a frame set that is late when the next one arrives is dropped: GstAggregator keeps one
- * while another is drawn, which would add a period or two of latency where drawing cannot keep up.
- * The streaming thread. */
-void strip_drop_late (GstStripRender *self);
 /** Forgets the stream. */
 void strip_reset_stream (GstStripRender *self);
-/** Reports latency that follows from the rate. Any thread, without locks. */
-void strip_update_latency (GstStripRender *self);
-/** A QOS or LATENCY event from downstream. Any thread. */
-void strip_handle_timing_event (GstStripRender *self, GstEvent *event);
 
 /** Running time of a stream position, or GST_CLOCK_TIME_NONE outside of the segment. */
 GstClockTime strip_running_time (GstStripRender *self, GstClockTime pts);

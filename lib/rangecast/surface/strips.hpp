@@ -21,6 +21,7 @@ struct StripSettings {
   StripMode mode = StripMode::kBlend;
   double depth_step = 0.03; ///< neighbours that differ by more than this share of their depth do
                             ///< not belong to one surface
+  bool operator== (const StripSettings &) const = default;
 };
 
 /** Invalid pixels, in a row or a column, that a strip bridges if its two ends are near in depth.

@@ -74,7 +74,9 @@ SurfaceScene::build (std::span<const RangeImage> images, const SurfaceSettings &
 {
   const std::uint64_t reduced = views_against (images, settings, orbit);
   const bool built = same_frame_set && reduced == reduced_ && complete_ &&
-                     count_ == images.size () && built_with_ == settings.serial;
+                     built_with_ == settings &&
+                     std::ranges::equal (images, layers (), {}, &RangeImage::view_id,
+                         [] (const SurfaceLayer &layer) { return layer.image.view_id; });
   complete_ = false; /* what follows may throw */
   count_ = images.size ();
   reduced_ = reduced;
@@ -102,7 +104,7 @@ SurfaceScene::build (std::span<const RangeImage> images, const SurfaceSettings &
       append_hull (layer.image, *layer.view, hull_);
     serial_++;
   }
-  built_with_ = settings.serial;
+  built_with_ = settings;
   complete_ = true;
 }
 

@@ -25,7 +25,7 @@ struct SurfaceLayer {
 struct SurfaceSettings {
   StripSettings strips;
   bool tint_views = false; ///< colours say which camera saw a point
-  unsigned serial = 0;     ///< changes with the settings
+  bool operator== (const SurfaceSettings &) const = default;
 };
 
 /** A frame set prepared for painters, and what follows from its rig. Keeps its memory from one
@@ -78,7 +78,7 @@ private:
   std::array<SurfaceLayer, kMaxViews> layers_;
   std::size_t count_ = 0; /* of the layers */
   std::vector<Vec3> hull_;
-  unsigned built_with_ = 0;   /* SurfaceSettings::serial */
+  SurfaceSettings built_with_;
   std::uint64_t reduced_ = 0; /* bit i: number i of the images */
   bool complete_ = false;     /* the last build() did not throw, and the rig is still the same */
   std::uint64_t serial_ = 1;

@@ -75,7 +75,6 @@ struct Ball {
   {
     SurfaceSettings settings;
     settings.strips.mode = mode;
-    settings.serial = unsigned (mode);
     scene.build (images, settings, orbit, false);
   }
 
