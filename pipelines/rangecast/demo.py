@@ -2,6 +2,7 @@
 """demo: the whole system on one machine. Camera hosts, a parent and a viewer as separate processes, connected by RTP on
 loopback. Measures it and leaves image, video and report in the output folder."""
 
+import argparse
 import json
 import os
 import re
@@ -17,13 +18,17 @@ from .launch import Fail, Launch, fail_unless, has_display
 from .processes import Processes
 
 OUTPUTS = ("avatar.png", "avatar.webm", "report.json")
+# What a machine must keep up with to show the demo in this size.
+TRIAL = {"size": (640, 480), "fps": 10, "frames": 30, "no_video": True, "window": False, "web": None}
 
 
 def add_demo(parser):
     options.add(parser, "--input",
                 help="avatar (default), avatar=MODEL, range, or a folder of recorded pairs with its rig.yaml, as in 'rangecast camera'; "
                 "cameras: the same scene from simulated GigE Vision cameras (fake-cameras of the source tree)")  # fmt: skip
-    options.add(parser, "--views", "--size", "--fps", "--loop", "--depth", "--render", "--threads", "--window")
+    options.add(parser, "--views", "--loop", "--depth", "--render", "--threads", "--window")
+    options.add(parser, "--size", default=None, help="size of the camera images (default 640x480 if this machine keeps up with it, else 320x240)")
+    options.add(parser, "--fps", default=None, help="frame sets per second (default 10 at 640x480, else 15)")
     options.add(parser, "--frames", default=150)
     options.add(parser, "--out", type=str, metavar="DIR", required=False, default="out", help="folder to write to (default out)")
     options.add(parser, "--base-port", default=18400, help="first of views + 2 UDP ports (default 18400)")
@@ -84,13 +89,36 @@ def export_rig(views, size, model, rig, processes):
 
 def demo(args, host):
     check(args)
-    out, log = Path(args.out).resolve(), Path(args.out).resolve() / "log"
+    out = Path(args.out).resolve()
     try:
-        log.mkdir(parents=True, exist_ok=True)
+        (out / "log").mkdir(parents=True, exist_ok=True)
         if not args.print:
-            keep_existing(log / "lock")  # until this program ends
+            keep_existing(out / "log" / "lock")  # until this program ends
     except Fail:
         raise Fail(f"--out: another demo writes to '{out}': give another folder") from None
+    if not (args.size or args.fps or args.print or Path(args.input).is_dir()):
+        choose(args, host)
+    args.size, args.fps = args.size or (320, 240), args.fps or 15
+    if r := run(args, host):
+        report(r, out)
+    return 0
+
+
+def choose(args, host):
+    """Chooses size and rate by a short run."""
+    width, height = TRIAL["size"]
+    print(f"trying {width}x{height} at {TRIAL['fps']} frame sets/s; --size or --fps would skip this", flush=True)
+    r = run(argparse.Namespace(**{**vars(args), **TRIAL}), host)
+    keeps_up = r["whole_frame_sets"] >= 0.9 * r["frames"] and r["fps"] >= 0.9 * TRIAL["fps"]
+    if keeps_up:
+        args.size, args.fps = TRIAL["size"], TRIAL["fps"]
+    print(f"this machine {'keeps up' if keeps_up else 'does not keep up'}: {r['fps']:.1f} frame sets/s, {r['whole_frame_sets']} of {r['frames']} "
+          f"with all views, latency {r['latency_ms']['p50']:.0f} ms", flush=True)  # fmt: skip
+
+
+def run(args, host):
+    """Returns the report; None with --print or --web."""
+    out, log = Path(args.out).resolve(), Path(args.out).resolve() / "log"
     for report_file in log.glob("*.json") if not args.print else ():  # of a run with more views
         report_file.unlink()
     rig, size, viewer_port = str(out / "rig.yaml"), "{}x{}".format(*args.size), args.base_port + args.views
@@ -127,10 +155,10 @@ def demo(args, host):
                                   "--title", f"gst-rangecast: {args.views} stereo cameras")  # fmt: skip
             child = start("server", launch, stdout=subprocess.PIPE, text=True)
             if args.print:
-                return 0
+                return None
             print("open the first link in a browser, or the second one for a dashboard of the rig; Ctrl-C ends the demo:", flush=True)
             fail_unless(serve.follow(parsed, child, rig=True) == 0, "the server for browsers failed")
-            return 0
+            return None
         video = [] if args.no_video else ["--video", out / "avatar.webm"]
         video += ["--window"] if args.window else []
         _, launch = host("view", "--listen", viewer_port, *video, "--jitter", args.jitter, "--render", " ".join(args.render))
@@ -138,7 +166,7 @@ def demo(args, host):
         launch.option("--snapshot", out / "avatar.png", "--report", log / "viewer.json")
         start("viewer", launch)
         if args.print:
-            return 0
+            return None
         if args.no_video:
             (out / "avatar.webm").unlink(missing_ok=True)  # of another run
         while True:
@@ -149,17 +177,20 @@ def demo(args, host):
     if status != 0:
         said = (log / f"{name}.log").read_text(errors="replace") if name != "viewer" else ""
         raise Fail(f"{name} " + (f"was killed by signal {-status}" if status < 0 else "failed") + (f":\n{said}" if said else ""))
-    report(out)
-    return 0
+    return collect(out)
 
 
-def report(out):
+def collect(out):
     """Frames, latency, points and bytes are the viewer's; packets those of parent and viewer; CPU that of all hosts."""
     hosts = {path.stem: json.loads(path.read_text()) for path in sorted((out / "log").glob("*.json"))}
     r = dict(hosts["viewer"])
     for field in ("rtp_packets", "rtp_lost", "cpu_seconds"):
         r[field] = round(sum(host[field] for host in hosts.values()), 3)
     (out / "report.json").write_text(json.dumps(r, indent=2) + "\n")
+    return {**r, "cpu_by_host": ", ".join(f"{name} {host['cpu_seconds']:.1f}" for name, host in hosts.items())}
+
+
+def report(r, out):
     raw, points, whole = r["raw_bytes_per_frame_set"], r["points_per_frame_set"], r["whole_frame_sets"]
     coded = r["coded_bytes_per_frame_set"] / raw if raw else 0
     rows = (
@@ -175,7 +206,7 @@ def report(out):
     print(f"\n{'':26}{'here':28}published (2008)")
     for name, value, published in rows:
         print(f"{name:26}{value:28}{published}".rstrip())
-    print("CPU seconds by host: " + ", ".join(f"{name} {host['cpu_seconds']:.1f}" for name, host in hosts.items()))
+    print("CPU seconds by host: " + r["cpu_by_host"])
     if whole < 0.9 * r["frames"]:
         print(f"warning: this machine is too slow for this size and rate: late views were ignored; try --fps {max(1, int(r['fps'] / 2))}")
     print("  ".join(str(out / name) for name in OUTPUTS if (out / name).exists()))

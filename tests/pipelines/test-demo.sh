@@ -38,6 +38,14 @@ test_demo_renders_a_model_with_large_packets () {
   check_picture demo/avatar.png
 }
 
+test_demo_tries_a_larger_size_first () {
+  rangecast demo --views 1 --frames 10 --input range --out demo >demo.txt
+  check_report demo 10 1
+  local expected=320x240
+  ! grep -q "^this machine keeps up" demo.txt || expected=640x480
+  grep -q "^1 camera hosts at $expected" demo.txt || fail "$(cat demo.txt)"
+}
+
 test_demo_plays_recorded_pairs () {
   # The hosts begin together, whether or not the viewer is there: the recording goes on after the background.
   local view
