@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The page's main thread: it owns the picture and the camera; decoder.js, a worker, owns stream, decoder and geometry. Parameters of the
 // address: src=URL of a recording; server=URL of a stream (default: this page's server, if that has one); stats; fit=0: the first camera's view; azimuth, elevation (degrees); time (ms) and paused;
-// transparent: nothing but the person.
+// transparent: nothing but the person; renderer=webgl or software.
 // A token comes in the fragment (#token=...), which stays in this browser.
 import { Core } from './core.js';
 import { followPointers } from './pointers.js';
-import { HEAD, LAYER, Renderer } from './renderer.js';
+import { makeRenderer } from './renderer.js';
 import { findServer, storeToken, readToken } from './server.js';
 import { Speech } from './speech.js';
 import { Stats } from './stats.js';
@@ -39,7 +39,7 @@ const timeText = (ms) => {
 };
 
 const REST = 500; // ms without a new picture until the last one is drawn with all pixels
-// Where the GPU takes longer than SLOW ms for a picture, pictures that move have fewer pixels, until it takes less than FAST.
+// Where drawing takes longer than SLOW ms for a picture, pictures that move have fewer pixels, until it takes less than FAST.
 const MIN_SCALE = 0.4, SLOW = 80, FAST = 30; // the scale is that of width and height
 
 class Page {
@@ -49,7 +49,7 @@ class Page {
     this.worker.onmessage = ({ data }) => this[data.type] (data);
     this.worker.postMessage ({ type: 'start', module });
     this.camera = new Core (module);
-    this.renderer = new Renderer (canvas, (number) => this.camera.text (this.camera.call ('rc_shader', number)), parameters.has ('transparent'));
+    this.renderer = makeRenderer (canvas, this.camera, parameters.has ('transparent'), parameters.get ('renderer'));
     this.speech = new Speech (say, (wait) => this.worker.postMessage ({ type: 'hold', wait }));
     this.stats = new Stats (element ('stats'), parameters.has ('stats'), (latency) => this.speech.follow (latency));
     this.pending = null; // the newest frame set, not uploaded yet
@@ -165,7 +165,7 @@ class Page {
         this.setScene (frame.state);
         this.renderer.upload (frame.layers);
       }
-      this.renderer.draw (this.picture ());
+      this.renderer.draw ();
     } catch (error) {
       say (error.message);
     }
@@ -179,11 +179,6 @@ class Page {
     this.worker.postMessage ({ type: 'shown' });
     this.stats.shown (frame, performance.now () - begin, scale);
     document.body.dataset.frameSets = Number (document.body.dataset.frameSets ?? 0) + 1;
-  }
-
-  picture () {
-    const at = this.camera.call ('rc_camera_picture', canvas.width, canvas.height, this.renderer.largest);
-    return this.camera.floats (at, HEAD + LAYER * this.renderer.layers.length);
   }
 
   // The camera decides which views are reduced, and the shape of the picture what fits.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Draws frame sets with WebGL2, as striprender does: its shaders, and numbers from the same code (rc_camera_picture). Knows nothing
-// of streams.
+// Draws frame sets as striprender does, with WebGL2 or, where that is software too or missing, in software: the same shaders or the
+// same code, and the same numbers (camera.cpp). Knows nothing of streams.
 
 // rangecast::Shader
 const COVERING = 0, VERTEX = 1, FRAGMENT = 2, FINISH = 3, SUM = 4;
@@ -41,16 +41,49 @@ class Program {
   }
 }
 
-export class Renderer {
-  // shader (number): its source
-  constructor (canvas, shader, transparent = false) {
+// Whether there is a WebGL2 that is not itself software: that takes several times as long as ours.
+const hasGpu = () => {
+  const gl = document.createElement ('canvas').getContext ('webgl2', { failIfMajorPerformanceCaveat: true });
+  const name = gl?.getParameter (gl.getExtension ('WEBGL_debug_renderer_info')?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER);
+  gl?.getExtension ('WEBGL_lose_context')?.loseContext ();
+  return gl && !/swiftshader|llvmpipe|softpipe|basic render/i.test (name);
+};
+
+// core: of the camera; kind: 'webgl' or 'software', or the better one
+export const makeRenderer = (canvas, core, transparent, kind) => {
+  // Kept, so that a picture can be saved at any time.
+  const gl = (kind ?? (hasGpu () ? 'webgl' : 'software')) === 'webgl' && canvas.getContext ('webgl2',
+    { alpha: transparent, premultipliedAlpha: false, antialias: false, depth: true, preserveDrawingBuffer: true, powerPreference: 'high-performance' });
+  return gl ? new WebGlRenderer (canvas, core, transparent, gl) : new SoftwareRenderer (canvas, core, transparent);
+};
+
+class SoftwareRenderer {
+  constructor (canvas, core, transparent) {
     this.canvas = canvas;
-    this.shader = shader;
+    this.core = core;
     this.transparent = transparent;
-    // Kept, so that a picture can be saved at any time.
-    this.gl = canvas.getContext ('webgl2', { alpha: transparent, premultipliedAlpha: false, antialias: false, depth: true, preserveDrawingBuffer: true, powerPreference: 'high-performance' });
-    if (!this.gl)
-      throw new Error ('This browser has no WebGL2, or it is switched off.');
+    this.context = canvas.getContext ('2d', { alpha: transparent });
+    this.largest = 4096;
+  }
+  upload (layers) {
+    layers.forEach (({ vertices }, i) => {
+      const address = this.core.call ('rc_draw_layer', i, vertices.length);
+      this.core.bytes (address, vertices.length).set (vertices);
+    });
+  }
+  draw () {
+    const { width, height } = this.canvas, address = this.core.call ('rc_draw', width, height, this.transparent ? 1 : 0);
+    this.context.putImageData (new ImageData (new Uint8ClampedArray (this.core.memory.buffer, address, 4 * width * height), width, height), 0, 0);
+  }
+  finished () { return Promise.resolve (); }
+}
+
+class WebGlRenderer {
+  constructor (canvas, core, transparent, gl) {
+    this.canvas = canvas;
+    this.core = core;
+    this.transparent = transparent;
+    this.gl = gl;
     this.start ();
   }
 
@@ -68,7 +101,9 @@ export class Renderer {
     this.largest = gl.getParameter (gl.MAX_TEXTURE_SIZE);
   }
 
-  program (vertex, fragment) { return new Program (this.gl, this.shader (vertex), this.shader (fragment)); }
+  program (...numbers) {
+    return new Program (this.gl, ...numbers.map ((number) => this.core.text (this.core.call ('rc_shader', number))));
+  }
 
   // Takes the layers of a frame set: { id, vertices: Uint8Array }.
   upload (layers) {
@@ -112,9 +147,9 @@ export class Renderer {
       gl.texParameteri (gl.TEXTURE_2D, name, value);
   }
 
-  // picture: the floats of rc_camera_picture for the canvas
-  draw (picture) {
-    const { gl, canvas: { width, height } } = this;
+  draw () {
+    const { gl, canvas: { width, height } } = this, address = this.core.call ('rc_camera_picture', width, height, this.largest);
+    const picture = this.core.floats (address, HEAD + LAYER * this.layers.length);
     gl.bindFramebuffer (gl.FRAMEBUFFER, null);
     gl.viewport (0, 0, width, height);
     if (this.transparent)

@@ -261,6 +261,23 @@ test ('another instance draws the scene of the first', () => {
   assert.ok (camera.floats (at, HEAD + 2 * LAYER).every (Number.isFinite));
 });
 
+test ('another instance draws pictures of the scene in software', () => {
+  const maker = decodeFirst (), camera = new Core (wasm), sizes = [];
+  buildScene (maker);
+  camera.input (stateOf (maker));
+  camera.call ('rc_camera_scene', stateOf (maker).length);
+  for (let i = 0; i < 2; i++) {
+    const { vertices, size } = maker.record ('rc_layer', i);
+    camera.bytes (camera.call ('rc_draw_layer', i, size), size).set (maker.bytes (vertices, size));
+  }
+  assert.equal (camera.call ('rc_draw_layer', 2, 12), 0);
+  for (const [width, height] of [[1, 1], [3, 500], [640, 480]]) {
+    const pixels = camera.bytes (camera.call ('rc_draw', width, height, 1), 4 * width * height);
+    sizes.push (pixels.filter ((value, i) => i % 4 === 3 && value > 0).length);
+  }
+  assert.ok (sizes[2] > 0.05 * 640 * 480 && sizes[2] < 0.9 * 640 * 480, `${sizes}`);
+});
+
 test ('a damaged scene is refused', () => {
   const maker = decodeFirst (), camera = new Core (wasm);
   buildScene (maker);

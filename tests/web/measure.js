@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// What a page shows of a stream, as a row of a table. usage: node measure.js ADDRESS SECONDS LABEL
+// What a page shows of a stream, as a row of a table. usage: node measure.js ADDRESS SECONDS LABEL [QUERY]
 // Latency: from capture to the frame after the GPU has drawn, by the server's clock. Resolution: how much of the window's width and height
 // is drawn at the end.
 import { launch, openPage, sleep } from './browser.js';
 
 // Resolves to { pictures (a second), p50, p99 (ms), dropped, firstPicture (ms), scale }
-const measure = async (browser, address, seconds) => {
-  const page = await openPage (browser, `${address}/?stats`, undefined, (made) => made.evaluateOnNewDocument (() => {
+const measure = async (browser, address, seconds, query) => {
+  const page = await openPage (browser, `${address}/?stats&${query}`, undefined, (made) => made.evaluateOnNewDocument (() => {
     const look = setInterval (() => {
       if (document.body?.dataset.frameSets) {
         window.firstPicture = performance.now (); // since the page was opened
@@ -33,9 +33,9 @@ const measure = async (browser, address, seconds) => {
     scale: last.scale };
 };
 
-const [address, seconds, label] = process.argv.slice (2);
+const [address, seconds, label, query = ''] = process.argv.slice (2);
 const browser = await launch ();
-const row = await measure (browser, address, Number (seconds));
+const row = await measure (browser, address, Number (seconds), query);
 const cells = [label, row.pictures.toFixed (1), ...[row.p50, row.p99, row.firstPicture].map ((ms) => `${ms?.toFixed (0)} ms`), `${Math.round (100 * row.scale)} %`, row.dropped];
 console.log (`| ${cells.join (' | ')} |`);
 await browser.close ();

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* The orbiting camera, and the numbers that the shaders take. */
+/* The orbiting camera, the numbers that the shaders take, and pictures drawn without them. */
 #include <algorithm>
 #include <cstring>
 #include <iterator>
+#include <rangecast/render/software_renderer.hpp>
 #include <rangecast/surface/orbit.hpp>
 #include <rangecast/surface/painting.hpp>
 #include <rangecast/surface/shaders.hpp>
@@ -21,6 +22,7 @@ namespace {
 struct Layer {
   View view;
   Roi roi;
+  std::vector<rangecast::SurfaceVertex> vertices; /* see rc_draw_layer() */
 };
 
 struct Scene {
@@ -44,7 +46,7 @@ read_scene (std::span<const std::uint8_t> bytes, Scene &to)
     return false;
   to.home = state.home;
   to.layers.resize (state.layers);
-  for (auto &[view, roi] : to.layers) {
+  for (auto &[view, roi, vertices] : to.layers) {
     web::LayerState layer;
     std::memcpy (&layer, bytes.data (), sizeof layer);
     bytes = bytes.subspan (sizeof layer);
@@ -66,6 +68,9 @@ struct Camera {
   rangecast::OrbitMotion motion;
   Scene scene;
   std::vector<float> picture;
+  rangecast::SoftwareRenderer renderer;
+  std::vector<rangecast::SurfaceLayer> drawn;
+  std::vector<rangecast::Rgbx> pixels;
 };
 
 Camera &
@@ -117,7 +122,7 @@ write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from
   write (to, {shift.a, shift.b, shift.g, double (rangecast::fill_reach (height)),
                  double (rangecast::mirrors (clip_from_world)), double (scene.layers.size ())});
   for (std::size_t i = 0; i < scene.layers.size (); i++) {
-    const auto &[view, roi] = scene.layers[i];
+    const auto &[view, roi, vertices] = scene.layers[i];
     const rangecast::LayerPlace place = rangecast::place_layer (
         rangecast::clip_from_pixel (clip_from_world, view, roi), clip_from_world,
         rangecast::layer_gap (rangecast::StripMode::kBlend, clip_from_world, view));
@@ -133,6 +138,18 @@ write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from
   }
 }
 
+/* A picture's matrices. Drags count in pixels of the last such picture. */
+Mat4
+look (std::int32_t width, std::int32_t height, bool top_first)
+{
+  Camera &c = camera ();
+  const double room_m = std::max (2 * rangecast::kViewGap_m, rangecast::kBlendRange_m);
+  const auto matrices = rangecast::orbit_matrices (
+      c.scene.home, c.motion.orbit, double (width) / height, top_first, {}, c.scene.hull, room_m);
+  c.motion.set_shown (matrices, c.scene.home, width, height);
+  return matrices.clip_from_world;
+}
+
 } // namespace
 
 /** Takes what rc_scene_state() of any instance gave, from the input. @return Outcome */
@@ -146,7 +163,7 @@ RC_EXPORT (rc_camera_scene) std::int32_t rc_camera_scene (std::uint32_t size)
 }
 
 /** The camera's numbers for a picture of the scene, in OpenGL's coordinates (first row at the
- *  bottom). Drags count in pixels of the last such picture.
+ *  bottom).
  *  @param max_side  of a texture, pixels
  *  @return as write_picture() */
 RC_EXPORT (rc_camera_picture)
@@ -154,12 +171,50 @@ const float *
 rc_camera_picture (std::int32_t width, std::int32_t height, std::int32_t max_side)
 {
   Camera &c = camera ();
-  const double room_m = std::max (2 * rangecast::kViewGap_m, rangecast::kBlendRange_m);
-  const auto matrices = rangecast::orbit_matrices (
-      c.scene.home, c.motion.orbit, double (width) / height, false, {}, c.scene.hull, room_m);
-  c.motion.set_shown (matrices, c.scene.home, width, height);
-  write_picture (c.picture, c.scene, matrices.clip_from_world, width, height, max_side);
+  write_picture (c.picture, c.scene, look (width, height, false), width, height, max_side);
   return c.picture.data ();
+}
+
+/** @return where the vertices of a layer of the scene are to be written for rc_draw(); nullptr if
+ *  there is no such layer or it has none */
+RC_EXPORT (rc_draw_layer) void *rc_draw_layer (std::uint32_t index, std::uint32_t bytes)
+{
+  Camera &c = camera ();
+  if (index >= c.scene.layers.size ())
+    return nullptr;
+  c.scene.layers[index].vertices.resize (bytes / sizeof (rangecast::SurfaceVertex));
+  return c.scene.layers[index].vertices.data ();
+}
+
+/** Draws the scene as striprender does in software.
+ *  @param transparent  1: without background
+ *  @return R, G, B, A of the pixels, rows from the top */
+RC_EXPORT (rc_draw)
+const rangecast::Rgbx *
+rc_draw (std::int32_t width, std::int32_t height, std::int32_t transparent)
+{
+  Camera &c = camera ();
+  rangecast::SurfacePicture picture;
+  picture.clip_from_world = look (width, height, true);
+  picture.width = width;
+  picture.height = height;
+  picture.part = {0, 0, width, height};
+  picture.covered =
+      rangecast::covered_part (picture.clip_from_world, c.scene.hull, width, height, picture.part);
+  for (int i = 0; i < 4; i++)
+    picture.background[i] =
+        transparent
+            ? 0
+            : float (
+                  (0xff000000 | rangecast::kBackgroundColour) >> (i == 3 ? 24 : 16 - 8 * i) & 255) /
+                  255;
+  c.drawn.clear ();
+  for (const Layer &layer : c.scene.layers)
+    c.drawn.push_back ({{layer.view.id, layer.roi, {}, {}}, &layer.view, layer.vertices});
+  c.pixels.resize (std::size_t (width) * std::size_t (height));
+  c.renderer.draw (picture, c.drawn,
+      {c.pixels.data (), width, height, std::ptrdiff_t (sizeof (rangecast::Rgbx)) * width});
+  return c.pixels.data ();
 }
 
 /** @return a record: azimuth, elevation (degrees), distance (metres, 0: default), field of view
