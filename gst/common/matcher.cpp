@@ -373,7 +373,7 @@ refuse_bytes (GstAggregatorPad *pad, GstEvent *event)
   GstObject *element = gst_object_get_parent (GST_OBJECT (pad));
   GST_ELEMENT_ERROR (element, STREAM, FORMAT,
       ("Pad %s receives bytes without times: put a parser or decoder before it, for .rcnc files "
-       "neighbourcodeparse",
+       "neighbourcodeparse, and set format=time on an appsrc",
           GST_PAD_NAME (pad)),
       (nullptr));
   gst_object_unref (element);

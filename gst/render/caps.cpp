@@ -35,18 +35,11 @@ filtered (GstCaps *caps, GstCaps *filter)
  * would be merged by elements downstream that simplify caps, into caps that are no longer a subset
  * of ours (GStreamer 1.22). */
 GstCaps *
-strip_output_caps (const GstCaps *input, GstCaps *output_template, GstCaps *filter)
+strip_output_caps (GstCaps *output_template, GstCaps *filter)
 {
   GstCaps *output = gst_caps_copy (output_template);
-  const GValue *rate = frame_rate (input);
-  const bool too_fast = rate && GST_VALUE_HOLDS_FRACTION (rate) &&
-                        gst_util_fraction_compare (gst_value_get_fraction_numerator (rate),
-                            gst_value_get_fraction_denominator (rate), kMaxFrameRate, 1) > 0;
-  if (too_fast)
-    gst_caps_set_value (output, "framerate", rate);
-  else
-    gst_caps_set_simple (
-        output, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, kMaxFrameRate, 1, nullptr);
+  gst_caps_set_simple (
+      output, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, kMaxFrameRate, 1, nullptr);
   return filtered (output, filter);
 }
 
@@ -118,15 +111,4 @@ strip_has_flags_as_text (const GstCaps *output)
 {
   const GstStructure *s = gst_caps_get_structure (output, 0);
   return gst_structure_has_field_typed (s, "multiview-flags", G_TYPE_STRING);
-}
-
-FrameRate
-strip_output_rate (const GstCaps *input, const GstCaps *output)
-{
-  int in_n = 0, in_d = 1;
-  FrameRate rate;
-  gst_structure_get_fraction (gst_caps_get_structure (input, 0), "framerate", &in_n, &in_d);
-  gst_structure_get_fraction (gst_caps_get_structure (output, 0), "framerate", &rate.n, &rate.d);
-  rate.is_inputs = gst_util_fraction_compare (rate.n, rate.d, in_n, in_d) == 0;
-  return rate;
 }

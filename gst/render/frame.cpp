@@ -131,11 +131,7 @@ draw (
     return status;
   if (Status status = check_images (priv->info.rig, frame.views ()); !status.ok ())
     return status;
-  StripRenderSettings settings;
-  {
-    std::lock_guard guard (priv->lock);
-    settings = priv->settings;
-  }
+  const StripRenderSettings settings = priv->settings_now ();
   const GstClockTime running = strip_running_time (self, GST_BUFFER_PTS (out));
   const auto orbit = settings.camera.at (orbit_time (priv, running));
   priv->scene.build (visible_images (self, frame.views (), settings.view_mask),
@@ -167,11 +163,8 @@ strip_draw_frame (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bo
   if (!status.ok ())
     return gst_range_flow_return (GST_ELEMENT (self), status);
   if (result.failure) {
-    bool may_go_on;
-    {
-      std::lock_guard guard (priv->lock);
-      may_go_on = priv->is_gl && priv->settings.backend == RenderBackendChoice::kAuto;
-    }
+    const bool may_go_on =
+        priv->is_gl && priv->settings_now ().backend == RenderBackendChoice::kAuto;
     if (!may_go_on || std::exchange (priv->lost_opengl, true)) {
       GST_ELEMENT_ERROR (
           self, RESOURCE, WRITE, ("Could not draw into the output: %s", result.failure), (nullptr));

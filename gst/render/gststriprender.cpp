@@ -64,11 +64,7 @@ caps_of_backend (GstStripRender *self, GstCaps *downstream)
                        system_caps = GST_STATIC_CAPS (STRIP_SYSTEM_CAPS);
   GstStripRenderPrivate *priv = self->priv;
   GstCaps *gl = gst_static_caps_get (&gl_caps), *system = gst_static_caps_get (&system_caps);
-  RenderBackendChoice choice;
-  {
-    std::lock_guard guard (priv->lock);
-    choice = priv->settings.backend;
-  }
+  const RenderBackendChoice choice = priv->settings_now ().backend;
   bool by_gl = choice == RenderBackendChoice::kOpenGl;
   if (choice == RenderBackendChoice::kAuto && gst_caps_can_intersect (downstream, gl))
     by_gl = !gst_caps_can_intersect (downstream, system) ||
@@ -141,13 +137,6 @@ choose_pool (GstStripRender *self, GstQuery *query)
 
 } // namespace
 
-/* Upstream has no use for a pool of pictures. */
-static gboolean
-gst_strip_render_propose_allocation (GstAggregator *, GstAggregatorPad *, GstQuery *, GstQuery *)
-{
-  return TRUE;
-}
-
 static gboolean
 gst_strip_render_decide_allocation (GstAggregator *aggregator, GstQuery *query)
 {
@@ -165,26 +154,9 @@ gst_strip_render_decide_allocation (GstAggregator *aggregator, GstQuery *query)
   return ready;
 }
 
-static void
-gst_strip_render_set_context (GstElement *element, GstContext *context)
-{
-  GST_STRIP_RENDER (element)->priv->gl.set (element, context);
-  GST_ELEMENT_CLASS (gst_strip_render_parent_class)->set_context (element, context);
-}
-
 /* ---- caps ---- */
 
 namespace {
-
-/* Whether both rigs have the same cameras, in other poses perhaps. */
-bool
-has_same_cameras (const rangecast::Rig &a, const rangecast::Rig &b)
-{
-  return std::ranges::equal (
-      a.views, b.views, [] (const rangecast::View &v, const rangecast::View &w) {
-        return v.id == w.id && v.width == w.width && v.height == w.height;
-      });
-}
 
 /* rangealign may correct poses at any time: a fit outlasts that. */
 bool
@@ -197,10 +169,9 @@ handle_input_caps (GstStripRender *self, GstCaps *caps)
   gstrange::RangeInfo info;
   const Status status = gstrange::parse_caps (caps, info);
   if (status.ok ()) {
-    if (!has_same_cameras (info.rig, priv->info.rig))
-      priv->fit.reset ();
     priv->info = std::move (info);
-    priv->scene.set_rig (priv->info.rig);
+    if (!priv->scene.set_rig (priv->info.rig))
+      priv->fit.reset ();
     priv->reporter.set_views (priv->info.rig);
     gst_caps_replace (&priv->input, caps);
   }
@@ -238,15 +209,9 @@ gst_strip_render_update_src_caps (GstAggregator *aggregator, GstCaps *wanted, Gs
         ("backend=opengl: striprender was built without OpenGL; use auto or software"), (nullptr));
     return GST_FLOW_NOT_NEGOTIATED;
   }
-  *caps = strip_output_caps (priv->input, output, wanted);
+  *caps = strip_output_caps (output, wanted);
   gst_caps_unref (output);
   return GST_FLOW_OK;
-}
-
-static GstCaps *
-gst_strip_render_fixate_src_caps (GstAggregator *aggregator, GstCaps *caps)
-{
-  return strip_fixate_output (caps, GST_STRIP_RENDER (aggregator)->priv->input);
 }
 
 static gboolean
@@ -265,15 +230,12 @@ gst_strip_render_negotiated_src_caps (GstAggregator *aggregator, GstCaps *caps)
   if (!gst_video_info_from_caps (&priv->out, caps))
     return FALSE;
   priv->is_gl = is_gl (caps);
-  const FrameRate rate = priv->rate = strip_output_rate (priv->input, caps);
-  bool keep_rate;
-  {
-    std::lock_guard guard (priv->lock);
-    keep_rate = priv->settings.keep_rate;
-  }
-  const bool own = rate.n > 0 && (!rate.is_inputs || keep_rate) &&
-                   gst_util_fraction_compare (rate.n, rate.d, kMaxFrameRate, 1) <= 0;
-  priv->period = own ? gst_util_uint64_scale (GST_SECOND, guint64 (rate.d), guint64 (rate.n)) : 0;
+  const GstVideoInfo &out = priv->out;
+  const bool is_inputs =
+      gst_util_fraction_compare (out.fps_n, out.fps_d, priv->info.fps_n, priv->info.fps_d) == 0;
+  priv->period = out.fps_n > 0 && (!is_inputs || priv->settings_now ().keep_rate)
+                     ? gst_util_uint64_scale (GST_SECOND, guint64 (out.fps_d), guint64 (out.fps_n))
+                     : 0;
   gst_aggregator_set_latency (aggregator, priv->period, priv->period);
   return TRUE;
 }
@@ -328,53 +290,36 @@ gst_strip_render_sink_query (GstAggregator *aggregator, GstAggregatorPad *pad, G
       if (self->priv->gl.answer (GST_ELEMENT (self), query))
         return TRUE;
       break;
-    case GST_QUERY_DRAIN: /* upstream wants its memory back */
-      if (GstBuffer *copy =
-              self->priv->frame_set ? gst_buffer_copy_deep (self->priv->frame_set) : nullptr) {
-        gst_buffer_replace (&self->priv->frame_set, copy);
-        gst_buffer_unref (copy);
-      }
-      break;
     default:
       break;
   }
   return GST_AGGREGATOR_CLASS (gst_strip_render_parent_class)->sink_query (aggregator, pad, query);
 }
 
-namespace {
-
-bool
-handle_navigation (GstStripRender *self, GstEvent *event)
-{
-  GstStripRenderPrivate *priv = self->priv;
-  StripRenderSettings before, after;
-  bool handled;
-  {
-    std::lock_guard guard (priv->lock);
-    before = priv->settings;
-    handled = priv->settings.camera.handle (event);
-    after = priv->settings;
-  }
-  strip_properties ().notify_changes (G_OBJECT (self), before, after);
-  return handled;
-}
-
-} // namespace
-
 static gboolean
 gst_strip_render_src_event (GstAggregator *aggregator, GstEvent *event)
 {
   auto self = GST_STRIP_RENDER (aggregator);
+  GstStripRenderPrivate *priv = self->priv;
   if (GST_EVENT_TYPE (event) == GST_EVENT_NAVIGATION) { /* GstAggregator forwards none */
-    if (!handle_navigation (self, event))
-      return gst_pad_push_event (GST_PAD (self->priv->sink), event);
+    StripRenderSettings before, after;
+    bool handled;
+    {
+      std::lock_guard guard (priv->lock);
+      before = priv->settings;
+      handled = priv->settings.camera.handle (event);
+      after = priv->settings;
+    }
+    strip_properties ().notify_changes (G_OBJECT (self), before, after);
+    if (!handled)
+      return gst_pad_push_event (GST_PAD (priv->sink), event);
     gst_event_unref (event);
     return TRUE;
   }
   if (GST_EVENT_TYPE (event) == GST_EVENT_LATENCY) {
     GstClockTime latency;
     gst_event_parse_latency (event, &latency);
-    self->priv->pipeline_latency = GST_CLOCK_TIME_IS_VALID (latency) ? latency : 0;
+    priv->pipeline_latency = GST_CLOCK_TIME_IS_VALID (latency) ? latency : 0;
   } else if (GST_EVENT_TYPE (event) == GST_EVENT_QOS) {
     GstQOSType type;
     GstClockTimeDiff diff;
@@ -383,7 +328,7 @@ gst_strip_render_src_event (GstAggregator *aggregator, GstEvent *event)
     if (diff > 0 && type != GST_QOS_TYPE_THROTTLE)
       diff *= 2; /* to catch up, instead of being just as late again; as GstVideoDecoder */
     if (GST_CLOCK_TIME_IS_VALID (time))
-      self->priv->earliest = diff < 0 && GstClockTime (-diff) > time ? 0 : time + diff;
+      priv->earliest = diff < 0 && GstClockTime (-diff) > time ? 0 : time + diff;
   }
   return GST_AGGREGATOR_CLASS (gst_strip_render_parent_class)->src_event (aggregator, event);
 }
@@ -429,20 +374,12 @@ gst_strip_render_start (GstAggregator *aggregator)
   priv->stats_text = {};
   priv->lost_opengl = false;
   priv->fit.reset ();
-  strip_reset_stream (self);
   priv->reporter.start (GST_ELEMENT (self), collect_stats);
   std::lock_guard guard (priv->lock);
   priv->stats = {};
   priv->pipeline_latency = 0;
   priv->settings.camera.release ();
   return TRUE;
-}
-
-static GstFlowReturn
-gst_strip_render_flush (GstAggregator *aggregator)
-{
-  strip_reset_stream (GST_STRIP_RENDER (aggregator));
-  return GST_FLOW_OK;
 }
 
 static gboolean
@@ -485,12 +422,16 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
         element_class, pad_template, GST_TYPE_AGGREGATOR_PAD);
   gst_element_class_set_static_metadata (element_class, "Strip renderer", "Filter/Converter/Video",
       "Renders range images without building a mesh", "gst-rangecast");
-  element_class->set_context = GST_DEBUG_FUNCPTR (gst_strip_render_set_context);
+  element_class->set_context = [] (GstElement *element, GstContext *context) {
+    GST_STRIP_RENDER (element)->priv->gl.set (element, context);
+    GST_ELEMENT_CLASS (gst_strip_render_parent_class)->set_context (element, context);
+  };
 
   aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_strip_render_update_src_caps);
-  aggregator_class->fixate_src_caps = GST_DEBUG_FUNCPTR (gst_strip_render_fixate_src_caps);
+  aggregator_class->fixate_src_caps = [] (GstAggregator *aggregator, GstCaps *caps) {
+    return strip_fixate_output (caps, GST_STRIP_RENDER (aggregator)->priv->input);
+  };
   aggregator_class->negotiated_src_caps = GST_DEBUG_FUNCPTR (gst_strip_render_negotiated_src_caps);
-  aggregator_class->propose_allocation = GST_DEBUG_FUNCPTR (gst_strip_render_propose_allocation);
   aggregator_class->decide_allocation = GST_DEBUG_FUNCPTR (gst_strip_render_decide_allocation);
   aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_strip_render_sink_event);
   aggregator_class->sink_query = GST_DEBUG_FUNCPTR (gst_strip_render_sink_query);
@@ -498,7 +439,10 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
   aggregator_class->src_query = GST_DEBUG_FUNCPTR (gst_strip_render_src_query);
   aggregator_class->aggregate = aggregate_to_the_end<gst_strip_render_aggregate>;
   aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_strip_render_get_next_time);
-  aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_strip_render_flush);
+  aggregator_class->flush = [] (GstAggregator *aggregator) {
+    strip_reset_stream (GST_STRIP_RENDER (aggregator));
+    return GST_FLOW_OK;
+  };
   aggregator_class->start = GST_DEBUG_FUNCPTR (gst_strip_render_start);
   aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_strip_render_stop);
 }

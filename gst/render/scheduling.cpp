@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* When striprender draws. GstAggregator waits for frame sets, live also for the clock, and calls
- * aggregate() on the source pad's thread, as all of this is. There are two modes:
+ * aggregate() on the source pad's thread; all functions here run on it. There are two modes:
  *
  * One picture per frame set, if the output has the input's frame rate or none: a picture has the
  * times of its frame set. Live, one that is late is skipped if the next frame set is there.
@@ -8,9 +8,9 @@
  * A frame rate of its own, if downstream requested another one than the input's, or keep-rate is
  * set: pictures are at whole multiples of the period, counted from stream position 0. A picture
  * shows the newest frame set that is no more than a quarter of a period after it, so that slightly
- * uneven times neither repeat a frame set nor skip one. Live, a picture whose frame set no later
- * one has followed is drawn a quarter of a period (and upstream's latency) after its time, and has
- * the rest of the period to be drawn in: the stream may stall. */
+ * uneven times neither repeat a frame set nor skip one. Live, if no later frame set has
+ * arrived, a picture is drawn a quarter of a period (and upstream's latency) after its time: the
+ * stream may stall. The rest of the period, and the property latency, is time to draw in. */
 #include <algorithm>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangepairing.hpp>
@@ -33,9 +33,9 @@ own_period (const GstStripRenderPrivate *priv)
 
 /* The first picture at a stream position or after it. */
 GstClockTime
-first_picture (const FrameRate &rate, GstClockTime from)
+first_picture (const GstVideoInfo &out, GstClockTime from)
 {
-  const guint64 second = guint64 (rate.d) * GST_SECOND, n = guint64 (rate.n);
+  const guint64 second = guint64 (out.fps_d) * GST_SECOND, n = guint64 (out.fps_n);
   return gst_util_uint64_scale (gst_util_uint64_scale_ceil (from, n, second), second, n);
 }
 
@@ -130,12 +130,9 @@ push_gap (GstStripRender *self, GstBuffer *gap)
   if (!GST_CLOCK_TIME_IS_VALID (GST_BUFFER_PTS (gap)) || !gst_pad_has_current_caps (src))
     return;
   if (!std::exchange (priv->segment_sent, true)) { /* GstAggregator sends it with buffers only */
-    GstEvent *event = gst_event_new_segment (&priv->sink->segment);
-    if (GstEvent *cause = gst_pad_get_sticky_event (GST_PAD (priv->sink), GST_EVENT_SEGMENT, 0)) {
-      gst_event_set_seqnum (event, gst_event_get_seqnum (cause));
-      gst_event_unref (cause);
-    }
-    gst_pad_push_event (src, event);
+    GstEvent *segment = gst_pad_get_sticky_event (GST_PAD (priv->sink), GST_EVENT_SEGMENT, 0);
+    if (segment)
+      gst_pad_push_event (src, segment);
   }
   gst_pad_push_event (src, gst_event_new_gap (GST_BUFFER_PTS (gap), GST_BUFFER_DURATION (gap)));
 }
@@ -180,14 +177,14 @@ draw_next (GstStripRender *self)
 {
   GstStripRenderPrivate *priv = self->priv;
   const GstClockTime pts = priv->next, running = strip_running_time (self, pts);
-  priv->next = first_picture (priv->rate, pts + 1);
+  priv->next = first_picture (priv->out, pts + 1);
   if (!GST_CLOCK_TIME_IS_VALID (running))
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   const GstClockTime lateness = lateness_at (self, running);
   if (lateness > 0 || is_late (self, running)) {
     const guint64 more = lateness / priv->period;
     drop_pictures (self, more + 1, pts, priv->period);
-    priv->next = first_picture (priv->rate, priv->next + more * priv->period);
+    priv->next = first_picture (priv->out, priv->next + more * priv->period);
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
   return draw (self, priv->frame_set, pts, priv->period, std::exchange (priv->is_built, true));
@@ -195,16 +192,15 @@ draw_next (GstStripRender *self)
 
 /* ---- output frame rate ---- */
 
-/* Whether the next picture, or that after a gap, is to show a frame set. One without a time is
- * shown once. */
+/* Whether the next picture, or that after a gap, is to show a frame set. One without a time follows
+ * the one before. */
 bool
 is_due (const GstStripRenderPrivate *priv, GstBuffer *frame_set)
 {
   if (!priv->frame_set || gstrange::is_gap (frame_set))
     return true;
-  if (!GST_BUFFER_PTS_IS_VALID (frame_set))
-    return priv->is_built;
-  const GstClockTime pts = GST_BUFFER_PTS (frame_set), next = priv->next;
+  const bool timed = GST_BUFFER_PTS_IS_VALID (frame_set);
+  const GstClockTime pts = timed ? GST_BUFFER_PTS (frame_set) : priv->end, next = priv->next;
   return pts <= next + priv->period / 4 || (pts - next > kMaxGap && next >= priv->end);
 }
 
@@ -215,7 +211,7 @@ take (GstStripRender *self, GstBuffer *frame_set)
   GstStripRenderPrivate *priv = self->priv;
   const GstClockTime pts = GST_BUFFER_PTS (frame_set), start = priv->sink->segment.start,
                      begin = GST_CLOCK_TIME_IS_VALID (pts) ? pts
-                             : priv->frame_set             ? priv->next
+                             : priv->frame_set             ? priv->end
                                                            : start;
   if (gstrange::is_gap (frame_set) || begin >= G_MAXINT64) {
     if (!priv->frame_set) /* a sink may wait for data */
@@ -233,26 +229,25 @@ take (GstStripRender *self, GstBuffer *frame_set)
   gst_clear_buffer (&priv->frame_set);
   priv->frame_set = frame_set;
   priv->is_built = false;
-  priv->end = begin + duration - std::min (priv->period, duration) / 4; /* ends are not exact */
+  priv->end = begin + duration;
+  priv->slack = std::min (priv->period, duration) / 4;
   if (!GST_CLOCK_TIME_IS_VALID (priv->next) || begin > priv->next + kMaxGap ||
       begin + kMaxGap < priv->next)
     priv->next =
-        first_picture (priv->rate, std::max (begin - std::min (begin, priv->period / 4), start));
+        first_picture (priv->out, std::max (begin - std::min (begin, priv->period / 4), start));
 }
 
 /* Whether the newest frame set is to be shown once more if no other follows. */
 bool
 has_more (const GstStripRenderPrivate *priv)
 {
-  return priv->frame_set && priv->next < priv->end;
+  return priv->frame_set && priv->next + priv->slack < priv->end;
 }
 
 GstFlowReturn
 draw_by_rate (GstStripRender *self, bool timeout)
 {
   GstStripRenderPrivate *priv = self->priv;
-  if (GST_CLOCK_TIME_IS_VALID (priv->next)) /* the rate may be another */
-    priv->next = first_picture (priv->rate, priv->next);
   while (GstBuffer *head = gst_aggregator_pad_peek_buffer (priv->sink)) {
     const bool due = is_due (priv, head);
     gst_buffer_unref (head);
@@ -290,9 +285,11 @@ gst_strip_render_get_next_time (GstAggregator *aggregator)
   const GstClockTime running = strip_running_time (self, priv->next);
   if (!GST_CLOCK_TIME_IS_VALID (running))
     return GST_CLOCK_TIME_NONE;
-  /* GstAggregator adds the latency, which includes a period. */
+  guint64 more = 0;
+  g_object_get (self, "latency", &more, nullptr);
+  /* GstAggregator adds the whole latency, which includes a period and `more`. */
   const GstClockTime due = running + period / 4;
-  return due - std::min (due, period);
+  return due - std::min (due, period + more);
 }
 
 void

@@ -24,11 +24,17 @@ GST_DEBUG_CATEGORY_EXTERN (strip_render_debug);
 #define GST_CAT_DEFAULT strip_render_debug
 
 struct GstStripRenderPrivate {
+  StripRenderSettings settings_now ()
+  {
+    std::lock_guard guard (lock);
+    return settings;
+  }
+
   std::mutex lock; /* guards what follows; nothing is pushed, posted or queried with it */
   StripRenderSettings settings;
   RenderStats stats;
 
-  /* From downstream's QOS and LATENCY events: running time up to which pictures are late, ns. */
+  /* From downstream's events: running time up to which pictures are late (QOS); ns (LATENCY). */
   std::atomic<GstClockTime> earliest = GST_CLOCK_TIME_NONE, pipeline_latency = 0;
   GstAggregatorPad *sink = nullptr;
   OpenGl gl;              /* has a lock of its own */
@@ -38,7 +44,6 @@ struct GstStripRenderPrivate {
   GstCaps *input = nullptr; /* the last ones that were accepted */
   gstrange::RangeInfo info; /* of these */
   GstVideoInfo out;
-  FrameRate rate;           /* of out */
   GstClockTime period = 0;  /* ns from one picture to the next; 0: one per frame set */
   bool is_gl = false;       /* out is of OpenGL memory */
   bool lost_opengl = false; /* its context; no other one is made */
@@ -53,7 +58,7 @@ struct GstStripRenderPrivate {
   /* Of the same, if the output has a frame rate of its own: stream positions. */
   GstBuffer *frame_set = nullptr;          /* the newest one */
   bool is_built = false;                   /* the scene has its strips */
-  GstClockTime end = 0;                    /* of the frame set */
+  GstClockTime end = 0, slack = 0;         /* of the frame set; ends are not exact */
   GstClockTime next = GST_CLOCK_TIME_NONE; /* of the next picture */
   bool segment_sent = false;
   bool discont = true; /* there is no picture right before the next one */

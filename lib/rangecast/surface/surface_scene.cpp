@@ -10,7 +10,7 @@
 
 namespace rangecast {
 
-void
+bool
 SurfaceScene::set_rig (const Rig &rig)
 {
   constexpr double kMoved = 0.1; /* metres; rangealign corrects poses by less */
@@ -27,6 +27,7 @@ SurfaceScene::set_rig (const Rig &rig)
   frame_ = scene_frame (known_);
   count_ = 0;
   complete_ = false;
+  return same;
 }
 
 /* The views, by number of their image, that look against the viewer or past them while another one

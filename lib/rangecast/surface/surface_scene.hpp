@@ -34,8 +34,8 @@ class SurfaceScene {
 public:
   /** The rig must live as long as it is used here. Views that have left still count for frame(), so
    * that the picture does not turn, unless another one is elsewhere now: then this is another rig.
-   */
-  void set_rig (const Rig &rig);
+   *  @return whether it is the same rig, with other views or slightly corrected perhaps */
+  bool set_rig (const Rig &rig);
   /** Forgets the views that have left. */
   void reset () { known_ = {}; }
   /** The camera's default position, from the rig and the views that have left. */
