@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -18,7 +19,7 @@ from .launch import Fail, Launch, fail_unless, has_display
 from .processes import Processes
 
 OUTPUTS = ("avatar.png", "avatar.webm", "report.json")
-# What a machine must keep up with to show the demo in this size.
+# A machine that keeps up with this gets this size and rate.
 TRIAL = {"size": (640, 480), "fps": 10, "frames": 30, "no_video": True, "window": False, "web": None}
 
 
@@ -98,7 +99,8 @@ def demo(args, host):
         raise Fail(f"--out: another demo writes to '{out}': give another folder") from None
     if not (args.size or args.fps or args.print or Path(args.input).is_dir()):
         choose(args, host)
-    args.size, args.fps = args.size or (320, 240), args.fps or 15
+    args.size = args.size or (320, 240)
+    args.fps = args.fps or (10 if args.size == TRIAL["size"] else 15)
     if r := run(args, host):
         report(r, out)
     return 0
@@ -108,7 +110,12 @@ def choose(args, host):
     """Chooses size and rate by a short run."""
     width, height = TRIAL["size"]
     print(f"trying {width}x{height} at {TRIAL['fps']} frame sets/s; --size or --fps would skip this", flush=True)
-    r = run(argparse.Namespace(**{**vars(args), **TRIAL}), host)
+    try:
+        r = run(argparse.Namespace(**{**vars(args), **TRIAL, "out": Path(args.out, "trial")}), host)
+    except Fail:
+        return  # and 320x240 says why, if it cannot be shown either
+    finally:
+        shutil.rmtree(Path(args.out, "trial"), ignore_errors=True)
     keeps_up = r["whole_frame_sets"] >= 0.9 * r["frames"] and r["fps"] >= 0.9 * TRIAL["fps"]
     if keeps_up:
         args.size, args.fps = TRIAL["size"], TRIAL["fps"]
@@ -119,6 +126,7 @@ def choose(args, host):
 def run(args, host):
     """Returns the report; None with --print or --web."""
     out, log = Path(args.out).resolve(), Path(args.out).resolve() / "log"
+    log.mkdir(parents=True, exist_ok=True)
     for report_file in log.glob("*.json") if not args.print else ():  # of a run with more views
         report_file.unlink()
     rig, size, viewer_port = str(out / "rig.yaml"), "{}x{}".format(*args.size), args.base_port + args.views
