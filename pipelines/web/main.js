@@ -130,7 +130,7 @@ class Page {
     this.painting = true;
     requestAnimationFrame (() => this.drawNext ());
   }
-  // The next picture has to wait until the GPU has drawn this one, so that it is of the newest frame set.
+  // The next picture has to wait until this one has been drawn, so that it is of the newest frame set.
   async drawNext () {
     clearTimeout (this.rest);
     const whole = this.resting, scale = whole ? 1 : this.scale;
@@ -168,6 +168,8 @@ class Page {
       this.renderer.draw ();
     } catch (error) {
       say (error.message);
+      if (!frame) // the core was made anew, without a scene
+        this.postedView = '';
     }
     this.postView ();
     return frame;
@@ -204,9 +206,10 @@ class Page {
 
   // scale: of the resolution of the screen
   setSize (scale) {
-    const ratio = scale * (window.devicePixelRatio || 1);
-    for (const [side, length] of [['width', canvas.clientWidth], ['height', canvas.clientHeight]]) {
-      const pixels = Math.max (1, Math.min (this.renderer.largest, Math.round (length * ratio)));
+    const { clientWidth, clientHeight } = canvas;
+    const ratio = Math.min (scale * (window.devicePixelRatio || 1), this.renderer.largest / Math.max (clientWidth, clientHeight));
+    for (const [side, length] of [['width', clientWidth], ['height', clientHeight]]) {
+      const pixels = Math.max (1, Math.round (length * ratio));
       if (canvas[side] !== pixels)
         canvas[side] = pixels;
     }

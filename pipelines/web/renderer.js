@@ -46,7 +46,7 @@ const hasGpu = () => {
   const gl = document.createElement ('canvas').getContext ('webgl2', { failIfMajorPerformanceCaveat: true });
   const name = gl?.getParameter (gl.getExtension ('WEBGL_debug_renderer_info')?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER);
   gl?.getExtension ('WEBGL_lose_context')?.loseContext ();
-  return gl && !/swiftshader|llvmpipe|softpipe|basic render/i.test (name);
+  return gl && !/swiftshader|llvmpipe|softpipe|swrast|software|basic render/i.test (name);
 };
 
 // core: of the camera; kind: 'webgl' or 'software', or the better one
@@ -68,7 +68,8 @@ class SoftwareRenderer {
   upload (layers) {
     layers.forEach (({ vertices }, i) => {
       const address = this.core.call ('rc_draw_layer', i, vertices.length);
-      this.core.bytes (address, vertices.length).set (vertices);
+      if (address)
+        this.core.bytes (address, vertices.length).set (vertices);
     });
   }
   draw () {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // What a page shows of a stream, as a row of a table. usage: node measure.js ADDRESS SECONDS LABEL [QUERY]
-// Latency: from capture to the frame after the GPU has drawn, by the server's clock. Resolution: how much of the window's width and height
+// Latency: from capture to the frame after the picture was drawn, by the server's clock. Resolution: how much of the window's width and height
 // is drawn at the end.
 import { launch, openPage, sleep } from './browser.js';
 

@@ -57,6 +57,7 @@ const picture = async (page) => {
   return assert.fail ('the picture does not come to rest');
 };
 
+const rendererOf = (page) => page.evaluate (() => window.rangecastPage.renderer.constructor.name);
 // In the page: of two pictures, the mean difference of their grey in levels, and the share of pixels that are not background.
 const compare = (page, ours, theirs) => page.evaluate (async (a, b) => {
   const grey = async (url) => {
@@ -76,6 +77,7 @@ for (const [angle, renderer] of [[-30, 'webgl'], [100, 'webgl'], [-30, 'software
   test (`the picture at ${angle} degrees, by ${renderer}, is striprender's`, async () => {
     const page = await open (`src=scene.rcnc&paused&azimuth=${angle}&renderer=${renderer}`);
     await framesShown (page, 1);
+    assert.equal (await rendererOf (page), { webgl: 'WebGlRenderer', software: 'SoftwareRenderer' }[renderer]);
     const ours = await picture (page);
     fs.writeFileSync (path.join (work, `page-${renderer}${angle}.png`), Buffer.from (ours.split (',')[1], 'base64'));
     const result = await compare (page, ours, `native-${angle}.png`);
@@ -114,7 +116,7 @@ test ('a browser without WebGL2 draws in software', async () => {
     HTMLCanvasElement.prototype.getContext = function (type, ...rest) { return type === 'webgl2' ? null : get.call (this, type, ...rest); };
   }));
   await framesShown (page, 1);
-  assert.equal (await page.evaluate (() => window.rangecastPage.renderer.constructor.name), 'SoftwareRenderer');
+  assert.equal (await rendererOf (page), 'SoftwareRenderer');
   await page.close ();
 });
 

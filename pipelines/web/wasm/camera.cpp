@@ -31,7 +31,7 @@ struct Scene {
   std::vector<Vec3> hull;
 };
 
-/* @return false if the bytes are not what rc_scene_state() gave */
+/* @return false, with nothing changed, if the bytes are not what rc_scene_state() gave */
 bool
 read_scene (std::span<const std::uint8_t> bytes, Scene &to)
 {
@@ -155,10 +155,8 @@ look (std::int32_t width, std::int32_t height, bool top_first)
 /** Takes what rc_scene_state() of any instance gave, from the input. @return Outcome */
 RC_EXPORT (rc_camera_scene) std::int32_t rc_camera_scene (std::uint32_t size)
 {
-  Scene scene;
-  if (!read_scene (web::input (size), scene))
+  if (!read_scene (web::input (size), camera ().scene))
     return web::fail ("The scene's state is damaged.");
-  camera ().scene = std::move (scene);
   return web::kDone;
 }
 
