@@ -169,13 +169,15 @@ handle_input_caps (GstStripRender *self, GstCaps *caps)
   gstrange::RangeInfo info;
   const Status status = gstrange::parse_caps (caps, info);
   if (status.ok ()) {
+    /* The output depends on the rate alone: rangealign corrects poses often. */
+    if (!priv->input || info.fps_n != priv->info.fps_n || info.fps_d != priv->info.fps_d)
+      gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
     priv->info = std::move (info);
     if (!priv->scene.set_rig (priv->info.rig))
       priv->fit.reset ();
     priv->reporter.set_views (priv->info.rig);
     gst_caps_replace (&priv->input, caps);
   }
-  gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
