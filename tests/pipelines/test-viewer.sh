@@ -42,7 +42,7 @@ snap () {
   until_true test -s rangecast-0001.png
   mv rangecast-0001.png "$1"
 }
-# Whether two PNGs show the same: a fit or alignment that settles later moves edges by parts of a pixel (2 % of the bytes).
+# Whether two PNGs show the same, but for pixels at edges: those moved a little after the first picture in 1 of 10 runs.
 looks_like () {
   local file
   for file in "$1" "$2"; do
