@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstdlib>
 #include <cstring>
 #include <numeric>
 #include <opencv2/core/hal/intrin.hpp>
@@ -71,6 +72,25 @@ cut (const cv::Mat &picture, const cv::Rect &tile, int around, Plane &to)
     std::copy (from + first + begin, from + first + end, row + begin);
     std::fill (row + end, row + to.width (), from[picture.cols - 1]);
   }
+}
+
+/* By how much the disparity changes over `distance` pixels across and down, together, where it does
+ * so evenly: a slanted surface has no steps. */
+int
+slant_at (const cv::Mat &disparity, int x, int y, int distance, int min)
+{
+  const auto slope = [own = disparity.at<std::int16_t> (y, x), min] (int before, int after) {
+    const bool is_even =
+        std::min (before, after) >= min && std::abs (before + after - 2 * own) <= 16;
+    return is_even ? std::abs (after - before) / 2 : 0;
+  };
+  const auto at = [&] (int row, int column) {
+    const bool is_inside =
+        row >= 0 && row < disparity.rows && column >= 0 && column < disparity.cols;
+    return is_inside ? int (disparity.at<std::int16_t> (row, column)) : min - 16;
+  };
+  return slope (at (y, x - distance), at (y, x + distance)) +
+         slope (at (y - distance, x), at (y + distance, x));
 }
 
 /* Splits every second pixel of a row into planes, from column x0 of theirs on. */
@@ -264,7 +284,11 @@ SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, con
       const int d = valid ? from[x] : likely (settings, own, at_x, at_y);
       if (d < std::max (min, settings.nearest))
         continue;
-      const int max = std::max (16, (d + settings.offset) * kShare >> 16);
+      const int slant = valid ? slant_at (disparity, at_x, at_y, settings.radius / 2, min) : 0,
+                max = std::max (16, (d + settings.offset) * kShare >> 16) + slant,
+                lowest = m.lowest.row (y)[x];
+      if (valid && !settings.only_beyond && lowest >= std::max (min, d - max))
+        continue;
       const Votes votes = valid && !settings.only_beyond
                               ? vote<false> (settings, own, at_x, at_y, d, max)
                               : vote<true> (settings, own, at_x, at_y, d, max);

@@ -13,8 +13,8 @@ namespace rangecast {
 
 /** Removes the rim that block matching adds around foreground: pixels near a step to farther
  * pixels, or near pixels without disparity, that are more similar in colour to those than to pixels
- * of their own depth within `radius`. Sets missing disparities where similar pixels around agree on
- * one. Reuses its memory between images. */
+ * of their own depth, or of their slanted surface, within `radius`. Sets missing disparities where
+ * similar pixels around agree on one. Reuses its memory between images. */
 class SilhouetteFilter {
 public:
   struct Settings {
