@@ -13,6 +13,8 @@ namespace {
 
 /* Margin around the ROI in which to match, for the same quality at its border, pixels. */
 constexpr int kMargin = 8;
+/* Maximum ratio of both cameras' brightness, and by how much it must change to count. */
+constexpr double kMaxGain = 2, kGainStep = 0.005;
 
 Status
 too_near (double near_m, double pixels)
@@ -49,7 +51,7 @@ DisparityFinder::set (const PairGeometry &pair, double near_m, double far_m, int
   min_disparity_ = static_cast<int> (std::floor (-pair.offset));
   max_disparity_ = std::max (static_cast<int> (std::ceil (nearest)), min_disparity_ + 1);
   far_ = static_cast<int> (std::ceil (16 * (pair.focal_baseline / far_m - pair.offset)));
-  background_.reset ();
+  reset ();
   if (max_disparity_ > kMaxDisparity || min_disparity_ < -kMaxDisparity)
     return {StatusCode::kBadValue, "stereo: disparities " + std::to_string (min_disparity_) +
                                        " to " + std::to_string (max_disparity_) +
@@ -139,6 +141,28 @@ DisparityFinder::match ()
   }
 }
 
+/* How much brighter the left window is than the right one, where they match. Cameras differ by some
+ * per cent, which on a plain surface exceeds its contrast. */
+double
+DisparityFinder::find_gain () const
+{
+  const int reach = range_.reach (), least = 16 * min_disparity_;
+  std::int64_t n = 0, sums[2] = {0, 0};
+  for (int y = 0; y < core_.rows; y++) {
+    const auto d = core_.ptr<std::int16_t> (y);
+    const auto left = window_[0].ptr<std::uint8_t> (y) + reach,
+               right = window_[1].ptr<std::uint8_t> (y) + reach;
+    for (int x = 0; x < core_.cols; x++)
+      if (d[x] >= least) {
+        n++;
+        sums[0] += left[x];
+        sums[1] += right[x - ((d[x] + 8) >> 4)];
+      }
+  }
+  const bool is_known = n > std::int64_t (core_.total () / 16) && sums[1] > 0;
+  return is_known ? double (sums[0]) / double (sums[1]) : 1;
+}
+
 /* After matching a limited range: sets the disparities of known background beyond it, or none. */
 void
 DisparityFinder::restore_background (const cv::Mat &grey, int right_x)
@@ -226,7 +250,15 @@ DisparityFinder::find (const cv::Mat &left, const cv::Mat &right, const Roi &roi
     cv::cvtColor ((i ? right : left) (window_at_), grey_, cv::COLOR_RGBA2GRAY);
     cv::copyMakeBorder (grey_, window_[i], 0, 0, missing_[0], missing_[1], cv::BORDER_REPLICATE);
   }
+  window_[1].convertTo (window_[1], CV_8U, gain_);
   match ();
+  const bool is_whole = !limited_ && !parts && core_.size () == left.size ();
+  const double more = is_whole ? find_gain () : 1;
+  if (std::abs (more - 1) > kGainStep) {
+    gain_ = std::clamp (gain_ * more, 1 / kMaxGain, kMaxGain);
+    window_[1].convertTo (window_[1], CV_8U, more);
+    match ();
+  }
   filter (left);
   write_disparity (roi);
 }

@@ -29,8 +29,12 @@ public:
    *  @return kBadValue if near needs a disparity beyond the image width or 2000 pixels */
   Status set (const PairGeometry &pair, double near_m, double far_m, int n_threads);
 
-  /** Forgets the background that was seen in earlier images. */
-  void reset () { background_.reset (); }
+  /** Forgets what was learnt from earlier images: the background, and the cameras' brightness. */
+  void reset ()
+  {
+    background_.reset ();
+    gain_ = 1;
+  }
 
   /** Throws cv::Exception.
    *  @param left, right  CV_8UC4, R G B x, of the pair's size
@@ -67,6 +71,7 @@ private:
   void place_window (const Roi &roi);
   void choose_parts (const std::vector<cv::Rect> *parts);
   void match ();
+  [[nodiscard]] double find_gain () const;
   void filter (const cv::Mat &left);
   void restore_background (const cv::Mat &grey, int right_x);
   void write_disparity (const Roi &roi);
@@ -75,6 +80,7 @@ private:
   SemiGlobalMatcher matcher_;
   Range range_; /* of this image; a part of that of all depths if limited_ */
   bool limited_ = false;
+  double gain_ = 1; /* brightness of left over that of right, in images matched completely */
   int n_threads_ = 0;
   int min_disparity_ = 0, max_disparity_ = 0; /* disparity range of all depths, pixels */
   int far_ = 0; /* disparity, 1/16 pixel, of the farthest depth of interest */
