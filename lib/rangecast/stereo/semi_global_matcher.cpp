@@ -14,7 +14,7 @@ namespace {
 
 /* Penalties for a change of disparity along a path by one pixel, and by more; the latter decreases
  * with the grey level step, because surfaces end at edges. */
-constexpr int kStep = 10, kJump = 60, kMinJump = 15, kEdge = 8;
+constexpr int kStep = 10, kJump = 50, kMinJump = 15, kEdge = 8;
 /* Greater than any cost along a path. */
 constexpr std::uint8_t kNever = 200;
 static_assert (kMaxCost + kJump < kNever && kNever + kStep < 256);
@@ -28,9 +28,13 @@ static_assert (kMinBands * kSide > 2 * kOverlap);
 /* Maximum difference of the disparities of a pixel and of its right pixel's best match, pixels. */
 constexpr int kMaxInconsistency = 1;
 
-/* Number of disparities from which half the size is searched first; margin around what was found
+/* Number of disparities from which half the size is matched first; margin around what was found
  * there, disparities; pixels of half the size around a tile from which it is taken. */
-constexpr int kMany = 64, kMargin = 2, kAround = 4;
+constexpr int kMany = 16, kMargin = 2, kAround = 4;
+/* By how much less the disparities cost that half the size found in its plain parts, where grey
+ * levels within kPlainRadius differ by at most kPlain: there noise may exceed texture, and half the
+ * size has half the noise. */
+constexpr int kFavour = 2, kPlainRadius = 4, kPlain = 16;
 
 /* The penalties of jumps between kSide pixels and as many others. */
 inline void
@@ -158,6 +162,31 @@ interpolate (const Best &best, std::int16_t *__restrict whole, std::int16_t *__r
   }
 }
 
+/* Lowers the costs of disparities near those of half the size: those up to one away by kFavour,
+ * farther ones by less.
+ * @param likely  1/8 pixel of a row of half the size, of `columns`; `least` - 1 and less = none
+ * @param x       of the tile's first column; @param costs  of its row, by disparity and column */
+void
+favour (const std::int16_t *likely, int columns, int least, int x, int low, int count,
+    std::uint8_t *costs)
+{
+  std::int16_t place[kSide];
+  int first = INT16_MAX, last = INT16_MIN;
+  for (int i = 0; i < kSide; i++) {
+    const int found = likely[std::min ((x + i) / 2, columns - 1)];
+    place[i] = std::int16_t (found < least ? INT16_MIN / 2 : ((found + 4) >> 3) - low);
+    first = found < least ? first : std::min<int> (first, place[i]);
+    last = std::max<int> (last, place[i]);
+  }
+  for (int d = std::max (0, first - kFavour); d <= std::min (count - 1, last + kFavour); d++) {
+    std::uint8_t *__restrict row = costs + d * kSide;
+    for (int i = 0; i < kSide; i++) {
+      const int by = std::clamp (kFavour + 1 - std::abs (d - place[i]), 0, kFavour);
+      row[i] = std::uint8_t (row[i] - std::min<int> (by, row[i]));
+    }
+  }
+}
+
 } // namespace
 
 /* The costs of all tiles of a band, row by row. */
@@ -187,8 +216,12 @@ SemiGlobalMatcher::compare_band (const Stripe &stripe, int band, Memory &m)
                   right = {m.transformed[1].data (), width, m.low.data (), m.high.data ()};
     for (int i = 0, x = stripe.x0; i < stripe.across; i++, x += kSide) {
       const Tile &tile = tiles[i];
-      compare<Lanes> (left, grey + x, x, right, tile.low, tile.count,
-          &costs_[tile.at + std::size_t (row - begin) * std::size_t (tile.count) * kSide]);
+      std::uint8_t *costs =
+          &costs_[tile.at + std::size_t (row - begin) * std::size_t (tile.count) * kSide];
+      compare<Lanes> (left, grey + x, x, right, tile.low, tile.count, costs);
+      if (has_coarse_)
+        favour (likely_.ptr<std::int16_t> (std::min (y / 2, likely_.rows - 1)), likely_.cols,
+            16 * coarse_min_, x, tile.low, tile.count, costs);
     }
   }
 }
@@ -457,6 +490,13 @@ SemiGlobalMatcher::find_coarse (const cv::Mat &left, const cv::Mat &right, int n
   coarse_->checks_right_ = false;
   coarse_->match (half_[0], half_[1], low, high - low + 1, n_threads, coarse_disparity_);
   coarse_min_ = low;
+  const cv::Mat around = cv::Mat::ones (2 * kPlainRadius + 1, 2 * kPlainRadius + 1, CV_8U);
+  cv::dilate (half_[0], range_[0], around);
+  cv::erode (half_[0], range_[1], around);
+  cv::subtract (range_[0], range_[1], range_[0]);
+  cv::compare (range_[0], kPlain, range_[0], cv::CMP_GT);
+  coarse_disparity_.copyTo (likely_);
+  likely_.setTo (16 * low - 16, range_[0]);
 }
 
 /* @param x, y    position of the tile in the image
@@ -471,7 +511,7 @@ SemiGlobalMatcher::choose_disparities (int x, int y, int across, Tile &tile) con
     tile.count = end - tile.low;
   };
   search (min_disparity_, min_disparity_ + disparities_);
-  if (coarse_disparity_.empty ())
+  if (!has_coarse_)
     return;
   const cv::Rect around (
       x / 2 - kAround, y / 2 - kAround, kSide / 2 + 2 * kAround, kSide / 2 + 2 * kAround);
@@ -530,8 +570,8 @@ SemiGlobalMatcher::match (const cv::Mat &left, const cv::Mat &right, int min_dis
     disparity.setTo (16 * min_disparity - 16);
     return;
   }
-  coarse_disparity_.release ();
-  if (disparities >= kMany && left.rows > 1)
+  has_coarse_ = disparities >= kMany && left.rows > 1;
+  if (has_coarse_)
     find_coarse (left, right, n_threads);
   /* Room for columns of tiles beyond the image. */
   const int more = kSide + (kSide - left.cols % kSide) % kSide;

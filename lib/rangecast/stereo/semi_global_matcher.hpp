@@ -17,10 +17,11 @@ namespace rangecast {
  * correspondence", ECCV 1994) with 15 levels instead of two, so that noise costs less than texture,
  * and strong texture no more than that of hair or skin. The grey level itself has a small weight
  * (S. Birchfield, C. Tomasi, "A pixel dissimilarity measure that is insensitive to image sampling",
- * PAMI 20, 1998). Many disparities are searched at half the size first, then around what was found
- * there in and near each tile (M. Rothermel et al., "SURE: photogrammetric surface reconstruction
- * from imagery", LC3D workshop 2012). Results depend neither on the number of threads nor on the
- * processor. Reuses its memory between images. */
+ * PAMI 20, 1998). Half the size is matched first, which is likely right where the picture is plain;
+ * only disparities around what was found there in and near each tile are searched (M. Rothermel et
+ * al., "SURE: photogrammetric surface reconstruction from imagery", LC3D workshop 2012). Results
+ * depend neither on the number of threads nor on the processor. Reuses its memory between images.
+ */
 class SemiGlobalMatcher {
 public:
   /** @param left, right    CV_8U, the same size, rows agree
@@ -83,6 +84,7 @@ private:
   }
 
   bool checks_right_ = true; /* whether matches must be those of their right pixels, too */
+  bool has_coarse_ = false;  /* half the size was matched */
   int min_disparity_ = 0, disparities_ = 0, coarse_min_ = 0;
   cv::Mat padded_[2]; /* CV_8U: left and right */
   std::vector<Tile> tiles_;
@@ -90,7 +92,8 @@ private:
   Matches matches_;
   WorkerMemory<Memory> memory_;
   std::unique_ptr<SemiGlobalMatcher> coarse_; /* for half the size */
-  cv::Mat half_[2], coarse_disparity_;
+  cv::Mat half_[2], range_[2], coarse_disparity_;
+  cv::Mat likely_; /* the same where the picture is plain */
 };
 
 } // namespace rangecast
