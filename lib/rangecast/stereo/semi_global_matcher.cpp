@@ -28,9 +28,10 @@ static_assert (kMinBands * kSide > 2 * kOverlap);
 /* Maximum difference of the disparities of a pixel and of its right pixel's best match, pixels. */
 constexpr int kMaxInconsistency = 1;
 
-/* Number of disparities from which half the size is matched first; margin around what was found
- * there, disparities; pixels of half the size around a tile from which it is taken. */
-constexpr int kMany = 16, kMargin = 2, kAround = 4;
+/* Number of disparities from which half the size is matched first, and from which only what was
+ * found there is searched; margin around that, disparities; pixels of half the size around a tile
+ * from which it is taken. Small things vanish at a fraction of the size. */
+constexpr int kSome = 16, kMany = 64, kMargin = 2, kAround = 4;
 /* By how much less the disparities cost that half the size found in its plain parts, where grey
  * levels within kPlainRadius differ by at most kPlain: there noise may exceed texture, and half the
  * size has half the noise. */
@@ -511,7 +512,7 @@ SemiGlobalMatcher::choose_disparities (int x, int y, int across, Tile &tile) con
     tile.count = end - tile.low;
   };
   search (min_disparity_, min_disparity_ + disparities_);
-  if (!has_coarse_)
+  if (!has_coarse_ || disparities_ < kMany)
     return;
   const cv::Rect around (
       x / 2 - kAround, y / 2 - kAround, kSide / 2 + 2 * kAround, kSide / 2 + 2 * kAround);
@@ -570,7 +571,7 @@ SemiGlobalMatcher::match (const cv::Mat &left, const cv::Mat &right, int min_dis
     disparity.setTo (16 * min_disparity - 16);
     return;
   }
-  has_coarse_ = disparities >= kMany && left.rows > 1;
+  has_coarse_ = disparities >= kSome && left.rows > 1;
   if (has_coarse_)
     find_coarse (left, right, n_threads);
   /* Room for columns of tiles beyond the image. */

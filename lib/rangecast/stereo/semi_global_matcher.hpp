@@ -18,10 +18,10 @@ namespace rangecast {
  * and strong texture no more than that of hair or skin. The grey level itself has a small weight
  * (S. Birchfield, C. Tomasi, "A pixel dissimilarity measure that is insensitive to image sampling",
  * PAMI 20, 1998). Half the size is matched first, which is likely right where the picture is plain;
- * only disparities around what was found there in and near each tile are searched (M. Rothermel et
- * al., "SURE: photogrammetric surface reconstruction from imagery", LC3D workshop 2012). Results
- * depend neither on the number of threads nor on the processor. Reuses its memory between images.
- */
+ * of many disparities, only those around what was found there in and near each tile are searched
+ * (M. Rothermel et al., "SURE: photogrammetric surface reconstruction from imagery", LC3D workshop
+ * 2012). Results depend neither on the number of threads nor on the processor. Reuses its memory
+ * between images. */
 class SemiGlobalMatcher {
 public:
   /** @param left, right    CV_8U, the same size, rows agree
