@@ -8,6 +8,7 @@
 
 #include "../options.hpp"
 #include "matchers.hpp"
+#include "plain.hpp"
 #include "scene.hpp"
 #include "truth.hpp"
 
@@ -22,6 +23,7 @@ const char *const kUsage =
     "                    [--near M] [--far M] [--rounds N]\n"
     "       stereo_bench --scene [--model FILE] [--size WxH] [--distance M] [--noise LEVELS]\n"
     "                    [--frames N]\n"
+    "       stereo_bench --plain [--size WxH] [--noise LEVELS] [--rounds N]\n"
     "Matches a pair of pictures as stereodepth does, and with OpenCV's BM, SGBM and\n"
     "3-way SGBM in the same run. Prints, for the pixels whose truth is known: density, the share\n"
     "that has a disparity; and of those bad-1.0 and bad-2.0, the shares further off than 1 and 2\n"
@@ -42,6 +44,8 @@ const char *const kUsage =
     "                       the person that has depth, the share of valid pixels more than 5 cm "
     "from\n"
     "                       the true surface, and errors, beside OpenCV at the same settings\n"
+    "  --plain              render a pair of plain surfaces, with texture below the noise, "
+    "instead\n"
     "  --model FILE         glTF or OBJ model to render (default: the built-in figure)\n"
     "  --size WxH           (default 320x240)\n"
     "  --distance M         from the cameras, 0.5 to 1.2 (default 0.8; at 1.1 the person's ROI is "
@@ -55,7 +59,7 @@ struct Job {
   std::string left, right, truth;
   int rounds = 12;
   double focal = 0, baseline = 0, offset = 0, scale = 1, near_m = 0, far_m = 0;
-  bool scene = false;
+  bool scene = false, plain = false;
   SceneJob rendered;
 };
 
@@ -73,6 +77,7 @@ add_options (Options &options, Job &job)
   options.number ("--far", job.far_m, 1e-3, 1e5);
   options.number ("--rounds", job.rounds, 1, 100000);
   options.flag ("--scene", job.scene);
+  options.flag ("--plain", job.plain);
   SceneSettings &s = job.rendered.scene;
   options.text ("--model", s.model);
   options.size ("--size", s.width, s.height, 64, 4096);
@@ -86,10 +91,10 @@ add_options (Options &options, Job &job)
 std::string
 complaint (const Job &job)
 {
-  if (job.scene)
-    return job.left.empty () && job.right.empty ()
+  if (job.scene || job.plain)
+    return job.left.empty () && job.right.empty () && job.scene != job.plain
                ? ""
-               : "--scene renders its pictures: omit --left, --right";
+               : "--scene or --plain renders the pictures: omit the other, --left and --right";
   if (job.left.empty () || job.right.empty ())
     return "expected --left and --right";
   if (job.focal <= 0 || job.baseline <= 0)
@@ -198,7 +203,10 @@ run (const Job &job)
     return s;
   }
   Pair pair;
-  if (Status s = read_pictures (job, pair); !s.ok ())
+  if (job.plain)
+    render_plain ({job.rendered.scene.width, job.rendered.scene.height},
+        job.rendered.scene.noise_sigma, pair);
+  else if (Status s = read_pictures (job, pair); !s.ok ())
     return s;
   if (Status s = make_view (job, pair, pair.view); !s.ok ())
     return s;
@@ -225,6 +233,10 @@ main (int argc, char **argv)
     return *status;
   if (const std::string wrong = complaint (job); !wrong.empty ())
     return options.refuse (wrong);
+  if (job.plain) {
+    job.focal = job.rendered.scene.width;
+    job.baseline = 0.1;
+  }
   if (const Status s = run (job); !s.ok ()) {
     std::fprintf (stderr, "stereo_bench: %s\n", s.message ().c_str ());
     return 1;

@@ -76,6 +76,31 @@ TEST (Matching, depth_is_focal_length_times_baseline_over_disparity)
   EXPECT_EQ (stereo.match (output.image ()).code (), StatusCode::kBadSize);
 }
 
+/* The lower half is a shaded wall whose texture is weaker than the difference between the cameras.
+ */
+TEST (Matching, camera_that_is_brighter_does_not_move_a_plain_surface)
+{
+  StereoDepth stereo;
+  ASSERT_TRUE (stereo.set (ideal_pair ()).ok ());
+  Dots dots (40);
+  for (Image<Rgbx> *picture : {&dots.left, &dots.right})
+    for (int y = 0; y < 240; y++)
+      for (int x = 0; x < 320; x++) {
+        const bool is_right = picture == &dots.right;
+        const double at = (x + (is_right ? 40 : 0)) / 320.0, texture = picture->view ().at (x, y).g,
+                     grey = 90 + 80 * at * at + (texture - 128) / (y < 120 ? 4 : 64);
+        const auto level = static_cast<std::uint8_t> (std::lround (is_right ? 1.08 * grey : grey));
+        picture->view ().at (x, y) = {level, level, level, 0};
+      }
+  Output output ({0, 0, 320, 240});
+  ASSERT_TRUE (stereo.process (dots.left.view (), dots.right.view (), output.image ()).ok ());
+  int right = 0;
+  for (int y = 130; y < 230; y++)
+    for (int x = 60; x < 310; x++)
+      right += std::abs (output.depth.view ().at (x, y) - 8000) <= 100;
+  EXPECT_GT (right, 100 * 250 * 95 / 100);
+}
+
 TEST (Rectification, turned_pair_gets_rows_that_agree_and_a_pose_that_fits)
 {
   View view = ideal_pair ();

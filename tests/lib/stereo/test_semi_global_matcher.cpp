@@ -17,12 +17,12 @@ const cv::Rect kSquare (90, 30, 60, 60);
 /* Smooth texture of little contrast, and noise of the cameras. */
 struct Pair {
   cv::Mat left = cv::Mat (kHeight, kWidth, CV_8U), right = left.clone ();
-  explicit Pair (double contrast, double brighter = 0)
+  explicit Pair (double contrast, double brighter = 0, double noise = 0.3, double scale = 1)
   {
     cv::RNG random (7);
     cv::Mat texture (kHeight, 2 * kWidth, CV_32F);
     random.fill (texture, cv::RNG::NORMAL, 0, 1);
-    cv::GaussianBlur (texture, texture, {}, 1);
+    cv::GaussianBlur (texture, texture, {}, scale);
     cv::Scalar mean, spread;
     cv::meanStdDev (texture, mean, spread);
     texture *= contrast / spread[0];
@@ -32,9 +32,9 @@ struct Pair {
                     *of_square = texture.ptr<float> ((y + kHeight / 2) % kHeight);
         const float there = kSquare.contains ({x, y}) ? of_square[x] : row[x + 40 - kFar];
         left.at<std::uint8_t> (y, x) =
-            cv::saturate_cast<std::uint8_t> (100 + there + random.gaussian (0.3));
-        right.at<std::uint8_t> (y, x) =
-            cv::saturate_cast<std::uint8_t> (100 + brighter + row[x + 40] + random.gaussian (0.3));
+            cv::saturate_cast<std::uint8_t> (100 + there + random.gaussian (noise));
+        right.at<std::uint8_t> (y, x) = cv::saturate_cast<std::uint8_t> (
+            100 + brighter + row[x + 40] + random.gaussian (noise));
       }
     /* The square hides what lies behind it. */
     for (int y = kSquare.y; y < kSquare.br ().y; y++)
@@ -50,12 +50,13 @@ struct Pair {
   }
 };
 
-/* Share of a part whose disparities are right to half a pixel. */
+/* Share of a part whose disparities are right to half a pixel, or `most` 1/16 pixel. */
 double
-share_right (const cv::Mat &disparity, const cv::Rect &part, int truth)
+share_right (const cv::Mat &disparity, const cv::Rect &part, int truth, int most = 8)
 {
   const cv::Mat d = disparity (part);
-  return cv::countNonZero ((d >= 16 * truth - 8) & (d <= 16 * truth + 8)) / double (d.total ());
+  return cv::countNonZero ((d >= 16 * truth - most) & (d <= 16 * truth + most)) /
+         double (d.total ());
 }
 
 const cv::Rect kInSquare (kSquare.x + 6, kSquare.y + 6, kSquare.width - 12, kSquare.height - 12),
@@ -68,6 +69,14 @@ TEST (SemiGlobalMatcher, texture_of_three_levels_is_enough_whatever_the_brightne
   const cv::Mat disparity = Pair (3, 30).match ();
   EXPECT_GT (share_right (disparity, kInSquare, kNear), 0.97);
   EXPECT_GT (share_right (disparity, kBeside, kFar), 0.97);
+}
+
+TEST (SemiGlobalMatcher, half_the_size_sees_large_texture_below_the_noise)
+{
+  const Pair pair (2, 0, 1, 4);
+  const cv::Mat alone = pair.match (15), with_half = pair.match (16);
+  EXPECT_LT (share_right (alone, kBeside, kFar, 16), 0.75);
+  EXPECT_GT (share_right (with_half, kBeside, kFar, 16), 0.9);
 }
 
 TEST (SemiGlobalMatcher, both_surfaces_are_found_at_half_the_size_first)
@@ -111,7 +120,7 @@ TEST (SemiGlobalMatcher, large_pictures_are_matched_in_stripes_without_a_seam)
   cv::copyMakeBorder (left.colRange (9, left.cols), right, 0, 0, 0, 9, cv::BORDER_REPLICATE);
   SemiGlobalMatcher matcher;
   cv::Mat disparity;
-  matcher.match (left, right, 0, 63, 1, disparity); /* not at half the size first */
+  matcher.match (left, right, 0, 63, 1, disparity);
   EXPECT_EQ (share_right (disparity, {63, 0, 637, 1000}, 9), 1);
 }
 

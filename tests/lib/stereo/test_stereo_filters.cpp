@@ -53,6 +53,18 @@ TEST (StereoFilters, rim_of_the_walls_colour_is_cleared)
     EXPECT_EQ (cleared.at<std::int16_t> (20, x), x < 27 ? 160 : x < 30 ? -16 : 480) << x;
 }
 
+TEST (StereoFilters, floor_that_slants_away_has_no_rims)
+{
+  cv::Mat disparity (60, 60, CV_16S);
+  const cv::Mat colour (60, 60, CV_8UC4, cv::Scalar (90, 100, 110, 0));
+  for (int y = 0; y < 60; y++)
+    disparity.row (y).setTo (160 + 8 * y);
+  cv::Mat cleared = disparity.clone ();
+  SilhouetteFilter ().apply ({}, colour, all_of (disparity), disparity, cleared);
+  const cv::Rect inside (0, 4, 60, 52); /* above and below, nothing says that it slants */
+  EXPECT_EQ (cv::countNonZero (cleared (inside) != disparity (inside)), 0);
+}
+
 TEST (StereoFilters, patch_that_looks_otherwise_is_cleared_and_a_darker_one_is_not)
 {
   cv::Mat left (40, 80, CV_8U), right (40, 80, CV_8U);
