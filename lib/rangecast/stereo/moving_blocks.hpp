@@ -43,6 +43,12 @@ public:
    *  @return the mean, of the same type; valid until the next call */
   const cv::Mat &add (const cv::Mat &image, const cv::Rect &part);
 
+  /** Of how many images the mean of a pixel's block is; 1 = it moves. */
+  [[nodiscard]] int images_at (int x, int y) const
+  {
+    return blocks_[grid_.at (x / BlockGrid::kBlock, y / BlockGrid::kBlock)].images;
+  }
+
 private:
   struct Block {
     float drift = 0, change = 0; /* grey levels: change of the block's mean, and of its pixels */

@@ -52,6 +52,8 @@ StereoDepth::set (const View &view, int n_threads, bool with_third)
   view_ = view;
   n_threads_ = n_threads;
   blocks_.set ({view.width, view.height});
+  for (cv::Mat *m : {&found_, &shown_})
+    *m = cv::Mat (view.height, view.width, CV_16U, cv::Scalar (0));
   reset ();
   pictures_[0].release ();
   map_depths (range, pair.focal_baseline);
@@ -189,11 +191,45 @@ StereoDepth::find (const RangeImage &image, bool everywhere)
         finder_.disparity (), third_.disparity (), third_.precision (), before_fusion_);
     clear_rims_of_third (image.roi);
   }
+  write_depth (image);
+}
+
+void
+StereoDepth::write_depth (const RangeImage &image) const
+{
   for (int y = 0; y < image.roi.height; y++) {
     const std::uint16_t *from = disparity ().row (y);
     std::uint16_t *to = image.depth.row (y);
     for (int x = 0; x < image.roi.width; x++)
       to[x] = depths_[from[x]];
+  }
+}
+
+/* Where nothing moves, a disparity changes only if two images in a row say so, and by less than a
+ * pixel only half the way: noise would move edges and surfaces in each image. */
+void
+StereoDepth::hold_still (const Roi &roi)
+{
+  constexpr int kSlight = 16, kMinImages = 3;
+  still_row_.resize (std::size_t (roi.width));
+  for (int y = 0; y < roi.height; y++) {
+    for (int x = 0; x < roi.width; x++)
+      still_row_[std::size_t (x)] = still_[0].images_at (roi.x + x, roi.y + y) >= kMinImages;
+    for_this_cpu ([&] {
+      const std::uint16_t *__restrict still = still_row_.data ();
+      auto *__restrict now = finder_.disparity ().ptr<std::uint16_t> (y),
+                       *__restrict found = found_.ptr<std::uint16_t> (roi.y + y) + roi.x,
+                       *__restrict shown = shown_.ptr<std::uint16_t> (roi.y + y) + roi.x;
+      for (int x = 0; x < roi.width; x++) {
+        const int d = now[x], before = found[x], last = shown[x],
+                  median = std::max (std::min (d, before), std::min (std::max (d, before), last)),
+                  step = median - last;
+        const bool slight = (median > 0) & (last > 0) & (std::abs (step) <= kSlight);
+        const int held = slight ? last + step / 2 : median;
+        found[x] = std::uint16_t (d);
+        now[x] = shown[x] = std::uint16_t (still[x] ? held : d);
+      }
+    });
   }
 }
 
@@ -228,6 +264,8 @@ StereoDepth::match_inside (const RangeImage &image)
   find (image, everywhere);
   if (!everywhere && is_suspect (image))
     find (image, true);
+  hold_still (roi);
+  write_depth (image);
   learn_range (image);
   blocks_.learn (image);
 }
