@@ -32,10 +32,10 @@ constexpr int kMaxInconsistency = 1;
  * found there is searched; margin around that, disparities; pixels of half the size around a tile
  * from which it is taken. Small things vanish at a fraction of the size. */
 constexpr int kSome = 16, kMany = 64, kMargin = 2, kAround = 4;
-/* By how much less the disparities cost that half the size found in its plain parts, where grey
- * levels within kPlainRadius differ by at most kPlain: there noise may exceed texture, and half the
- * size has half the noise. */
-constexpr int kFavour = 2, kPlainRadius = 4, kPlain = 16;
+/* Disparities that half the size found in its plain parts, and those next to them, cost one less.
+ * Plain is where grey levels within kPlainRadius differ by at most kPlain: there noise may exceed
+ * texture, and half the size has half the noise. */
+constexpr int kPlainRadius = 4, kPlain = 16;
 
 /* The penalties of jumps between kSide pixels and as many others. */
 inline void
@@ -163,9 +163,8 @@ interpolate (const Best &best, std::int16_t *__restrict whole, std::int16_t *__r
   }
 }
 
-/* Lowers the costs of disparities near those of half the size: those up to one away by kFavour,
- * farther ones by less.
- * @param likely  1/8 pixel of a row of half the size, of `columns`; `least` - 1 and less = none
+/* Lowers the costs of the disparities that half the size found.
+ * @param likely  1/8 pixel of a row of half the size, of `columns`; less than `least` = none
  * @param x       of the tile's first column; @param costs  of its row, by disparity and column */
 void
 favour (const std::int16_t *likely, int columns, int least, int x, int low, int count,
@@ -179,12 +178,10 @@ favour (const std::int16_t *likely, int columns, int least, int x, int low, int 
     first = found < least ? first : std::min<int> (first, place[i]);
     last = std::max<int> (last, place[i]);
   }
-  for (int d = std::max (0, first - kFavour); d <= std::min (count - 1, last + kFavour); d++) {
+  for (int d = std::max (0, first - 1); d <= std::min (count - 1, last + 1); d++) {
     std::uint8_t *__restrict row = costs + d * kSide;
-    for (int i = 0; i < kSide; i++) {
-      const int by = std::clamp (kFavour + 1 - std::abs (d - place[i]), 0, kFavour);
-      row[i] = std::uint8_t (row[i] - std::min<int> (by, row[i]));
-    }
+    for (int i = 0; i < kSide; i++)
+      row[i] = std::uint8_t (row[i] - ((std::abs (d - place[i]) <= 1) & (row[i] > 0)));
   }
 }
 
