@@ -124,6 +124,7 @@ void
 DisparityFinder::match ()
 {
   constexpr int kAround = kMargin - 2;
+  window_[1].convertTo (scaled_, CV_8U, gain_);
   const cv::Rect all (0, 0, core_at_.width, core_at_.height);
   for (int i = 0; i < 2; i++) {
     cv::Mat &core = i ? next_ : core_;
@@ -136,31 +137,37 @@ DisparityFinder::match ()
               bottom = std::min (all.height, part.br ().y + kAround);
     const cv::Rect window (part.x, top, part.width + beside, bottom - top);
     matcher_.match (
-        window_[0](window), window_[1](window), range_.min, range_.count, n_threads_, raw_);
+        window_[0](window), scaled_ (window), range_.min, range_.count, n_threads_, raw_);
     raw_ (cv::Rect (reach, part.y - top, part.width, part.height)).copyTo (core_ (part));
   }
 }
 
-/* How much brighter the left window is than the right one, where they match. Cameras differ by some
- * per cent, which on a plain surface exceeds its contrast. */
+/* How much brighter the left image is than the right one, where they match and neither is black or
+ * burnt out; that of before if that is little. Cameras differ by some per cent, which on a plain
+ * surface exceeds its contrast. */
 double
 DisparityFinder::find_gain () const
 {
+  const auto counts = [] (int grey) { return grey > 5 && grey < 250; };
   const int reach = range_.reach (), least = 16 * min_disparity_;
   std::int64_t n = 0, sums[2] = {0, 0};
   for (int y = 0; y < core_.rows; y++) {
     const auto d = core_.ptr<std::int16_t> (y);
     const auto left = window_[0].ptr<std::uint8_t> (y) + reach,
                right = window_[1].ptr<std::uint8_t> (y) + reach;
-    for (int x = 0; x < core_.cols; x++)
-      if (d[x] >= least) {
-        n++;
-        sums[0] += left[x];
-        sums[1] += right[x - ((d[x] + 8) >> 4)];
-      }
+    for (int x = 0; x < core_.cols; x++) {
+      const int there = x - ((d[x] + 8) >> 4);
+      if (d[x] < least || there < 0 || there >= core_.cols || !counts (left[x]) ||
+          !counts (right[there]))
+        continue;
+      n++;
+      sums[0] += left[x];
+      sums[1] += right[there];
+    }
   }
-  const bool is_known = n > std::int64_t (core_.total () / 16) && sums[1] > 0;
-  return is_known ? double (sums[0]) / double (sums[1]) : 1;
+  if (n <= std::int64_t (core_.total () / 16))
+    return gain_;
+  return std::clamp (double (sums[0]) / double (sums[1]), 1 / kMaxGain, kMaxGain);
 }
 
 /* After matching a limited range: sets the disparities of known background beyond it, or none. */
@@ -209,7 +216,7 @@ DisparityFinder::filter (const cv::Mat &left)
   }
   if (!limited_)
     filter_.clear_doubled (grey, window_[1], right_x, min, tiles_, core_);
-  refiner_.apply ({grey, window_[1], colour, right_x, std::max (min, far_)}, tiles_, core_);
+  refiner_.apply ({grey, scaled_, colour, right_x, std::max (min, far_)}, tiles_, core_);
   if (!limited_ && core_.cols == pair_.width && core_.rows == pair_.height)
     background_.remember (grey, core_, min, far_);
 }
@@ -250,13 +257,11 @@ DisparityFinder::find (const cv::Mat &left, const cv::Mat &right, const Roi &roi
     cv::cvtColor ((i ? right : left) (window_at_), grey_, cv::COLOR_RGBA2GRAY);
     cv::copyMakeBorder (grey_, window_[i], 0, 0, missing_[0], missing_[1], cv::BORDER_REPLICATE);
   }
-  window_[1].convertTo (window_[1], CV_8U, gain_);
   match ();
   const bool is_whole = !limited_ && !parts && core_.size () == left.size ();
-  const double more = is_whole ? find_gain () : 1;
-  if (std::abs (more - 1) > kGainStep) {
-    gain_ = std::clamp (gain_ * more, 1 / kMaxGain, kMaxGain);
-    window_[1].convertTo (window_[1], CV_8U, more);
+  const double gain = is_whole ? find_gain () : gain_;
+  if (std::abs (gain / gain_ - 1) > kGainStep) {
+    gain_ = gain;
     match ();
   }
   filter (left);

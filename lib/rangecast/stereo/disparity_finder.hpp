@@ -92,7 +92,7 @@ private:
   Tiles tiles_;                  /* in core_: where to match */
   int missing_[2] = {0, 0};      /* columns of the window outside of the image, left and right */
   std::vector<cv::Rect> parts_;
-  cv::Mat grey_, window_[2], raw_, disparity_;
+  cv::Mat grey_, window_[2], scaled_, raw_, disparity_; /* scaled_: window_[1], as bright as left */
   cv::Mat whole_[2];    /* of the size of the image: memory for the others */
   cv::Mat core_, next_; /* CV_16S of core_at_: disparities, and output of the next filter */
 };

@@ -21,7 +21,7 @@ public:
    * or in front of or behind it */
   Status set (const View &view, const View &range_view, double focal_baseline, int n_threads);
 
-  /** Forgets the background that was seen in earlier images. */
+  /** As DisparityFinder::reset(). */
   void reset () { finder_.reset (); }
 
   /** @param left, third  CV_8UC4, of the view's size, not rectified */

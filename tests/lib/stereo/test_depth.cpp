@@ -88,7 +88,7 @@ TEST (Matching, camera_that_is_brighter_does_not_move_a_plain_surface)
       for (int x = 0; x < 320; x++) {
         const bool is_right = picture == &dots.right;
         const double at = (x + (is_right ? 40 : 0)) / 320.0, texture = picture->view ().at (x, y).g,
-                     grey = 90 + 80 * at * at + (texture - 128) / (y < 120 ? 4 : 64);
+                     grey = 50 + 50 * at * at + (texture - 128) / (y < 120 ? 4 : 64);
         const auto level = static_cast<std::uint8_t> (std::lround (is_right ? 1.08 * grey : grey));
         picture->view ().at (x, y) = {level, level, level, 0};
       }
