@@ -53,7 +53,7 @@ StereoDepth::set (const View &view, int n_threads, bool with_third)
   n_threads_ = n_threads;
   blocks_.set ({view.width, view.height});
   for (cv::Mat *m : {&found_, &shown_})
-    *m = cv::Mat (view.height, view.width, CV_16U, cv::Scalar (0));
+    m->create (view.height, view.width, CV_16U);
   reset ();
   pictures_[0].release ();
   map_depths (range, pair.focal_baseline);
@@ -205,16 +205,20 @@ StereoDepth::write_depth (const RangeImage &image) const
   }
 }
 
-/* Where nothing moves, a disparity changes only if two images in a row say so, and by less than a
- * pixel only half the way: noise would move edges and surfaces in each image. */
+/* Noise would move edges and surfaces in each image. Where nothing moves, the output is the median
+ * of what this and the last image found and of the last output; changes by less than a pixel go
+ * half the way. */
 void
 StereoDepth::hold_still (const Roi &roi)
 {
   constexpr int kSlight = 16, kMinImages = 3;
+  const cv::Rect now_at (roi.x, roi.y, roi.width, roi.height), both = now_at & held_;
+  held_ = now_at;
   still_row_.resize (std::size_t (roi.width));
   for (int y = 0; y < roi.height; y++) {
     for (int x = 0; x < roi.width; x++)
-      still_row_[std::size_t (x)] = still_[0].images_at (roi.x + x, roi.y + y) >= kMinImages;
+      still_row_[std::size_t (x)] = both.contains ({roi.x + x, roi.y + y}) &&
+                                    still_[0].images_at (roi.x + x, roi.y + y) >= kMinImages;
     for_this_cpu ([&] {
       const std::uint16_t *__restrict still = still_row_.data ();
       auto *__restrict now = finder_.disparity ().ptr<std::uint16_t> (y),
@@ -242,32 +246,24 @@ StereoDepth::match (const RangeImage &image)
       image.depth.width != roi.width || image.depth.height != roi.height)
     return {StatusCode::kBadSize, "stereo: the ROI does not lie in the view"};
   return guarded ("stereo", [&] () -> Status {
-    match_inside (image);
+    const cv::Mat to (roi.height, roi.width, CV_8UC4, image.colour.data,
+        static_cast<std::size_t> (image.colour.stride));
+    pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)).copyTo (to);
+    for (int i = 0; i < 2; i++)
+      matched_[i] = still_[i].add (pictures_[i], finder_.needed (roi, i));
+    const bool whole = roi.width == view_.width && roi.height == view_.height;
+    if (whole)
+      blocks_.set_reference ();
+    const bool everywhere = whole || near_now_m_ <= 0;
+    find (image, everywhere);
+    if (!everywhere && is_suspect (image))
+      find (image, true);
+    learn_range (image);
+    hold_still (roi);
+    write_depth (image);
+    blocks_.learn (image);
     return {};
   });
-}
-
-/* The same, of a ROI that lies in the view. */
-void
-StereoDepth::match_inside (const RangeImage &image)
-{
-  const Roi &roi = image.roi;
-  const cv::Mat to (roi.height, roi.width, CV_8UC4, image.colour.data,
-      static_cast<std::size_t> (image.colour.stride));
-  pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)).copyTo (to);
-  for (int i = 0; i < 2; i++)
-    matched_[i] = still_[i].add (pictures_[i], finder_.needed (roi, i));
-  const bool whole = roi.width == view_.width && roi.height == view_.height;
-  if (whole)
-    blocks_.set_reference ();
-  const bool everywhere = whole || near_now_m_ <= 0;
-  find (image, everywhere);
-  if (!everywhere && is_suspect (image))
-    find (image, true);
-  hold_still (roi);
-  write_depth (image);
-  learn_range (image);
-  blocks_.learn (image);
 }
 
 } // namespace rangecast

@@ -66,16 +66,14 @@ public:
     third_.reset ();
     near_now_m_ = far_now_m_ = seen_share_ = 0;
     last_roi_ = {};
-    found_.setTo (0);
-    shown_.setTo (0);
+    held_ = {};
   }
 
-  /** The disparities of the last image, 1/16 pixel with equal principal points, 0 = no match; of
-   *  its ROI. */
+  /** The disparities put out for the last image's ROI, 1/16 pixel with equal principal points,
+   * 0 = no match. */
   [[nodiscard]] ImageView<const std::uint16_t> disparity () const;
 
 private:
-  void match_inside (const RangeImage &image);
   void map_depths (const View &range, double focal_baseline);
   void find (const RangeImage &image, bool everywhere);
   void write_depth (const RangeImage &image) const;
@@ -99,7 +97,8 @@ private:
   StillAverage still_[2];
   cv::Mat rectified_[2], before_fusion_;
   cv::Mat found_, shown_; /* CV_16U, of the view: disparities of the last image, and its output */
-  std::vector<std::uint16_t> still_row_;  /* 1 = its block does not move */
+  cv::Rect held_;         /* the ROI of that image */
+  std::vector<std::uint16_t> still_row_;  /* 1 = nothing moves there */
   std::vector<int> histogram_;            /* of the last depths, by pixels of disparity */
   double near_now_m_ = 0, far_now_m_ = 0; /* where the ROI's surfaces were; 0 = not known */
   Roi last_roi_;                          /* last ROI that was not the whole image */
