@@ -28,10 +28,11 @@ static_assert (kMinBands * kSide > 2 * kOverlap);
 /* Maximum difference of the disparities of a pixel and of its right pixel's best match, pixels. */
 constexpr int kMaxInconsistency = 1;
 
-/* Number of disparities from which half the size is matched first, and from which only what was
- * found there is searched; margin around that, disparities; pixels of half the size around a tile
- * from which it is taken. Small things vanish at a fraction of the size. */
-constexpr int kSome = 16, kMany = 64, kMargin = 2, kAround = 4;
+/* Number of disparities from which half the size is matched first, and from which only what it
+ * found is searched: small near things vanish at a fraction of the size. */
+constexpr int kSome = 16, kMany = 64;
+/* Margin around what it found, disparities; its pixels around a tile that count. */
+constexpr int kMargin = 2, kAround = 4;
 /* Disparities that half the size found in its plain parts, and those next to them, cost one less.
  * Plain is where grey levels within kPlainRadius differ by at most kPlain: there noise may exceed
  * texture, and half the size has half the noise. */
@@ -482,19 +483,18 @@ SemiGlobalMatcher::find_coarse (const cv::Mat &left, const cv::Mat &right, int n
 {
   if (!coarse_)
     coarse_ = std::make_unique<SemiGlobalMatcher> ();
+  const cv::Size half (left.cols / 2, left.rows / 2);
   for (int i = 0; i < 2; i++)
-    cv::resize (i ? right : left, half_[i], {left.cols / 2, left.rows / 2}, 0, 0, cv::INTER_AREA);
+    cv::resize ((i ? right : left) (cv::Rect ({}, half * 2)), half_[i], half, 0, 0, cv::INTER_AREA);
   const int low = (min_disparity_ - 1) / 2, high = (min_disparity_ + disparities_) / 2;
   coarse_->checks_right_ = false;
   coarse_->match (half_[0], half_[1], low, high - low + 1, n_threads, coarse_disparity_);
   coarse_min_ = low;
-  const cv::Mat around = cv::Mat::ones (2 * kPlainRadius + 1, 2 * kPlainRadius + 1, CV_8U);
-  cv::dilate (half_[0], range_[0], around);
-  cv::erode (half_[0], range_[1], around);
-  cv::subtract (range_[0], range_[1], range_[0]);
-  cv::compare (range_[0], kPlain, range_[0], cv::CMP_GT);
+  static const cv::Mat kWindow = cv::Mat::ones (2 * kPlainRadius + 1, 2 * kPlainRadius + 1, CV_8U);
+  cv::morphologyEx (half_[0], contrast_, cv::MORPH_GRADIENT, kWindow);
+  cv::compare (contrast_, kPlain, contrast_, cv::CMP_GT);
   coarse_disparity_.copyTo (likely_);
-  likely_.setTo (16 * low - 16, range_[0]);
+  likely_.setTo (16 * low - 16, contrast_);
 }
 
 /* @param x, y    position of the tile in the image

@@ -92,7 +92,7 @@ private:
   Matches matches_;
   WorkerMemory<Memory> memory_;
   std::unique_ptr<SemiGlobalMatcher> coarse_; /* for half the size */
-  cv::Mat half_[2], range_[2], coarse_disparity_;
+  cv::Mat half_[2], contrast_, coarse_disparity_;
   cv::Mat likely_; /* the same where the picture is plain */
 };
 

@@ -75,7 +75,7 @@ cut (const cv::Mat &picture, const cv::Rect &tile, int around, Plane &to)
 }
 
 /* By how much the disparity changes over `distance` pixels across and down, together, where it does
- * so evenly: a slanted surface has no steps. */
+ * so evenly to both sides: a slanted surface has no steps. */
 int
 slant_at (const cv::Mat &disparity, int x, int y, int distance, int min)
 {
@@ -84,13 +84,11 @@ slant_at (const cv::Mat &disparity, int x, int y, int distance, int min)
         std::min (before, after) >= min && std::abs (before + after - 2 * own) <= 16;
     return is_even ? std::abs (after - before) / 2 : 0;
   };
-  const auto at = [&] (int row, int column) {
-    const bool is_inside =
-        row >= 0 && row < disparity.rows && column >= 0 && column < disparity.cols;
-    return is_inside ? int (disparity.at<std::int16_t> (row, column)) : min - 16;
+  const auto at = [&, whole = cv::Rect ({}, disparity.size ())] (const cv::Point &p) {
+    return whole.contains (p) ? int (disparity.at<std::int16_t> (p)) : min - 16;
   };
-  return slope (at (y, x - distance), at (y, x + distance)) +
-         slope (at (y - distance, x), at (y + distance, x));
+  return slope (at ({x - distance, y}), at ({x + distance, y})) +
+         slope (at ({x, y - distance}), at ({x, y + distance}));
 }
 
 /* Splits every second pixel of a row into planes, from column x0 of theirs on. */
