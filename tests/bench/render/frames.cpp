@@ -2,7 +2,7 @@
 #include "frames.hpp"
 
 #include <algorithm>
-#include <memory>
+#include <list>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <rangecast/overlap/cylinder_filter.hpp>
@@ -50,23 +50,25 @@ public:
   {
   }
 
-  Status run (RangeImage &image)
+  /* Before kMoment. */
+  Status learn (const RangeImage &image)
   {
     Status status = stereo_.set (view_, {});
-    BackgroundModel background;
-    background.reset (view_.width, view_.height);
+    background_.reset (view_.width, view_.height);
     for (int i = 0; i < kLearnt && status.ok (); i++) {
       status = match (kMoment - 0.1 * (kLearnt + 1 - i), true, image);
       if (status.ok ())
-        status = background.learn (image);
+        status = background_.learn (image);
     }
-    background.finish ();
-    if (status.ok ())
-      status = match (kMoment, false, image);
-    if (!status.ok ())
+    background_.finish ();
+    return status;
+  }
+
+  Status look (double time_s, RangeImage &image)
+  {
+    if (Status status = match (time_s, false, image); !status.ok ())
       return status;
-    Segmenter segmenter;
-    status = segmenter.clear_background (image, background, view_.depth_unit_m, {});
+    const Status status = segmenter_.clear_background (image, background_, view_.depth_unit_m, {});
     cut (image, bounding_box (image, 0));
     return status;
   }
@@ -91,6 +93,8 @@ private:
   Scene &scene_;
   const View &view_;
   StereoDepth stereo_;
+  BackgroundModel background_;
+  Segmenter segmenter_;
   std::vector<Rgbx> left_, right_;
 };
 
@@ -106,7 +110,7 @@ filter (FrameSet &set, const CylinderSettings &settings)
 } // namespace
 
 Status
-exact_frames (SceneSettings settings, FrameSet &set)
+exact_frames (SceneSettings settings, FrameSet &set, double time_s)
 {
   settings.noise_sigma = 0;
   std::unique_ptr<Scene> scene;
@@ -115,29 +119,59 @@ exact_frames (SceneSettings settings, FrameSet &set)
   set.rig = scene->range_rig ();
   make_room (set, settings.width, settings.height);
   std::vector<Roi> boxes (set.images.size ());
-  if (Status status = scene->render_range (set.images, kMoment, false, boxes, 0); !status.ok ())
+  if (Status status = scene->render_range (set.images, time_s, false, boxes, 0); !status.ok ())
     return status;
   for (std::size_t i = 0; i < boxes.size (); i++)
     cut (set.images[i], boxes[i]);
   return {};
 }
 
+struct Film::Hosts {
+  std::unique_ptr<Scene> scene;
+  std::list<CameraHost> all;
+};
+
+Film::Film () : hosts_ (std::make_unique<Hosts> ()) {}
+Film::~Film () = default;
+
+Status
+Film::start (const SceneSettings &settings)
+{
+  if (Status status = Scene::create (settings, hosts_->scene); !status.ok ())
+    return status;
+  FrameSet set;
+  set.rig = hosts_->scene->range_rig ();
+  make_room (set, settings.width, settings.height);
+  Status status;
+  for (std::size_t i = 0; i < set.images.size () && status.ok (); i++)
+    status = hosts_->all.emplace_back (*hosts_->scene, hosts_->scene->rig ().views[i])
+                 .learn (set.images[i]);
+  return status;
+}
+
+Status
+Film::next (double time_s, FrameSet &set)
+{
+  const View &first = hosts_->scene->rig ().views[0];
+  set.rig = hosts_->scene->range_rig ();
+  make_room (set, first.width, first.height);
+  std::size_t i = 0;
+  for (CameraHost &host : hosts_->all) {
+    if (Status status = host.look (time_s, set.images[i]); !status.ok ())
+      return status;
+    set.rig.views[i++] = host.range_view ();
+  }
+  return code (set, {});
+}
+
 Status
 stereo_frames (const SceneSettings &settings, const CylinderSettings &cylinder, FrameSet &set)
 {
-  std::unique_ptr<Scene> scene;
-  if (Status status = Scene::create (settings, scene); !status.ok ())
-    return status;
-  set.rig = scene->range_rig ();
-  make_room (set, settings.width, settings.height);
-  for (std::size_t i = 0; i < set.images.size (); i++) {
-    CameraHost host (*scene, scene->rig ().views[i]);
-    if (Status status = host.run (set.images[i]); !status.ok ())
-      return status;
-    set.rig.views[i] = host.range_view ();
-  }
-  const Status coded = code (set, {});
-  return coded.ok () ? filter (set, cylinder) : coded;
+  Film film;
+  Status status = film.start (settings);
+  if (status.ok ())
+    status = film.next (kMoment, set);
+  return status.ok () ? filter (set, cylinder) : status;
 }
 
 Status

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <rangecast/neighbourcode/access_unit.hpp>
 #include <rangecast/overlap/cylinder_filter.hpp>
 #include <rangecast/scene/scene.hpp>
@@ -25,11 +26,25 @@ struct FrameSet {
 };
 
 /** The scene's own range images: exact depth, no sensor noise. */
-rangecast::Status exact_frames (rangecast::SceneSettings settings, FrameSet &set);
+rangecast::Status exact_frames (
+    rangecast::SceneSettings settings, FrameSet &set, double time_s = kMoment);
 
-/** What the demo's viewer has: the scene's stereo pairs with sensor noise, matched, freed of the
- *  background that was learnt before, through the neighbour code with its defaults, and through
- *  the cylinder. */
+/** The scene's stereo pairs with sensor noise, matched, freed of the background that was learnt
+ *  before, and through the neighbour code with its defaults: one moment after the other. */
+class Film {
+public:
+  Film ();
+  ~Film ();
+  rangecast::Status start (const rangecast::SceneSettings &settings);
+  /** @param time_s  kMoment or later */
+  rangecast::Status next (double time_s, FrameSet &set);
+
+private:
+  struct Hosts;
+  std::unique_ptr<Hosts> hosts_;
+};
+
+/** The first of a film, through the cylinder. */
 rangecast::Status stereo_frames (const rangecast::SceneSettings &settings,
     const rangecast::CylinderSettings &cylinder, FrameSet &set);
 

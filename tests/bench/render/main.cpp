@@ -11,8 +11,6 @@
 #include <list>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
-#include <rangecast/surface/orbit.hpp>
-#include <rangecast/surface/scene_hull.hpp>
 
 #include "../options.hpp"
 #include "report.hpp"
@@ -55,6 +53,11 @@ const char *const kUsage =
     "  --overlap PIXELS  of the cylinder (default: the element's)\n"
     "  --mode NAME     only that row of the table\n"
     "  --depth KIND    only that depth\n"
+    "  --motion        instead: films of the figure, still and in motion, from stereo depth, drawn "
+    "in\n"
+    "                  software: SSIM all; flicker, pixels inside that change by over 20 levels "
+    "more\n"
+    "                  than the truth; outline, pixels that come or go and in the truth do not\n"
     "  --json FILE     writes the rows (but noise) there\n"
     "  --pictures DIR  writes truth, picture and difference there, as PNG\n";
 
@@ -105,35 +108,6 @@ struct Kind {
   FrameSet set, coded;
   std::vector<std::unique_ptr<Way>> ways;
 };
-
-Orbit
-orbit_at (double azimuth_deg)
-{
-  Orbit orbit;
-  orbit.azimuth_deg = azimuth_deg;
-  return orbit;
-}
-
-SurfacePicture
-make_picture (const FrameSet &set, double azimuth_deg)
-{
-  const SceneFrame frame = scene_frame (set.rig);
-  std::vector<Vec3> hull;
-  for (const RangeImage &image : set.images)
-    append_hull (image, *set.rig.find (image.view_id), hull);
-  SurfacePicture picture = {};
-  picture.background[3] = 0;
-  const Orbit orbit = orbit_at (azimuth_deg);
-  picture.clip_from_world =
-      orbit_matrices (frame, orbit, double (kWidth) / kHeight, true, {}, hull).clip_from_world;
-  picture.point_size = 1;
-  picture.pixels_per_unit = float (kHeight / (2 * std::tan (frame.fov_deg * M_PI / 360)));
-  picture.width = kWidth;
-  picture.height = kHeight;
-  picture.part = {0, 0, kWidth, kHeight};
-  picture.covered = covered_part (picture.clip_from_world, hull, kWidth, kHeight, picture.part);
-  return picture;
-}
 
 Status
 make_ways (Job &job, Kind &kind)
@@ -288,6 +262,46 @@ run (Job &job)
   return run_scene (job);
 }
 
+/* Films of still and moving figures. */
+Status
+run_films (SceneSettings settings)
+{
+  constexpr int kBefore = 6, kPictures = 5;
+  std::printf ("%-7s %5s %9s %9s %9s\n", "film", "angle", "SSIM all", "flicker", "outline");
+  for (const bool moves : {false, true}) {
+    settings.motion = moves;
+    MotionScore scores[std::size (kAngles)];
+    std::vector<Shot> shots[std::size (kAngles)];
+    Film film;
+    Status status = film.start (settings);
+    for (int i = -kBefore; i < kPictures && status.ok (); i++) {
+      const double time_s = kMoment + (i + kBefore) / 15.0;
+      FrameSet set, cameras;
+      status = film.next (time_s, set);
+      for (std::size_t k = 0; k < std::size (kAngles) && i >= 0 && status.ok (); k++) {
+        if (i == 0 || moves) {
+          shots[k].clear ();
+          status = exact_frames (settings, cameras, time_s);
+          if (status.ok ())
+            status = make_truth (settings, cameras, kAngles[k], shots[k], time_s);
+        }
+        const auto way = make_strip_way ("blend", nullptr, set, {});
+        for (const Shot &shot : shots[k]) {
+          way->build (orbit_at (shot.azimuth_deg));
+          way->draw (make_picture (set, shot.azimuth_deg));
+          scores[k].add (int (shot.azimuth_deg), shot, *way->own_picture ());
+        }
+      }
+    }
+    if (!status.ok ())
+      return status;
+    for (std::size_t k = 0; k < std::size (kAngles); k++)
+      std::printf ("%-7s %5d %9.4f %7.2f %% %7.2f %%\n", moves ? "moving" : "still", kAngles[k],
+          scores[k].ssim_all (), 100 * scores[k].flicker (), 100 * scores[k].outline ());
+  }
+  return {};
+}
+
 /* Whether an argument is one of some names; if not, says so. */
 bool
 is_one_of (const char *option, const std::string &value, const std::vector<const char *> &names)
@@ -320,11 +334,13 @@ int
 main (int argc, char **argv)
 {
   Job job;
+  bool motion = false;
   Options options ("render_bench", kUsage);
   options.text ("--model", job.scene.model);
   options.size ("--size", job.scene.width, job.scene.height, 16, 1920);
   options.number ("--rounds", job.rounds, 1, 100000);
   options.number ("--overlap", job.cylinder.overlap, 0.0, kMaxOverlap);
+  options.flag ("--motion", motion);
   options.text ("--mode", job.mode);
   options.text ("--depth", job.depth);
   options.text ("--json", job.json);
@@ -338,6 +354,12 @@ main (int argc, char **argv)
   if (!is_one_of ("--mode", job.mode, modes) ||
       !is_one_of ("--depth", job.depth, {"exact", "stereo", "noise"}))
     return 2;
+  if (motion) {
+    const Status status = run_films (job.scene);
+    if (!status.ok ())
+      std::fprintf (stderr, "render_bench: %s\n", status.message ().c_str ());
+    return status.ok () ? 0 : 1;
+  }
   if (!g_getenv ("DISPLAY") && !g_getenv ("WAYLAND_DISPLAY")) { /* software, if nothing is chosen */
     g_setenv ("GST_GL_PLATFORM", "egl", FALSE);
     g_setenv ("GST_GL_WINDOW", "egl-device", FALSE);

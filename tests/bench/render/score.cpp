@@ -174,6 +174,27 @@ Score::add (const Shot &shot, const cv::Mat &rgba)
   shots_++;
 }
 
+void
+MotionScore::add (int place, const Shot &truth, const cv::Mat &rgba)
+{
+  score_.add (truth, rgba);
+  Last &last = last_[place];
+  if (!last.rgba.empty ()) {
+    const Comparison now (truth, rgba), then (last.truth, last.rgba);
+    cv::Mat inside, ours, real, channels[3];
+    cv::erode (now.real & now.drawn & then.real & then.drawn, inside, box (5), {-1, -1}, 1,
+        cv::BORDER_CONSTANT, 0);
+    cv::subtract (now.ours, then.ours, ours, cv::noArray (), CV_16S);
+    cv::subtract (now.truth, then.truth, real, cv::noArray (), CV_16S);
+    cv::split (cv::abs (ours - real), channels);
+    const cv::Mat most = cv::max (cv::max (channels[0], channels[1]), channels[2]);
+    flicker_ += share_of ((most > 20) & inside, inside);
+    outline_ += share_of ((now.drawn ^ then.drawn) & ~(now.real ^ then.real), now.real);
+    changes_++;
+  }
+  last = {truth, rgba.clone ()};
+}
+
 cv::Mat
 comparison (const Shot &shot, const cv::Mat &rgba)
 {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <map>
 #include <opencv2/core.hpp>
 
 namespace bench {
@@ -50,6 +51,31 @@ private:
   double holes_ = 0, spill_ = 0, psnr_ = 0, ssim_ = 0, ssim_all_ = 0, edge_ = 0, edge95_ = 0,
          seam_ = 0, bad_ = 0;
   int shots_ = 0;
+};
+
+/** What changes from picture to picture of a film and not in the truth: means over the pictures. */
+class MotionScore {
+public:
+  /** @param place  from which of several places, each with its own film */
+  void add (int place, const Shot &truth, const cv::Mat &rgba);
+
+  [[nodiscard]] double ssim_all () const { return score_.ssim_all (); }
+  /** Share of the pixels inside both figures that change by over 20 levels more than the truth. */
+  [[nodiscard]] double flicker () const { return changes_ > 0 ? flicker_ / changes_ : 0; }
+  /** Pixels that are drawn in one of two pictures while the truth stays, as a share of the
+   * figure's.
+   */
+  [[nodiscard]] double outline () const { return changes_ > 0 ? outline_ / changes_ : 0; }
+
+private:
+  struct Last {
+    Shot truth;
+    cv::Mat rgba;
+  };
+  std::map<int, Last> last_;
+  Score score_;
+  double flicker_ = 0, outline_ = 0;
+  int changes_ = 0;
 };
 
 /** Truth, picture, and where they differ (four times the difference, about grey; holes magenta,

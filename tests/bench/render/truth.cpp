@@ -97,14 +97,15 @@ average (const cv::Mat &colour, const cv::Mat &mask, Shot &shot)
 }
 
 Status
-take_shot (Scene &fine, Scene &plain, int view_id, const FrameSet &cameras, Shot &shot)
+take_shot (
+    Scene &fine, Scene &plain, int view_id, double time_s, const FrameSet &cameras, Shot &shot)
 {
   cv::Mat colour (kSamples * kHeight, kSamples * kWidth, CV_8UC4), mask (colour.size (), CV_8U),
       small (kHeight, kWidth, CV_8UC4), depth (kHeight, kWidth, CV_16U);
-  Status status = fine.render (view_id, SceneCamera::kLeft, kMoment, false, view_of<Rgbx> (colour),
+  Status status = fine.render (view_id, SceneCamera::kLeft, time_s, false, view_of<Rgbx> (colour),
       {}, view_of<std::uint8_t> (mask));
   if (status.ok ())
-    status = plain.render (view_id, SceneCamera::kLeft, kMoment, false, view_of<Rgbx> (small),
+    status = plain.render (view_id, SceneCamera::kLeft, time_s, false, view_of<Rgbx> (small),
         view_of<std::uint16_t> (depth), {});
   if (!status.ok ())
     return status;
@@ -117,8 +118,8 @@ take_shot (Scene &fine, Scene &plain, int view_id, const FrameSet &cameras, Shot
 } // namespace
 
 Status
-make_truth (
-    SceneSettings settings, const FrameSet &cameras, int angle_deg, std::vector<Shot> &shots)
+make_truth (SceneSettings settings, const FrameSet &cameras, int angle_deg,
+    std::vector<Shot> &shots, double time_s)
 {
   const Ring *ring = kRings;
   while (ring->angle_deg != angle_deg)
@@ -130,7 +131,7 @@ make_truth (
   for (int i = 0; i < 4 && status.ok (); i++) {
     Shot shot;
     shot.azimuth_deg = 360.0 * ring->which[i] / ring->cameras;
-    status = take_shot (*fine, *plain, ring->which[i], cameras, shot);
+    status = take_shot (*fine, *plain, ring->which[i], time_s, cameras, shot);
     shots.push_back (shot);
   }
   return status;

@@ -21,6 +21,6 @@ inline constexpr int kAngles[] = {0, 20, 45};
  *  @param cameras   exact frames of the same scene: what they see
  *  @param angle_deg one of kAngles */
 rangecast::Status make_truth (rangecast::SceneSettings settings, const FrameSet &cameras,
-    int angle_deg, std::vector<Shot> &shots);
+    int angle_deg, std::vector<Shot> &shots, double time_s = kMoment);
 
 } // namespace bench

@@ -1,7 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "ways.hpp"
 
+#include <cmath>
 #include <rangecast/render/software_renderer.hpp>
+#include <rangecast/surface/orbit.hpp>
+#include <rangecast/surface/scene_hull.hpp>
+
+#include "truth.hpp"
 
 using namespace rangecast;
 
@@ -66,6 +71,35 @@ private:
 };
 
 } // namespace
+
+Orbit
+orbit_at (double azimuth_deg)
+{
+  Orbit orbit;
+  orbit.azimuth_deg = azimuth_deg;
+  return orbit;
+}
+
+SurfacePicture
+make_picture (const FrameSet &set, double azimuth_deg)
+{
+  const SceneFrame frame = scene_frame (set.rig);
+  std::vector<Vec3> hull;
+  for (const RangeImage &image : set.images)
+    append_hull (image, *set.rig.find (image.view_id), hull);
+  SurfacePicture picture = {};
+  picture.background[3] = 0;
+  const Orbit orbit = orbit_at (azimuth_deg);
+  picture.clip_from_world =
+      orbit_matrices (frame, orbit, double (kWidth) / kHeight, true, {}, hull).clip_from_world;
+  picture.point_size = 1;
+  picture.pixels_per_unit = float (kHeight / (2 * std::tan (frame.fov_deg * M_PI / 360)));
+  picture.width = kWidth;
+  picture.height = kHeight;
+  picture.part = {0, 0, kWidth, kHeight};
+  picture.covered = covered_part (picture.clip_from_world, hull, kWidth, kHeight, picture.part);
+  return picture;
+}
 
 std::unique_ptr<Way>
 make_strip_way (std::string name, SurfacePainter *painter, const FrameSet &set,

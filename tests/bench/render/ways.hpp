@@ -34,6 +34,11 @@ private:
   const std::string name_;
 };
 
+/** Where the truth is taken from, degrees. */
+rangecast::Orbit orbit_at (double azimuth_deg);
+/** The picture from there. */
+rangecast::SurfacePicture make_picture (const FrameSet &set, double azimuth_deg);
+
 /** striprender's own, in one of its modes. The frame set must stay.
  *  @param painter  nullptr: in software
  *  @param held     only the first picture is of a new frame set: later ones are what a stream that
