@@ -12,6 +12,7 @@ prints_rows () { # rows command...
 test_benchmarks_print_their_tables () {
   prints_rows 3 codec_bench --size 64x48 --frames 2 --rounds 1
   prints_rows 3 stereo_bench --scene --size 160x120 --frames 1
+  prints_rows 3 stereo_bench --plain --size 160x120 --rounds 1
   prints_rows 1 roi_bench --frames 1 --depth range --room standard
   prints_rows 2 roi_bench --changes --depth range --room lamp
   prints_rows 3 cameras_bench --size 160x120 --seconds 1 --rounds 1

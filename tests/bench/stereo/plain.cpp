@@ -19,6 +19,16 @@ struct Surface {
   {
     return at + across * (x - area.x) + down * (y - area.y);
   }
+  [[nodiscard]] float grey (double x, int y) const
+  {
+    const auto row = texture.ptr<float> (y);
+    const auto at = [&] (int column) {
+      return row[cv::borderInterpolate (column, texture.cols, cv::BORDER_REFLECT)];
+    };
+    const int before = int (std::floor (2 * x));
+    const auto share = float (2 * x - before);
+    return at (before) * (1 - share) + at (before + 1) * share;
+  }
   /* The column of the left picture that the right one shows at x. */
   [[nodiscard]] double seen_at (double x, double y) const
   {
@@ -75,11 +85,10 @@ draw (const std::vector<Surface> &room, cv::Size size, bool is_right, cv::Mat &g
         if (d <= nearest || !s.area.contains ({column, double (y)}))
           continue;
         nearest = d;
-        const int at = cv::borderInterpolate (
-            int (std::lround (2 * column)), s.texture.cols, cv::BORDER_REFLECT);
-        samples.at<float> (y, i) = s.texture.at<float> (y, at);
+        samples.at<float> (y, i) = s.grey (column, y);
       }
-      truth.at<float> (y, i / kSamples) = float (nearest);
+      if (i % kSamples == kSamples / 2)
+        truth.at<float> (y, i / kSamples) = float (nearest);
     }
   cv::resize (samples, grey, size, 0, 0, cv::INTER_AREA);
   cv::GaussianBlur (grey, grey, {}, 0.6);
