@@ -211,7 +211,7 @@ StereoDepth::write_depth (const RangeImage &image) const
 void
 StereoDepth::hold_still (const Roi &roi)
 {
-  constexpr int kSlight = 16, kMinImages = 3;
+  constexpr int kSlight = 16, kMinImages = 6; /* slow motion is seen late */
   const cv::Rect now_at (roi.x, roi.y, roi.width, roi.height), both = now_at & held_;
   held_ = now_at;
   still_row_.resize (std::size_t (roi.width));
