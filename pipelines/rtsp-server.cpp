@@ -101,12 +101,13 @@ G_END_DECLS
 G_DEFINE_TYPE (LaunchMedia, launch_media, GST_TYPE_RTSP_MEDIA)
 
 /* The thread that posts it: where the state change fails, the library stops the media before its
- * own thread has read the message. */
+ * own thread has read the message. Sources that are being stopped can fail to negotiate. */
 static GstBusSyncReply
-report_message (GstBus *, GstMessage *message, gpointer)
+report_message (GstBus *, GstMessage *message, gpointer pipeline)
 {
   dump_graph (message, "rtsp-server");
-  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR) {
+  if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_ERROR &&
+      GST_STATE_TARGET (pipeline) != GST_STATE_NULL) {
     g_autoptr (GError) error = nullptr;
     g_autofree gchar *details = nullptr;
     gst_message_parse_error (message, &error, &details);
@@ -121,7 +122,7 @@ launch_media_prepare (GstRTSPMedia *media, GstRTSPThread *thread)
   g_autoptr (GstElement) element = gst_rtsp_media_get_element (media);
   g_autoptr (GstObject) pipeline = gst_object_get_parent (GST_OBJECT (element));
   g_autoptr (GstBus) bus = gst_element_get_bus (GST_ELEMENT (pipeline));
-  gst_bus_set_sync_handler (bus, report_message, nullptr, nullptr);
+  gst_bus_set_sync_handler (bus, report_message, pipeline, nullptr);
   return GST_RTSP_MEDIA_CLASS (launch_media_parent_class)->prepare (media, thread);
 }
 
@@ -404,9 +405,8 @@ parse_arguments (int argc, char **argv, Options &options)
       {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &options.launch, nullptr, nullptr}, {}};
   g_autoptr (GOptionContext) context =
       g_option_context_new ("-- LAUNCH STRING - serve coded frame sets over RTSP");
-  g_option_context_set_description (context, "The launch string ends in coded frame sets "
-                                             "(neighbourcodeenc, rangemux) or has a payloader\n"
-                                             "named pay0.\n");
+  g_option_context_set_description (
+      context, "The launch string ends in coded frame sets or has a payloader named pay0.\n");
   g_option_context_add_main_entries (context, entries, nullptr);
   g_option_context_add_group (context, gst_init_get_option_group ());
   g_autoptr (GError) error = nullptr;
