@@ -25,6 +25,7 @@
 #include "common/basetransform.hpp"
 #include "common/elementproperties.hpp"
 
+using rangecast::AxisMode;
 using rangecast::Status;
 
 GST_DEBUG_CATEGORY_STATIC (gst_cylinder_filter_debug);
@@ -36,17 +37,10 @@ struct CylinderFilterSettings : rangecast::CylinderSettings {
   CylinderFilterSettings () { threads = 0; }
 };
 
-GType
-axis_type ()
-{
-  using rangecast::AxisMode;
-  static const GEnumValue values[] = {
-      {int (AxisMode::kPrincipal), "Principal axis of the points of all views", "principal"},
-      {int (AxisMode::kVertical), "World y axis through the centroid of the points", "vertical"},
-      {int (AxisMode::kWorld), "World y axis", "world"}, {0, nullptr, nullptr}};
-  static const GType type = g_enum_register_static ("GstCylinderFilterAxis", values);
-  return type;
-}
+const GEnumValue kAxes[] = {
+    {int (AxisMode::kPrincipal), "Principal axis of the points of all views", "principal"},
+    {int (AxisMode::kVertical), "World y axis through the centroid of the points", "vertical"},
+    {int (AxisMode::kWorld), "World y axis", "world"}, {0, nullptr, nullptr}};
 
 PropertyTable<CylinderFilterSettings> &
 cylinder_properties ()
@@ -54,8 +48,8 @@ cylinder_properties ()
   using S = CylinderFilterSettings;
   using P = PropertyTable<S>;
   static P table = {
-      P::enumeration<&S::axis> (
-          "axis", "Axis", "How to choose the axis of the cylinder", axis_type (), kMutablePlaying),
+      P::enumeration<&S::axis> ("axis", "Axis", "How to choose the axis of the cylinder",
+          "GstCylinderFilterAxis", kAxes, kMutablePlaying),
       P::number<&S::slice_height_m> ("slice-height", "Slice height",
           "Height of a slice of the cylinder in metres", 0.0002, 10., kMutablePlaying),
       P::number<&S::columns> (

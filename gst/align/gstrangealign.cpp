@@ -40,17 +40,11 @@ struct RangeAlignSettings {
   int threads = 0;
 };
 
-GType
-corrections_type ()
-{
-  static const GFlagsValue values[] = {{0, "Nothing", "none"},
-      {kPoses, "Estimate and correct errors of the camera poses", "poses"},
-      {kViews, "Clear a view that contradicts the others", "views"},
-      {kPoints, "Clear points that another view sees through in a different colour", "points"},
-      {kColours, "Match the colours of the views", "colours"}, {0, nullptr, nullptr}};
-  static const GType type = g_flags_register_static ("GstRangeAlignCorrections", values);
-  return type;
-}
+const GFlagsValue kCorrections[] = {{0, "Nothing", "none"},
+    {kPoses, "Estimate and correct errors of the camera poses", "poses"},
+    {kViews, "Clear a view that contradicts the others", "views"},
+    {kPoints, "Clear points that another view sees through in a different colour", "points"},
+    {kColours, "Match the colours of the views", "colours"}, {0, nullptr, nullptr}};
 
 PropertyTable<RangeAlignSettings> &
 align_properties ()
@@ -58,8 +52,9 @@ align_properties ()
   using S = RangeAlignSettings;
   using P = PropertyTable<S>;
   static P table = {
-      P::enumeration<&S::corrections> ("corrections", "Corrections",
-          "What to correct (points needs colours)", corrections_type (), kMutablePlaying),
+      P::flags<&S::corrections> ("corrections", "Corrections",
+          "What to correct (points needs colours)", "GstRangeAlignCorrections", kCorrections,
+          kMutablePlaying),
       P::number<&S::threads> ("n-threads", "Threads",
           "Number of threads that process views (0 = one per CPU core)", 0, 64, kMutablePlaying),
   };

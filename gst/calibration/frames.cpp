@@ -23,20 +23,10 @@ struct _GstRigCalibratePad {
 
 G_DEFINE_TYPE (GstRigCalibratePad, gst_rig_calibrate_pad, GST_TYPE_AGGREGATOR_PAD)
 
-#define GST_TYPE_RIG_CALIBRATE_ROLE (gst_rig_calibrate_role_get_type ())
-static GType
-gst_rig_calibrate_role_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (CameraRole::kLeft), "Left camera of a stereo pair, or the only camera of a view",
-            "left"},
-        {int (CameraRole::kRight), "Right camera of a stereo pair", "right"},
-        {int (CameraRole::kThird), "Third camera of a view", "third"}, {}};
-    return g_enum_register_static ("GstRigCalibrateRole", values);
-  }();
-  return type;
-}
+static const GEnumValue kRoles[] = {
+    {int (CameraRole::kLeft), "Left camera of a stereo pair, or the only camera of a view", "left"},
+    {int (CameraRole::kRight), "Right camera of a stereo pair", "right"},
+    {int (CameraRole::kThird), "Third camera of a view", "third"}, {}};
 
 rangecast::CalibrationCamera
 calibration_camera (GstRigCalibratePad *pad)
@@ -59,7 +49,7 @@ pad_properties ()
           "view-id of the view that the camera belongs to (default: the number of the pad)", 0,
           rangecast::kMaxViews - 1, kMutableReady),
       P::enumeration<&CalibratePadSettings::role> ("role", "Role", "Role of the camera in its view",
-          GST_TYPE_RIG_CALIBRATE_ROLE, kMutableReady),
+          "GstRigCalibrateRole", kRoles, kMutableReady),
   };
   return table;
 }

@@ -6,24 +6,15 @@
 using rangecast::Status;
 using rangecast::StatusCode;
 
-GType
-gst_stereo_cam_src_trigger_get_type (void)
-{
-  static const GEnumValue values[] = {
-      {gint (TriggerMode::kFreeRun),
-          "Cameras run freely at their frame rate; the nearest frames are paired", "free-run"},
-      {gint (TriggerMode::kSoftware),
-          "Software trigger at multiples of the frame period on the pipeline clock", "software"},
-      {gint (TriggerMode::kHardware), "Electrical signal on trigger-line", "hardware"},
-      {gint (TriggerMode::kAction), "GigE Vision action commands to all cameras of a rig",
-          "action"},
-      {0, nullptr, nullptr},
-  };
-  static gsize type = 0;
-  if (g_once_init_enter (&type))
-    g_once_init_leave (&type, g_enum_register_static ("GstStereoCamSrcTrigger", values));
-  return type;
-}
+static const GEnumValue kTriggers[] = {
+    {gint (TriggerMode::kFreeRun),
+        "Cameras run freely at their frame rate; the nearest frames are paired", "free-run"},
+    {gint (TriggerMode::kSoftware),
+        "Software trigger at multiples of the frame period on the pipeline clock", "software"},
+    {gint (TriggerMode::kHardware), "Electrical signal on trigger-line", "hardware"},
+    {gint (TriggerMode::kAction), "GigE Vision action commands to all cameras of a rig", "action"},
+    {0, nullptr, nullptr},
+};
 
 namespace {
 
@@ -94,7 +85,7 @@ stereo_cam_properties ()
       P::boolean<&S::reconnect> ("reconnect", "Reconnect",
           "Reconnect to a lost camera and post a warning instead of an error", kMutableReady),
       P::enumeration<&S::trigger> ("trigger", "Trigger", "What triggers the cameras",
-          GST_TYPE_STEREO_CAM_SRC_TRIGGER, kMutableReady),
+          "GstStereoCamSrcTrigger", kTriggers, kMutableReady),
       P::number<&S::exposure_us> ("exposure", "Exposure",
           "Exposure time of all cameras in microseconds (0 = leave unchanged)", 0., 1e9,
           kMutableReady),

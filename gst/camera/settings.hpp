@@ -57,6 +57,3 @@ struct StereoCamSettings {
 };
 
 PropertyTable<StereoCamSettings> &stereo_cam_properties ();
-
-GType gst_stereo_cam_src_trigger_get_type (void);
-#define GST_TYPE_STEREO_CAM_SRC_TRIGGER (gst_stereo_cam_src_trigger_get_type ())

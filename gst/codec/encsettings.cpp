@@ -4,33 +4,17 @@
 using rangecast::NeighbourChoice;
 using rangecast::Profile;
 
-static GType
-gst_neighbour_code_profile_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (Profile::kPlain), "Fixed-length codes, no entropy coding", "plain"},
-        {int (Profile::kPacked), "Run lengths and fixed prefix codes", "packed"},
-        {int (Profile::kEntropy), "Adaptive context model, rANS", "entropy"}, {}};
-    return g_enum_register_static ("GstNeighbourCodeProfile", values);
-  }();
-  return type;
-}
+static const GEnumValue kProfiles[] = {
+    {int (Profile::kPlain), "Fixed-length codes, no entropy coding", "plain"},
+    {int (Profile::kPacked), "Run lengths and fixed prefix codes", "packed"},
+    {int (Profile::kEntropy), "Adaptive context model, rANS", "entropy"}, {}};
 
-static GType
-gst_neighbour_code_choice_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (NeighbourChoice::kFirst),
-            "First neighbour in the order left, upper-left, upper, upper-right", "first"},
-        {int (NeighbourChoice::kBest), "Neighbour with the least cost in error and bits; slower",
-            "best"},
-        {}};
-    return g_enum_register_static ("GstNeighbourCodeChoice", values);
-  }();
-  return type;
-}
+static const GEnumValue kChoices[] = {
+    {int (NeighbourChoice::kFirst),
+        "First neighbour in the order left, upper-left, upper, upper-right", "first"},
+    {int (NeighbourChoice::kBest), "Neighbour with the least cost in error and bits; slower",
+        "best"},
+    {}};
 
 /* Profile, bits and references are not controllable: a change of them rebuilds tables, which a
  * controller might cause with every frame set. */
@@ -44,11 +28,11 @@ encoder_properties ()
   static constexpr guint kMaxPeriod_ms = 3600000;
   static P table = {
       P::enumeration<&S::coding, &Coding::profile> ("profile", "Profile", "Coding profile",
-          gst_neighbour_code_profile_get_type (), kMutablePlaying),
+          "GstNeighbourCodeProfile", kProfiles, kMutablePlaying),
       P::enumeration<&S::coding, &Coding::choice> ("choice", "Neighbour choice",
           "Which neighbour within the thresholds replaces a pixel (the plain profile always uses "
           "the first)",
-          gst_neighbour_code_choice_get_type (), kControllable),
+          "GstNeighbourCodeChoice", kChoices, kControllable),
       P::number<&S::coding, &Coding::depth_bits> ("depth-bits", "Depth bits",
           "Bits of a quantised depth between the view's near and far limits", 6, 16,
           kMutablePlaying),

@@ -109,18 +109,9 @@ G_DEFINE_TYPE (GstNeighbourCodeDec, gst_neighbour_code_dec, GST_TYPE_BASE_TRANSF
 GST_ELEMENT_REGISTER_DEFINE (
     neighbourcodedec, "neighbourcodedec", GST_RANK_PRIMARY, gst_neighbour_code_dec_get_type ())
 
-#define GST_TYPE_NEIGHBOUR_CODE_CONCEAL (gst_neighbour_code_conceal_get_type ())
-static GType
-gst_neighbour_code_conceal_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {CONCEAL_INVALID, "Leave pixels of lost or damaged slices invalid", "invalid"},
-        {CONCEAL_LAST, "Repeat the pixels of the last frame set", "last"}, {}};
-    return g_enum_register_static ("GstNeighbourCodeConceal", values);
-  }();
-  return type;
-}
+static const GEnumValue kConcealments[] = {
+    {CONCEAL_INVALID, "Leave pixels of lost or damaged slices invalid", "invalid"},
+    {CONCEAL_LAST, "Repeat the pixels of the last frame set", "last"}, {}};
 
 /* ---- caps ---- */
 
@@ -495,8 +486,8 @@ decoder_properties ()
   using P = PropertyTable<Settings>;
   static P table = {
       P::enumeration<&Settings::conceal> ("conceal", "Concealment",
-          "How to fill pixels whose slices are lost or damaged", GST_TYPE_NEIGHBOUR_CODE_CONCEAL,
-          kMutablePlaying),
+          "How to fill pixels whose slices are lost or damaged", "GstNeighbourCodeConceal",
+          kConcealments, kMutablePlaying),
       P::boolean<&Settings::request_key_units> ("request-key-units", "Request key units",
           "Request a key frame set from upstream (GstForceKeyUnit) when data was lost that later "
           "frame sets refer to",

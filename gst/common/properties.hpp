@@ -156,18 +156,29 @@ public:
         name, nick, blurb, default_value.empty () ? nullptr : default_value.c_str (), flags));
   }
 
-  /** An enumeration or a set of flags. @param type  GType with the values of the member's type;
-   *  gets marked as plugin API, so that documentation tools find it */
+  /** An enumeration. @param type_name  GType to register with `values`, which GLib keeps; gets
+   *  marked as plugin API, so that documentation tools find it */
   template <auto... kPath>
-  static Row enumeration (
-      const char *name, const char *nick, const char *blurb, GType type, GParamFlags flags)
+  static Row enumeration (const char *name, const char *nick, const char *blurb,
+      const char *type_name, const GEnumValue *values, GParamFlags flags)
   {
     const Settings defaults{};
-    const auto value = properties::member<kPath...> (defaults);
+    const GType type = g_enum_register_static (type_name, values);
     gst_type_mark_as_plugin_api (type, GstPluginAPIFlags (0));
-    return properties::row<Settings, kPath...> (
-        G_TYPE_IS_FLAGS (type) ? g_param_spec_flags (name, nick, blurb, type, guint (value), flags)
-                               : g_param_spec_enum (name, nick, blurb, type, int (value), flags));
+    return properties::row<Settings, kPath...> (g_param_spec_enum (
+        name, nick, blurb, type, int (properties::member<kPath...> (defaults)), flags));
+  }
+
+  /** The same for a set of flags. */
+  template <auto... kPath>
+  static Row flags (const char *name, const char *nick, const char *blurb, const char *type_name,
+      const GFlagsValue *values, GParamFlags flags)
+  {
+    const Settings defaults{};
+    const GType type = g_flags_register_static (type_name, values);
+    gst_type_mark_as_plugin_api (type, GstPluginAPIFlags (0));
+    return properties::row<Settings, kPath...> (g_param_spec_flags (
+        name, nick, blurb, type, properties::member<kPath...> (defaults), flags));
   }
 
   /** Installs the rows with the ids `first_id` and following. @return the next free id */

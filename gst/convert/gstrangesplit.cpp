@@ -467,20 +467,11 @@ gst_range_split_change_state (GstElement *element, GstStateChange transition)
   return result;
 }
 
-#define GST_TYPE_RANGE_SPLIT_DEPTH_MAP (gst_range_split_depth_map_get_type ())
-static GType
-gst_range_split_depth_map_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (DepthMap::kNone), "Depth units, 16 bits (0 = invalid)", "none"},
-        {int (DepthMap::kGrey), "8 bits, white at near, dark at far, black where invalid", "grey"},
-        {int (DepthMap::kTurbo), "Colours, red at near, blue at far, black where invalid", "turbo"},
-        {}};
-    return g_enum_register_static ("GstRangeSplitDepthMap", values);
-  }();
-  return type;
-}
+static const GEnumValue kDepthMaps[] = {
+    {int (DepthMap::kNone), "Depth units, 16 bits (0 = invalid)", "none"},
+    {int (DepthMap::kGrey), "8 bits, white at near, dark at far, black where invalid", "grey"},
+    {int (DepthMap::kTurbo), "Colours, red at near, blue at far, black where invalid", "turbo"},
+    {}};
 
 static PropertyTable<SplitSettings> &
 split_properties ()
@@ -489,7 +480,7 @@ split_properties ()
   using P = PropertyTable<S>;
   static P table = {
       P::enumeration<&S::depth_map> ("depth-map", "Depth map", "What depth pads show",
-          GST_TYPE_RANGE_SPLIT_DEPTH_MAP, kMutablePlaying),
+          "GstRangeSplitDepthMap", kDepthMaps, kMutablePlaying),
       P::boolean<&S::mask> (
           "mask", "Mask colour", "Make colour black where depth is invalid", kMutablePlaying),
   };

@@ -490,20 +490,10 @@ gst_range_combine_stop (GstAggregator *aggregator)
 
 /* ---- properties ---- */
 
-#define GST_TYPE_RANGE_COMBINE_INTO (gst_range_combine_into_get_type ())
-static GType
-gst_range_combine_into_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (RegisterInto::kDepth), "View of the depth camera: depth stays as measured", "depth"},
-        {int (RegisterInto::kColour), "View of the colour camera: colour stays as captured",
-            "colour"},
-        {}};
-    return g_enum_register_static ("GstRangeCombineInto", values);
-  }();
-  return type;
-}
+static const GEnumValue kOutputViews[] = {
+    {int (RegisterInto::kDepth), "View of the depth camera: depth stays as measured", "depth"},
+    {int (RegisterInto::kColour), "View of the colour camera: colour stays as captured", "colour"},
+    {}};
 
 static PropertyTable<CombineSettings> &
 combine_properties ()
@@ -527,8 +517,8 @@ combine_properties ()
           "origin",
           kMutableReady),
       P::enumeration<&S::into> ("into", "Output view",
-          "Output view if colour and depth come from different cameras",
-          GST_TYPE_RANGE_COMBINE_INTO, kMutableReady),
+          "Output view if colour and depth come from different cameras", "GstRangeCombineInto",
+          kOutputViews, kMutableReady),
       P::number<&S::view, &V::focal_length> ("focal-length", "Focal length",
           "Focal length in pixels of the depth images, without a rig (0 = 0.82 of their width)", 0,
           1e6, kMutableReady),

@@ -568,18 +568,8 @@ gst_roi_extract_capture_background (GstRoiExtract *self)
 
 /* ---- properties ---- */
 
-#define GST_TYPE_ROI_EXTRACT_CUE (gst_roi_extract_cue_get_type ())
-static GType
-gst_roi_extract_cue_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {{int (Cue::kBoth), "Depth and colour", "both"},
-        {int (Cue::kColour), "Colour only", "colour"}, {int (Cue::kDepth), "Depth only", "depth"},
-        {}};
-    return g_enum_register_static ("GstRoiExtractCue", values);
-  }();
-  return type;
-}
+static const GEnumValue kCues[] = {{int (Cue::kBoth), "Depth and colour", "both"},
+    {int (Cue::kColour), "Colour only", "colour"}, {int (Cue::kDepth), "Depth only", "depth"}, {}};
 
 static PropertyTable<RoiSettings> &
 roi_properties ()
@@ -636,7 +626,8 @@ roi_properties ()
       P::text<&S::save_background> ("save-background", "Save background",
           "Background file to write after learning and at EOS (.yml or .yaml)", kMutablePlaying),
       P::enumeration<&S::segmentation, &Segmentation::cue> ("cue", "Segmentation cue",
-          "What distinguishes foreground from background", GST_TYPE_ROI_EXTRACT_CUE, kControllable),
+          "What distinguishes foreground from background", "GstRoiExtractCue", kCues,
+          kControllable),
       P::boolean<&S::segmentation, &Segmentation::follow_light> ("follow-light", "Follow light",
           "Compensate brightness and white balance changes of the whole image", kControllable),
   };

@@ -66,20 +66,11 @@ check_field_of_view (
 
 /* ---- stereodepth ---- */
 
-#define GST_TYPE_STEREO_DEPTH_PACKING (gst_stereo_depth_packing_get_type ())
-static GType
-gst_stereo_depth_packing_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (Packing::kAuto), "As multiview-mode in the caps of pad left", "auto"},
-        {int (Packing::kNone), "One view at each pad", "none"},
-        {int (Packing::kSideBySide), "Left view in the left half", "side-by-side"},
-        {int (Packing::kTopBottom), "Left view in the upper half", "top-bottom"}, {}};
-    return g_enum_register_static ("GstStereoDepthPacking", values);
-  }();
-  return type;
-}
+static const GEnumValue kPackings[] = {
+    {int (Packing::kAuto), "As multiview-mode in the caps of pad left", "auto"},
+    {int (Packing::kNone), "One view at each pad", "none"},
+    {int (Packing::kSideBySide), "Left view in the left half", "side-by-side"},
+    {int (Packing::kTopBottom), "Left view in the upper half", "top-bottom"}, {}};
 
 PropertyTable<StereoDepthSettings> &
 stereo_properties ()
@@ -111,7 +102,7 @@ stereo_properties ()
           kMutableReady),
       P::enumeration<&S::packing> ("packing", "Packing",
           "Whether images at pad left contain both views; pad right is then not linked",
-          GST_TYPE_STEREO_DEPTH_PACKING, kMutableReady),
+          "GstStereoDepthPacking", kPackings, kMutableReady),
       P::boolean<&S::qos> ("qos", "QoS",
           "Skip image pairs whose depth would arrive too late downstream", kMutablePlaying),
   };

@@ -1,36 +1,20 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "settings.hpp"
 
+using Choice = RenderBackendChoice;
 using rangecast::StripMode;
 
-GType
-gst_strip_render_mode_get_type (void)
-{
-  static const GType type = [] {
-    static const GEnumValue values[] = {
-        {int (StripMode::kBlend), "Surfaces of all views, blended where they overlap", "blend"},
-        {int (StripMode::kStrips), "Triangle strips along the rows", "strips"},
-        {int (StripMode::kRectangles), "One rectangle per pixel", "rectangles"},
-        {int (StripMode::kPoints), "One point per pixel", "points"}, {}};
-    return g_enum_register_static ("GstStripRenderMode", values);
-  }();
-  return type;
-}
+static const GEnumValue kModes[] = {
+    {int (StripMode::kBlend), "Surfaces of all views, blended where they overlap", "blend"},
+    {int (StripMode::kStrips), "Triangle strips along the rows", "strips"},
+    {int (StripMode::kRectangles), "One rectangle per pixel", "rectangles"},
+    {int (StripMode::kPoints), "One point per pixel", "points"}, {}};
 
-GType
-gst_strip_render_backend_get_type (void)
-{
-  static const GType type = [] {
-    using Choice = RenderBackendChoice;
-    static const GEnumValue values[] = {
-        {int (Choice::kAuto),
-            "OpenGL where downstream accepts its memory and it is not itself software", "auto"},
-        {int (Choice::kSoftware), "The CPU, into system memory", "software"},
-        {int (Choice::kOpenGl), "OpenGL, into OpenGL memory", "opengl"}, {}};
-    return g_enum_register_static ("GstStripRenderBackend", values);
-  }();
-  return type;
-}
+static const GEnumValue kBackends[] = {
+    {int (Choice::kAuto),
+        "OpenGL where downstream accepts its memory and it is not itself software", "auto"},
+    {int (Choice::kSoftware), "The CPU, into system memory", "software"},
+    {int (Choice::kOpenGl), "OpenGL, into OpenGL memory", "opengl"}, {}};
 
 PropertyTable<StripRenderSettings> &
 strip_properties ()
@@ -95,9 +79,9 @@ strip_properties ()
       P::boolean<&S::tint_views> (
           "tint-views", "Tint views", "Tint each point with the colour of its view", kControllable),
       P::enumeration<&S::strips, &Strips::mode> (
-          "mode", "Mode", "Rendering mode", GST_TYPE_STRIP_RENDER_MODE, kControllable),
+          "mode", "Mode", "Rendering mode", "GstStripRenderMode", kModes, kControllable),
       P::enumeration<&S::backend> ("backend", "Backend",
-          "Renderer; the one in use is reported in stats", GST_TYPE_STRIP_RENDER_BACKEND,
+          "Renderer; the one in use is reported in stats", "GstStripRenderBackend", kBackends,
           kMutableReady),
       P::number<&S::background> (
           "background", "Background", "Background colour, ARGB", 0, G_MAXUINT32, kControllable),

@@ -29,8 +29,3 @@ struct StripRenderSettings {
 };
 
 PropertyTable<StripRenderSettings> &strip_properties ();
-
-GType gst_strip_render_mode_get_type (void);
-#define GST_TYPE_STRIP_RENDER_MODE (gst_strip_render_mode_get_type ())
-GType gst_strip_render_backend_get_type (void);
-#define GST_TYPE_STRIP_RENDER_BACKEND (gst_strip_render_backend_get_type ())

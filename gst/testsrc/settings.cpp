@@ -1,18 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "settings.hpp"
 
-static GType
-avatar_dress_get_type ()
-{
-  static const GFlagsValue values[] = {{0, "Nothing", "none"},
-      {rangecast::kDressHair, "Long hair with loose strands", "hair"},
-      {rangecast::kDressGlasses, "Glasses", "glasses"},
-      {rangecast::kDressCollar, "Open collar", "collar"},
-      {rangecast::kDressHand, "Forearm and hand in front of the chest", "hand"},
-      {rangecast::kDressAll, "All accessories", "all"}, {0, nullptr, nullptr}};
-  static const GType type = g_flags_register_static ("GstAvatarTestSrcDress", values);
-  return type;
-}
+static const GFlagsValue kDresses[] = {{0, "Nothing", "none"},
+    {rangecast::kDressHair, "Long hair with loose strands", "hair"},
+    {rangecast::kDressGlasses, "Glasses", "glasses"},
+    {rangecast::kDressCollar, "Open collar", "collar"},
+    {rangecast::kDressHand, "Forearm and hand in front of the chest", "hand"},
+    {rangecast::kDressAll, "All accessories", "all"}, {0, nullptr, nullptr}};
 
 PropertyTable<AvatarSettings> &
 avatar_properties ()
@@ -66,9 +60,9 @@ avatar_properties ()
           "File to write the calibration of all cameras to, YAML or JSON", kMutableReady),
       P::boolean<&S::person_only> ("range-person-only", "Crop to person",
           "Crop range images to the bounding box of the figures", kMutableReady),
-      P::enumeration<&S::scene, &Scene::dress> ("dress", "Accessories",
+      P::flags<&S::scene, &Scene::dress> ("dress", "Accessories",
           "Accessories of the built-in figure that add surfaces in front of one another",
-          avatar_dress_get_type (), kMutableReady),
+          "GstAvatarTestSrcDress", kDresses, kMutableReady),
   };
   return table;
 }
