@@ -154,11 +154,7 @@ gst_cylinder_filter_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
 {
   auto self = GST_CYLINDER_FILTER (base);
   auto priv = self->priv;
-  CylinderFilterSettings settings;
-  {
-    const std::lock_guard guard (priv->lock);
-    settings = priv->settings;
-  }
+  const CylinderFilterSettings settings = settings_of (priv);
   rangecast::CylinderResult result;
   Status status;
   {

@@ -113,13 +113,6 @@ current_cameras (GstRigCalibrate *self)
   return self->priv->cameras;
 }
 
-static RigCalibrateSettings
-current_settings (GstRigCalibrate *self)
-{
-  std::lock_guard guard (self->priv->lock);
-  return self->priv->settings;
-}
-
 /* ---- sink caps ---- */
 
 static Status
@@ -178,7 +171,7 @@ static Status
 calibrate (GstRigCalibrate *self, std::stop_token stop)
 {
   GstRigCalibratePrivate *priv = self->priv;
-  const std::string location = current_settings (self).location;
+  const std::string location = settings_of (priv).location;
   rangecast::CalibrationResult result;
   Status status = {StatusCode::kNotFound, "there were no images to calibrate from"};
   if (!priv->session.cameras ().empty ())
@@ -334,7 +327,7 @@ static GstFlowReturn
 examine_set (GstRigCalibrate *self, std::shared_ptr<CalibrationImages> set, bool live)
 {
   GstRigCalibratePrivate *priv = self->priv;
-  const RigCalibrateSettings p = current_settings (self);
+  const RigCalibrateSettings p = settings_of (priv);
   const GstClockTime running = set->running;
   if (live && !priv->jobs.idle ()) {
     GST_DEBUG_OBJECT (
@@ -507,7 +500,7 @@ gst_rig_calibrate_start (GstAggregator *aggregator)
 {
   auto self = GST_RIG_CALIBRATE (aggregator);
   GstRigCalibratePrivate *priv = self->priv;
-  const RigCalibrateSettings p = current_settings (self);
+  const RigCalibrateSettings p = settings_of (priv);
   rangecast::SessionSettings settings;
   settings.calibration = p.core;
   settings.selection.max_frames = kMaxFrames;

@@ -189,10 +189,7 @@ collect_stats (GstElement *element)
 static bool
 check_settings (GstStereoCamSrc *self, StereoCamSettings &settings, CameraNames &names)
 {
-  {
-    std::lock_guard guard (self->priv->lock);
-    settings = self->priv->settings;
-  }
+  settings = settings_of (self->priv);
   return gst_range_flow_return (GST_ELEMENT (self), settings.find_names (names)) == GST_FLOW_OK;
 }
 

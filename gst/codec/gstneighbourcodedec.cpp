@@ -277,11 +277,7 @@ static GstFlowReturn
 decode_frame_set (GstNeighbourCodeDec *self, GstBuffer *input, Bytes units, GstBuffer **output)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
-  Settings settings;
-  {
-    std::lock_guard guard (priv->lock);
-    settings = priv->settings;
-  }
+  const Settings settings = settings_of (priv);
   GstBuffer *older = priv->concealment.begin (input);
   if (settings.conceal == CONCEAL_INVALID)
     older = nullptr;

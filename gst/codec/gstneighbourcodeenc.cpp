@@ -234,11 +234,7 @@ encode_input (GstNeighbourCodeEnc *self)
   GstNeighbourCodeEncPrivate *priv = self->priv;
   GstBuffer *input = priv->input;
   sync_controlled_values (GST_BASE_TRANSFORM (self), input);
-  NeighbourCodeEncSettings settings;
-  {
-    std::lock_guard guard (priv->lock);
-    settings = priv->settings;
-  }
+  NeighbourCodeEncSettings settings = settings_of (priv);
   settings.coding.frame_interval_ns =
       priv->info.fps_n > 0 ? priv->info.frame_duration () : GST_SECOND / 30;
   const bool keeps = priv->rate.begin (settings.rate, input, settings.coding.frame_interval_ns);

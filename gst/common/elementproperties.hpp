@@ -19,6 +19,15 @@ delete_private (GObject *object)
   G_OBJECT_CLASS (g_type_class_peek_parent (G_OBJECT_GET_CLASS (object)))->finalize (object);
 }
 
+/** A copy of an element's settings. Any thread, without the lock held. */
+template <typename Private>
+auto
+settings_of (Private *priv)
+{
+  std::lock_guard guard (priv->lock);
+  return priv->settings;
+}
+
 namespace properties {
 
 enum : guint { kStatsId = 1, kStatsIntervalId, kFirstSettingId };

@@ -53,13 +53,6 @@ static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
 G_DEFINE_TYPE (GstPlyEnc, gst_ply_enc, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (plyenc, "plyenc", GST_RANK_NONE, gst_ply_enc_get_type ())
 
-static PointCloudFormat
-current_format (GstPlyEncPrivate *priv)
-{
-  std::lock_guard guard (priv->lock);
-  return priv->settings;
-}
-
 static GstCaps *
 gst_ply_enc_transform_caps (
     GstBaseTransform *, GstPadDirection direction, GstCaps *, GstCaps *filter)
@@ -89,7 +82,7 @@ write_file (GstPlyEnc *self, GstBuffer *input, GstBuffer *&output)
   const gstrange::RangeFrameMap frame (input, GST_MAP_READ);
   if (!frame.status ().ok ())
     return frame.status ();
-  const rangecast::PointCloudWriter writer (current_format (self->priv));
+  const rangecast::PointCloudWriter writer (settings_of (self->priv));
   std::size_t points = 0;
   for (const auto &view : frame.views ())
     points += rangecast::count_points (view);

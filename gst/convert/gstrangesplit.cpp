@@ -130,13 +130,6 @@ current_pads (GstRangeSplit *self)
   return self->priv->pads;
 }
 
-static SplitSettings
-current_settings (GstRangeSplit *self)
-{
-  std::lock_guard guard (self->priv->lock);
-  return self->priv->settings;
-}
-
 static bool
 set_up_pool (SplitPad &pad, GstCaps *caps)
 {
@@ -320,7 +313,7 @@ gst_range_split_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
   {
     gstrange::RangeFrameMap frame (buffer, GST_MAP_READ);
     flow = gst_range_flow_return (GST_ELEMENT (self), frame.status ());
-    const SplitSettings settings = current_settings (self);
+    const SplitSettings settings = settings_of (self->priv);
     for (const auto &pad : flow == GST_FLOW_OK ? current_pads (self) : SplitPads{}) {
       const GstFlowReturn pushed = push_view (self, *pad, settings, frame, buffer);
       std::lock_guard guard (self->priv->lock);
@@ -387,7 +380,7 @@ gst_range_split_sink_event (GstPad *sink, GstObject *parent, GstEvent *event)
     case GST_EVENT_GAP:
       for (const auto &pad : pads)
         if (self->priv->info.views () > 0)
-          make_ready (self, *pad, current_settings (self));
+          make_ready (self, *pad, settings_of (self->priv));
       break;
     default:
       break;

@@ -272,11 +272,7 @@ negotiate (GstRangeCombine *self)
     GST_WARNING_OBJECT (self, "pad %s: frames without caps", priv->colour ? "depth" : "colour");
     return GST_FLOW_NOT_NEGOTIATED;
   }
-  CombineSettings settings;
-  {
-    std::lock_guard guard (priv->lock);
-    settings = priv->settings;
-  }
+  const CombineSettings settings = settings_of (priv);
   if (const GstFlowReturn flow =
           gst_range_flow_return (GST_ELEMENT (self), configure_views (priv, settings));
       flow != GST_FLOW_OK)

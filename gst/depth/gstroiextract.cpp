@@ -140,13 +140,6 @@ static GstStaticPadTemplate src_template =
 G_DEFINE_TYPE (GstRoiExtract, gst_roi_extract, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (roiextract, "roiextract", GST_RANK_NONE, GST_TYPE_ROI_EXTRACT)
 
-static RoiSettings
-copy_settings (GstRoiExtractPrivate *priv)
-{
-  std::lock_guard guard (priv->lock);
-  return priv->settings;
-}
-
 static void
 begin_learning (ViewState &state, const View &view, int frames)
 {
@@ -220,7 +213,7 @@ gst_roi_extract_set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
 {
   auto self = GST_ROI_EXTRACT (base);
   GstRoiExtractPrivate *priv = self->priv;
-  const RoiSettings settings = copy_settings (priv);
+  const RoiSettings settings = settings_of (priv);
   Status status = gstrange::parse_caps (caps, priv->info);
   if (status.ok ()) {
     GST_INFO_OBJECT (self, "caps %" GST_PTR_FORMAT, caps);
@@ -496,7 +489,7 @@ gst_roi_extract_transform_ip (GstBaseTransform *base, GstBuffer *buffer)
 {
   auto self = GST_ROI_EXTRACT (base);
   sync_controlled_values (base, buffer);
-  const RoiSettings settings = copy_settings (self->priv);
+  const RoiSettings settings = settings_of (self->priv);
   if (self->priv->relearn.exchange (false))
     relearn_all (self, settings.background_frames);
   gstrange::RangeFrameMap frame (buffer, GST_MAP_READWRITE);
@@ -513,7 +506,7 @@ gst_roi_extract_sink_event (GstBaseTransform *base, GstEvent *event)
 {
   auto self = GST_ROI_EXTRACT (base);
   if (GST_EVENT_TYPE (event) == GST_EVENT_EOS && !self->priv->info.rig.views.empty ()) {
-    const RoiSettings settings = copy_settings (self->priv);
+    const RoiSettings settings = settings_of (self->priv);
     warn_if_not_learnt (self, settings);
     if (settings.adapt_time_s > 0)
       save_when_all_learnt (self, settings.save_background);
@@ -537,7 +530,7 @@ static gboolean
 gst_roi_extract_start (GstBaseTransform *base)
 {
   GstRoiExtractPrivate *priv = GST_ROI_EXTRACT (base)->priv;
-  const Status status = check_save_path (copy_settings (priv).save_background);
+  const Status status = check_save_path (settings_of (priv).save_background);
   if (gst_range_flow_return (GST_ELEMENT (base), status) != GST_FLOW_OK)
     return FALSE;
   priv->reporter.start (GST_ELEMENT (base), collect_stats);

@@ -225,11 +225,7 @@ configure_core (GstStereoDepthPrivate *priv, bool with_third)
   const View &before = priv->core.range_view ();
   if (before.width != width || before.height != height)
     priv->rois.reset (); /* downstream requests a region again only if the output caps change */
-  StereoDepthSettings settings;
-  {
-    std::lock_guard guard (priv->lock);
-    settings = priv->settings;
-  }
+  const StereoDepthSettings settings = settings_of (priv);
   View view;
   if (Status s = make_stereo_view (settings, width, height, view); !s.ok ())
     return s;
@@ -273,12 +269,8 @@ negotiate (GstStereoDepth *self)
   const View &view = info.rig.views.front ();
   GST_DEBUG_OBJECT (self, "view %d, %g to %g m, focal length %g pixels, %s third camera", view.id,
       view.near_m, view.far_m, view.intrinsics.fx, with_third ? "with" : "without");
-  ViewSettings settings;
-  {
-    std::lock_guard guard (priv->lock);
-    settings = priv->settings.view;
-  }
-  check_field_of_view (GST_ELEMENT (self), settings, "the images", view.width, view.height);
+  check_field_of_view (
+      GST_ELEMENT (self), settings_of (priv).view, "the images", view.width, view.height);
   drop_pool (priv->pool);
   const Status status = gstrange::make_pool (caps, priv->pool);
   if (status.ok ())

@@ -594,11 +594,7 @@ gst_range_mux_start (GstAggregator *aggregator)
 {
   auto self = GST_RANGE_MUX (aggregator);
   GstRangeMuxPrivate *priv = self->priv;
-  Settings settings;
-  {
-    std::lock_guard guard (priv->lock);
-    settings = priv->settings;
-  }
+  const Settings settings = settings_of (priv);
   priv->caps_dirty = true;
   priv->frame_duration = GST_CLOCK_TIME_NONE;
   priv->times.flush ();

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "common/elementproperties.hpp"
 #include "striprenderprivate.hpp"
 
 using rangecast::RangeImage;
@@ -131,7 +132,7 @@ draw (
     return status;
   if (Status status = check_images (priv->info.rig, frame.views ()); !status.ok ())
     return status;
-  const StripRenderSettings settings = priv->settings_now ();
+  const StripRenderSettings settings = settings_of (priv);
   const GstClockTime running = strip_running_time (self, GST_BUFFER_PTS (out));
   const auto orbit = settings.camera.at (orbit_time (priv, running));
   priv->scene.build (visible_images (self, frame.views (), settings.view_mask),
@@ -163,8 +164,7 @@ strip_draw_frame (GstStripRender *self, GstBuffer *frame_set, GstBuffer *out, bo
   if (!status.ok ())
     return gst_range_flow_return (GST_ELEMENT (self), status);
   if (result.failure) {
-    const bool may_go_on =
-        priv->is_gl && priv->settings_now ().backend == RenderBackendChoice::kAuto;
+    const bool may_go_on = priv->is_gl && settings_of (priv).backend == RenderBackendChoice::kAuto;
     if (!may_go_on || std::exchange (priv->lost_opengl, true)) {
       GST_ELEMENT_ERROR (
           self, RESOURCE, WRITE, ("Could not draw into the output: %s", result.failure), (nullptr));

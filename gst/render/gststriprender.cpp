@@ -64,7 +64,7 @@ caps_of_backend (GstStripRender *self, GstCaps *downstream)
                        system_caps = GST_STATIC_CAPS (STRIP_SYSTEM_CAPS);
   GstStripRenderPrivate *priv = self->priv;
   GstCaps *gl = gst_static_caps_get (&gl_caps), *system = gst_static_caps_get (&system_caps);
-  const RenderBackendChoice choice = priv->settings_now ().backend;
+  const RenderBackendChoice choice = settings_of (priv).backend;
   bool by_gl = choice == RenderBackendChoice::kOpenGl;
   if (choice == RenderBackendChoice::kAuto && gst_caps_can_intersect (downstream, gl))
     by_gl = !gst_caps_can_intersect (downstream, system) ||
@@ -235,7 +235,7 @@ gst_strip_render_negotiated_src_caps (GstAggregator *aggregator, GstCaps *caps)
   const GstVideoInfo &out = priv->out;
   const bool is_inputs =
       gst_util_fraction_compare (out.fps_n, out.fps_d, priv->info.fps_n, priv->info.fps_d) == 0;
-  priv->period = out.fps_n > 0 && (!is_inputs || priv->settings_now ().keep_rate)
+  priv->period = out.fps_n > 0 && (!is_inputs || settings_of (priv).keep_rate)
                      ? gst_util_uint64_scale (GST_SECOND, guint64 (out.fps_d), guint64 (out.fps_n))
                      : 0;
   gst_aggregator_set_latency (aggregator, priv->period, priv->period);

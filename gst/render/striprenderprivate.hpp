@@ -24,12 +24,6 @@ GST_DEBUG_CATEGORY_EXTERN (strip_render_debug);
 #define GST_CAT_DEFAULT strip_render_debug
 
 struct GstStripRenderPrivate {
-  StripRenderSettings settings_now ()
-  {
-    std::lock_guard guard (lock);
-    return settings;
-  }
-
   std::mutex lock; /* guards what follows; nothing is pushed, posted or queried with it */
   StripRenderSettings settings;
   RenderStats stats;

@@ -224,11 +224,7 @@ static bool
 config_is_due (GstRtpNeighbourCodePay *self, GstClockTime running)
 {
   GstRtpNeighbourCodePayPrivate *priv = self->priv;
-  int interval = 0;
-  {
-    std::lock_guard guard (priv->lock);
-    interval = priv->settings.config_interval;
-  }
+  const int interval = settings_of (priv).config_interval;
   if (interval == 0 && !priv->rig_changed)
     return false;
   const bool due = priv->rig_changed || interval < 0 ||

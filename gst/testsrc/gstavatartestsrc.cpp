@@ -145,23 +145,12 @@ gst_avatar_test_src_release_pad (GstElement *element, GstPad *pad)
 
 /* ---- state changes ---- */
 
-static bool
-start (GstAvatarTestSrc *self)
-{
-  AvatarSettings settings;
-  {
-    std::lock_guard guard (self->priv->lock);
-    settings = self->priv->settings;
-  }
-  return self->priv->stream.start (settings);
-}
-
 static GstStateChangeReturn
 gst_avatar_test_src_change_state (GstElement *element, GstStateChange transition)
 {
   auto self = GST_AVATAR_TEST_SRC (element);
   AvatarStream &stream = self->priv->stream;
-  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !start (self))
+  if (transition == GST_STATE_CHANGE_READY_TO_PAUSED && !stream.start (settings_of (self->priv)))
     return GST_STATE_CHANGE_FAILURE;
   if (transition == GST_STATE_CHANGE_PLAYING_TO_PAUSED)
     stream.set_playing (false);

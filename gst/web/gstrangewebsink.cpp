@@ -282,11 +282,7 @@ static bool
 gst_range_web_sink_start (GstElement *element)
 {
   GstRangeWebSinkPrivate *priv = GST_RANGE_WEB_SINK (element)->priv;
-  Settings settings;
-  {
-    std::lock_guard guard (priv->lock);
-    settings = priv->settings;
-  }
+  Settings settings = settings_of (priv);
   if (settings.root.empty ())
     settings.root = default_root (element);
   priv->last_pts = GST_CLOCK_TIME_NONE;
