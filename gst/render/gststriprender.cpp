@@ -158,6 +158,117 @@ gst_strip_render_decide_allocation (GstAggregator *aggregator, GstQuery *query)
 
 namespace {
 
+constexpr int kMaxFrameRate = 1000; /* above that a period is too short for times in ns */
+
+/* The frame rate that all structures of caps have, else nullptr. */
+const GValue *
+frame_rate (const GstCaps *caps)
+{
+  const GValue *rate = nullptr;
+  for (guint i = 0; caps && i < gst_caps_get_size (caps); i++) {
+    const GValue *own = gst_structure_get_value (gst_caps_get_structure (caps, i), "framerate");
+    if (!own || (rate && gst_value_compare (rate, own) != GST_VALUE_EQUAL))
+      return nullptr;
+    rate = own;
+  }
+  return rate;
+}
+
+GstCaps *
+filtered (GstCaps *caps, GstCaps *filter)
+{
+  if (!filter)
+    return caps;
+  GstCaps *result = gst_caps_intersect_full (filter, caps, GST_CAPS_INTERSECT_FIRST);
+  gst_caps_unref (caps);
+  return result;
+}
+
+/* Any size, and any frame rate up to kMaxFrameRate. Returns: (transfer full)
+ *
+ * One structure; fixation prefers the input's rate. Two structures that differ only in their rates
+ * would be merged by elements downstream that simplify caps, into caps that are no longer a subset
+ * of ours (GStreamer 1.22). */
+GstCaps *
+output_caps (GstCaps *output_template, GstCaps *filter)
+{
+  GstCaps *output = gst_caps_copy (output_template);
+  gst_caps_set_simple (
+      output, "framerate", GST_TYPE_FRACTION_RANGE, 0, 1, kMaxFrameRate, 1, nullptr);
+  return filtered (output, filter);
+}
+
+/* Input caps for an output: its frame rate first, so that sources prefer it, then any.
+ * Returns: (transfer full) */
+GstCaps *
+input_caps (const GstCaps *output, GstCaps *input_template, GstCaps *filter)
+{
+  GstCaps *input = gst_caps_copy (input_template);
+  if (const GValue *rate = frame_rate (output)) {
+    GstCaps *same = gst_caps_copy (input);
+    gst_caps_set_value (same, "framerate", rate);
+    input = gst_caps_merge (same, input);
+  }
+  return filtered (input, filter);
+}
+
+/* The input's, or near it; 30 if the input has none and downstream requires one. */
+void
+fixate_rate (GstStructure *s, const GstCaps *input)
+{
+  int n = 0, d = 1;
+  gst_structure_get_fraction (gst_caps_get_structure (input, 0), "framerate", &n, &d);
+  GValue none = G_VALUE_INIT;
+  g_value_init (&none, GST_TYPE_FRACTION);
+  gst_value_set_fraction (&none, 0, 1);
+  const GValue *wanted = gst_structure_get_value (s, "framerate");
+  if (n == 0 && wanted && !gst_value_intersect (nullptr, wanted, &none))
+    n = 30;
+  g_value_unset (&none);
+  gst_structure_fixate_field_nearest_fraction (s, "framerate", n, d);
+}
+
+/* Width and height for both eyes together. */
+void
+fixate_size (GstStructure *s)
+{
+  const gchar *mode = gst_structure_get_string (s, "multiview-mode");
+  guint flags = 0, mask = 0;
+  gst_structure_get_flagset (s, "multiview-flags", &flags, &mask);
+  const bool half = (flags & mask & GST_VIDEO_MULTIVIEW_FLAGS_HALF_ASPECT) != 0;
+  const bool wide = !half && g_strcmp0 (mode, "side-by-side") == 0;
+  const bool high = !half && g_strcmp0 (mode, "top-bottom") == 0;
+  gst_structure_fixate_field_nearest_int (s, "width", wide ? 1280 : 640);
+  gst_structure_fixate_field_nearest_int (s, "height", high ? 960 : 480);
+}
+
+/* One picture of 640x480, or that much for each eye, with the input's rate or near it.
+ * @param caps  transfer full. Returns: (transfer full) */
+GstCaps *
+fixate_output (GstCaps *caps, const GstCaps *input)
+{
+  caps = gst_caps_make_writable (gst_caps_truncate (caps));
+  GstStructure *s = gst_caps_get_structure (caps, 0);
+  fixate_rate (s, input);
+  gst_structure_fixate_field_string (s, "multiview-mode", "mono");
+  if (g_strcmp0 (gst_structure_get_string (s, "multiview-mode"), "separated") == 0)
+    gst_structure_set (s, "views", G_TYPE_INT, 2, nullptr);
+  fixate_size (s);
+  if (gst_structure_has_field (s, "pixel-aspect-ratio"))
+    gst_structure_fixate_field_nearest_fraction (s, "pixel-aspect-ratio", 1, 1);
+  else
+    gst_structure_set (s, "pixel-aspect-ratio", GST_TYPE_FRACTION, 1, 1, nullptr);
+  return gst_caps_fixate (caps);
+}
+
+/* gst-launch-1.0 reads multiview-flags without a type as a string, which no element interprets */
+bool
+has_flags_as_text (const GstCaps *output)
+{
+  const GstStructure *s = gst_caps_get_structure (output, 0);
+  return gst_structure_has_field_typed (s, "multiview-flags", G_TYPE_STRING);
+}
+
 /* rangealign may correct poses at any time: a fit outlasts that. */
 bool
 handle_input_caps (GstStripRender *self, GstCaps *caps)
@@ -188,7 +299,7 @@ answer_caps (GstStripRender *self, GstQuery *query)
   GstCaps *filter = nullptr, *input = gst_static_pad_template_get_caps (&sink_template);
   gst_query_parse_caps (query, &filter);
   GstCaps *output = gst_pad_get_allowed_caps (GST_AGGREGATOR_SRC_PAD (self));
-  GstCaps *caps = strip_input_caps (output, input, filter);
+  GstCaps *caps = input_caps (output, input, filter);
   gst_query_set_caps_result (query, caps);
   gst_caps_unref (caps);
   gst_clear_caps (&output);
@@ -211,7 +322,7 @@ gst_strip_render_update_src_caps (GstAggregator *aggregator, GstCaps *wanted, Gs
         ("backend=opengl: striprender was built without OpenGL; use auto or software"), (nullptr));
     return GST_FLOW_NOT_NEGOTIATED;
   }
-  *caps = strip_output_caps (output, wanted);
+  *caps = output_caps (output, wanted);
   gst_caps_unref (output);
   return GST_FLOW_OK;
 }
@@ -222,7 +333,7 @@ gst_strip_render_negotiated_src_caps (GstAggregator *aggregator, GstCaps *caps)
   auto self = GST_STRIP_RENDER (aggregator);
   GstStripRenderPrivate *priv = self->priv;
   GST_INFO_OBJECT (self, "from %" GST_PTR_FORMAT " to %" GST_PTR_FORMAT, priv->input, caps);
-  if (strip_has_flags_as_text (caps)) {
+  if (has_flags_as_text (caps)) {
     GST_ELEMENT_ERROR (self, STREAM, FORMAT,
         ("multiview-flags in the caps is a string; write (GstVideoMultiviewFlagsSet) before its "
          "value"),
@@ -431,7 +542,7 @@ gst_strip_render_class_init (GstStripRenderClass *klass)
 
   aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_strip_render_update_src_caps);
   aggregator_class->fixate_src_caps = [] (GstAggregator *aggregator, GstCaps *caps) {
-    return strip_fixate_output (caps, GST_STRIP_RENDER (aggregator)->priv->input);
+    return fixate_output (caps, GST_STRIP_RENDER (aggregator)->priv->input);
   };
   aggregator_class->negotiated_src_caps = GST_DEBUG_FUNCPTR (gst_strip_render_negotiated_src_caps);
   aggregator_class->decide_allocation = GST_DEBUG_FUNCPTR (gst_strip_render_decide_allocation);

@@ -13,7 +13,6 @@
 #include <rangecast/overlay/stats_panel.hpp>
 #include <rangecast/surface/view_fit.hpp>
 
-#include "caps.hpp"
 #include "common/statsreporter.hpp"
 #include "opengl.hpp"
 #include "picture.hpp"
