@@ -4,6 +4,8 @@
 #include <gstrange/gstrange.h>
 
 #include <algorithm>
+#include <cstdio>
+#include <sys/resource.h>
 
 namespace {
 
@@ -58,10 +60,25 @@ read_decoder (GstBin *bin, StreamStats &stats)
   gst_object_unref (decoder);
 }
 
+double
+cpu_seconds ()
+{
+  rusage usage;
+  getrusage (RUSAGE_SELF, &usage);
+  return usage.ru_utime.tv_sec + usage.ru_stime.tv_sec +
+         1e-6 * (usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+}
+
+double
+per_frame (guint64 total, guint64 frames)
+{
+  return frames ? double (total) / double (frames) : 0;
+}
+
 } // namespace
 
 StreamStats
-RunMeasure::stats ()
+RunMeasure::read_stats ()
 {
   StreamStats stats;
   auto bin = GST_BIN (pipeline_);
@@ -107,6 +124,50 @@ RunMeasure::whole_of (guint64 frames)
   return decoded_ ? frames * whole_ / decoded_ : 0;
 }
 
+/* ---- what is written ---- */
+
+void
+RunMeasure::print_progress ()
+{
+  const StreamStats stats = read_stats ();
+  if (stats.frames == 0)
+    std::printf ("  waiting: cameras are learning their background\n");
+  else
+    std::printf ("  frame set %5" G_GUINT64_FORMAT
+                 "  %d view%s  %5.1f /s  %7.0f points  %6.1f ms\n",
+        stats.frames, stats.views_now, stats.views_now == 1 ? "" : "s", fps (),
+        per_frame (stats.points, stats.coded_frames), latency_ms (0.5));
+  std::fflush (stdout);
+}
+
+bool
+RunMeasure::write_report (const char *path)
+{
+  const StreamStats s = read_stats ();
+  FILE *file = std::fopen (path, "w");
+  if (!file) {
+    g_printerr ("rangecast-run: %s: cannot be opened for writing\n", path);
+    return false;
+  }
+  std::fprintf (file,
+      "{\n  \"frames\": %" G_GUINT64_FORMAT ",\n  \"whole_frame_sets\": %" G_GUINT64_FORMAT
+      ",\n  \"views\": %" G_GUINT64_FORMAT
+      ",\n  \"fps\": %.2f,\n  \"points_per_frame_set\": %.1f,\n"
+      "  \"raw_bytes_per_frame_set\": %.1f,\n"
+      "  \"coded_bytes_per_frame_set\": %.1f,\n"
+      "  \"latency_ms\": {\"p50\": %.2f, \"p99\": %.2f},\n"
+      "  \"rtp_packets\": %" G_GUINT64_FORMAT ",\n  \"rtp_lost\": %" G_GUINT64_FORMAT
+      ",\n  \"cpu_seconds\": %.3f\n}\n",
+      s.frames, whole_of (s.frames), s.views, fps (), per_frame (s.points, s.coded_frames),
+      per_frame (s.raw_bytes, s.coded_frames), per_frame (s.coded_bytes, s.coded_frames),
+      latency_ms (0.5), latency_ms (0.99), s.rtp_packets, s.rtp_lost, cpu_seconds ());
+  const bool failed = std::ferror (file) != 0;
+  if (std::fclose (file) == 0 && !failed)
+    return true;
+  g_printerr ("rangecast-run: %s: cannot be written\n", path);
+  return false;
+}
+
 /* ---- probes, on streaming threads ---- */
 
 /* While camera hosts learn their backgrounds, not all views have points, and nothing is drawn,
@@ -121,7 +182,7 @@ RunMeasure::count_views (GstPad *, GstPadProbeInfo *info, gpointer user_data)
   gint seen = 0;
   while (GstRangeMeta *meta = gst_buffer_iterate_range_meta (buffer, &state))
     seen += meta->width > 0 && meta->height > 0;
-  const bool whole = seen >= std::max (1, self->options_.views);
+  const bool whole = seen >= std::max (1, self->views_);
   std::lock_guard guard (self->lock_);
   if (seen > 0 && self->first_points_us_ == 0)
     self->first_points_us_ = g_get_monotonic_time ();
@@ -144,7 +205,7 @@ RunMeasure::record_rendered (GstClockTime capture, gint &frames)
   const GstClockTime now = clock ? gst_clock_get_time (clock) : gst_util_get_timestamp ();
   gst_clear_object (&clock);
   std::lock_guard guard (lock_);
-  if (options_.frames > 0 && rendered_ >= guint64 (options_.frames))
+  if (frames_ > 0 && rendered_ >= guint64 (frames_))
     return false;
   if (!GST_CLOCK_TIME_IS_VALID (first_frame_))
     first_frame_ = now;
@@ -169,7 +230,7 @@ RunMeasure::count_rendered (GstPad *pad, GstPadProbeInfo *info, gpointer user_da
     gst_pad_push_event (pad, gst_event_new_eos ()); /* sources get GST_FLOW_EOS from now on */
     return GST_PAD_PROBE_DROP;
   }
-  const gint wanted = self->options_.frames;
+  const gint wanted = self->frames_;
   if (self->turned_) /* the next frame; the last one is the first view's again */
     g_object_set (
         self->turned_, "azimuth", 360.0 * std::min (frames + 1, wanted) / wanted, nullptr);
@@ -190,8 +251,8 @@ RunMeasure::add_probe (const char *element_name, GstPadProbeCallback probe)
 
 /* ---- life ---- */
 
-RunMeasure::RunMeasure (GstElement *pipeline, const RunOptions &options)
-    : pipeline_ (pipeline), options_ (options)
+RunMeasure::RunMeasure (GstElement *pipeline, int views, int frames)
+    : pipeline_ (pipeline), views_ (views), frames_ (frames)
 {
   latencies_ms_.reserve (kMaxLatencies);
 }
@@ -202,9 +263,9 @@ RunMeasure::~RunMeasure ()
 }
 
 void
-RunMeasure::start ()
+RunMeasure::start (bool turn)
 {
-  if (options_.turn && options_.frames > 0)
+  if (turn && frames_ > 0)
     turned_ = gst_bin_get_by_name (GST_BIN (pipeline_), "view");
   add_probe ("decoder", count_views);
   add_probe ("rendered", count_rendered);

@@ -6,8 +6,6 @@
 #include <mutex>
 #include <vector>
 
-#include "options.hpp"
-
 /** What the elements of a pipeline have counted. */
 struct StreamStats {
   guint64 frames = 0, views = 0;
@@ -21,21 +19,21 @@ struct StreamStats {
  *  grow. */
 class RunMeasure {
 public:
-  RunMeasure (GstElement *pipeline, const RunOptions &options);
+  /** @param views   to wait for, for 2 s after the first one has points
+   *  @param frames  to end the streams after; 0: no limit */
+  RunMeasure (GstElement *pipeline, int views, int frames);
   ~RunMeasure ();
   RunMeasure (const RunMeasure &) = delete;
   RunMeasure &operator= (const RunMeasure &) = delete;
 
-  /** Adds the probes; before the pipeline runs. */
-  void start ();
+  /** Adds the probes; before the pipeline runs. @param turn  "view" by 360 degrees */
+  void start (bool turn);
 
-  /* Any thread: */
-  [[nodiscard]] StreamStats stats ();
-  [[nodiscard]] double fps ();
-  /** From capture time to "rendered", of the last kMaxLatencies frames. @param p  0 to 1 */
-  [[nodiscard]] double latency_ms (double p);
-  /** Of so many frame sets, as many as have had points in all views. */
-  [[nodiscard]] guint64 whole_of (guint64 frames);
+  /** Prints a line: frames, rate, points, latency. */
+  void print_progress ();
+  /** Writes what was measured, JSON; `rangecast demo` reads it. @return false after reporting why
+   *  not */
+  bool write_report (const char *path);
 
 private:
   static GstPadProbeReturn count_views (GstPad *, GstPadProbeInfo *info, gpointer self);
@@ -43,10 +41,16 @@ private:
   void add_probe (const char *element_name, GstPadProbeCallback probe);
   static constexpr std::size_t kMaxLatencies = 65536;
 
+  StreamStats read_stats ();
+  double fps ();
+  /** From capture time to "rendered", of the last kMaxLatencies frames. @param p  0 to 1 */
+  double latency_ms (double p);
+  /** Of so many frame sets, as many as have had points in all views. */
+  guint64 whole_of (guint64 frames);
   bool record_rendered (GstClockTime capture, gint &frames);
 
   GstElement *pipeline_;
-  const RunOptions &options_;
+  const int views_, frames_;
   GstElement *turned_ = nullptr; /* a striprender */
 
   std::mutex lock_;                  /* guards what the pad probes write */

@@ -10,6 +10,7 @@
 #include <glib/gstdio.h>
 #include <gst/gst.h>
 #include <gst/net/gstnet.h>
+#include <gst/video/video.h>
 
 #include <clocale>
 #include <memory>
@@ -22,14 +23,34 @@
 #include "common/dump-graph.hpp"
 #include "common/final-signal.hpp"
 #include "common/for-each.hpp"
-#include "report.hpp"
+#include "measure.hpp"
 #include "srtp-key.hpp"
 #include "stats-sender.hpp"
 
 namespace {
 
+/* The command line; --help describes the options. */
+struct Options {
+  gint64 base_time = -1; ///< ns, < 0: the pipeline's own
+  gint frames = 0;
+  gint views = 1;
+  gboolean turn = FALSE;
+  gint timeout_s = 0;
+  gboolean loop = FALSE;
+  gboolean progress = FALSE;
+  gchar *stats = nullptr;
+  gchar *report = nullptr;
+  gchar *snapshot = nullptr;
+  gchar *srtp_key = nullptr;
+  gchar *clock = nullptr;
+  gchar *signal = nullptr;
+  gchar *certificate = nullptr;
+  gchar **drop_empty = nullptr;
+  gchar **launch = nullptr;
+};
+
 struct Runner {
-  RunOptions options;
+  Options options;
   GstElement *pipeline = nullptr;
   GMainLoop *loop = nullptr;
   std::unique_ptr<RunMeasure> measure;
@@ -281,7 +302,7 @@ add_sources (Runner &runner)
     end_process_after (1000L * limit_s + kPatience_ms);
   }
   const auto progress = [] (gpointer data) -> gboolean {
-    print_progress (*static_cast<Runner *> (data)->measure);
+    static_cast<Runner *> (data)->measure->print_progress ();
     return G_SOURCE_CONTINUE;
   };
   if (runner.options.progress)
@@ -306,13 +327,57 @@ is_empty (const char *path)
   return empty;
 }
 
+/* @return transfer full; null after reporting that there is none, or that it cannot be converted */
+GstSample *
+last_picture (GstElement *pipeline, const char *path)
+{
+  GstElement *sink = gst_bin_get_by_name (GST_BIN (pipeline), "snapshot");
+  GstSample *sample = nullptr;
+  if (sink)
+    g_object_get (sink, "last-sample", &sample, nullptr);
+  gst_clear_object (&sink);
+  if (!sample) {
+    g_printerr ("rangecast-run: no frame was rendered for %s\n", path);
+    return nullptr;
+  }
+  g_autoptr (GError) error = nullptr;
+  GstCaps *png = gst_caps_new_empty_simple ("image/png");
+  GstSample *converted = gst_video_convert_sample (sample, png, 10 * GST_SECOND, &error);
+  gst_caps_unref (png);
+  gst_sample_unref (sample);
+  if (!converted)
+    g_printerr ("rangecast-run: %s: %s\n", path, error->message);
+  return converted;
+}
+
+/* Writes the last frame of the sink named "snapshot" as a PNG. @return false after reporting why
+ * not */
+bool
+write_snapshot (GstElement *pipeline, const char *path)
+{
+  GstSample *picture = last_picture (pipeline, path);
+  if (!picture)
+    return false;
+  g_autoptr (GError) error = nullptr;
+  gpointer png = nullptr;
+  gsize size = 0;
+  gst_buffer_extract_dup (gst_sample_get_buffer (picture), 0, gsize (-1), &png, &size);
+  const bool written =
+      g_file_set_contents (path, static_cast<const gchar *> (png), gssize (size), &error);
+  g_free (png);
+  gst_sample_unref (picture);
+  if (!written)
+    g_printerr ("rangecast-run: %s: %s\n", path, error->message);
+  return written;
+}
+
 /* Reads the results while the pipeline still has them, and stops it. */
 void
 finish (Runner &runner)
 {
-  const RunOptions &options = runner.options;
+  const Options &options = runner.options;
   if (!runner.failed && options.report)
-    runner.failed = !write_report (*runner.measure, options.report);
+    runner.failed = !runner.measure->write_report (options.report);
   if (!runner.failed && options.snapshot)
     runner.failed = !write_snapshot (runner.pipeline, options.snapshot);
   gst_element_set_state (runner.pipeline, GST_STATE_NULL);
@@ -353,7 +418,7 @@ play (Runner &runner)
     for_each (gst_bin_iterate_recurse (GST_BIN (runner.pipeline)), request_stats);
   if (runner.muted)
     set_microphone (runner, true);
-  runner.measure->start ();
+  runner.measure->start (runner.options.turn);
 
   if (gst_element_set_state (runner.pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
     report_failure (runner, bus);
@@ -470,8 +535,8 @@ use_clock (GstElement *pipeline, const char *name)
 bool
 run (Runner &runner)
 {
-  const RunOptions &options = runner.options;
-  runner.measure = std::make_unique<RunMeasure> (runner.pipeline, options);
+  const Options &options = runner.options;
+  runner.measure = std::make_unique<RunMeasure> (runner.pipeline, options.views, options.frames);
   if ((options.clock && !use_clock (runner.pipeline, options.clock)) ||
       (options.srtp_key && !give_srtp_key (runner.pipeline, options.srtp_key)))
     runner.failed = true;
@@ -482,14 +547,69 @@ run (Runner &runner)
   return !runner.failed;
 }
 
+/* Reads the command line, and initialises GStreamer. @return false after reporting what is wrong */
+bool
+parse_arguments (int argc, char **argv, Options &o)
+{
+  const GOptionEntry entries[] = {
+      {"base-time", 0, 0, G_OPTION_ARG_INT64, &o.base_time,
+          "Base time of the pipeline: the clock time of running time 0", "NS"},
+      {"frames", 0, 0, G_OPTION_ARG_INT, &o.frames,
+          "End the streams after N frames at the element named rendered (default 0: no limit)",
+          "N"},
+      {"views", 0, 0, G_OPTION_ARG_INT, &o.views,
+          "Start when N views have points, or 2 s after the first one (default 1)", "N"},
+      {"turn", 0, 0, G_OPTION_ARG_NONE, &o.turn,
+          "Turn the striprender named view by 360 degrees over the N frames", nullptr},
+      {"timeout", 0, 0, G_OPTION_ARG_INT, &o.timeout_s,
+          "Fail if the stream has not ended by then (default 0: no limit)", "SECONDS"},
+      {"loop", 0, 0, G_OPTION_ARG_NONE, &o.loop, "Play a file again and again", nullptr},
+      {"progress", 0, 0, G_OPTION_ARG_NONE, &o.progress, "Print a line every 2 s", nullptr},
+      {"stats", 0, 0, G_OPTION_ARG_STRING, &o.stats,
+          "Send the elements' statistics to udp://HOST:PORT (default: environment variable "
+          "RANGECAST_STATS, or none)",
+          "ADDRESS"},
+      {"report", 0, 0, G_OPTION_ARG_FILENAME, &o.report, "Write the measurements", "JSON"},
+      {"snapshot", 0, 0, G_OPTION_ARG_FILENAME, &o.snapshot,
+          "Write the last frame of the sink named snapshot", "PNG"},
+      {"srtp-key", 0, 0, G_OPTION_ARG_FILENAME, &o.srtp_key,
+          "File with the key (60 hexadecimal digits) of every srtpenc and srtpdec", "FILE"},
+      {"drop-empty", 0, 0, G_OPTION_ARG_FILENAME_ARRAY, &o.drop_empty,
+          "Remove this file at the end if nothing was written to it, or a WebM header without "
+          "frames; that is an error of the first of several such files",
+          "FILE"},
+      {"clock", 0, 0, G_OPTION_ARG_STRING, &o.clock,
+          "Clock of the pipeline: system (monotonic), or HOST:PORT, where rangemux publishes one "
+          "(default: what its elements provide, such as a sound card's)",
+          "CLOCK"},
+      {"signal", 0, 0, G_OPTION_ARG_STRING, &o.signal,
+          "Negotiate the webrtcbin named webrtc with the peer that uses the same link", "'LINK'"},
+      {"certificate", 0, 0, G_OPTION_ARG_FILENAME, &o.certificate,
+          "Certificate of the server of --signal (default: one that the system trusts)", "PEM"},
+      {G_OPTION_REMAINING, 0, 0, G_OPTION_ARG_STRING_ARRAY, &o.launch, nullptr, nullptr}, {}};
+  GOptionContext *context =
+      g_option_context_new ("LAUNCH-STRING... - run a pipeline and measure it");
+  g_option_context_add_main_entries (context, entries, nullptr);
+  g_option_context_add_group (context, gst_init_get_option_group ());
+  GError *error = nullptr;
+  const bool parsed = g_option_context_parse (context, &argc, &argv, &error);
+  if (!parsed)
+    g_printerr ("rangecast-run: %s\n", error->message);
+  else if (!o.launch)
+    g_printerr ("rangecast-run: give a launch string, see --help\n");
+  g_clear_error (&error);
+  g_option_context_free (context);
+  return parsed && o.launch;
+}
+
 } // namespace
 
 int
 main (int argc, char **argv)
 {
   setlocale (LC_CTYPE, ""); /* arguments are in the user's encoding */
-  Runner runner;
-  if (!runner.options.parse (&argc, &argv) || !open_stats (runner))
+  static Runner runner;     /* its options are never freed */
+  if (!parse_arguments (argc, argv, runner.options) || !open_stats (runner))
     return 2;
   bool good = make_call (runner);
   do {
