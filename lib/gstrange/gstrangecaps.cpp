@@ -66,8 +66,6 @@ G_DEFINE_BOXED_TYPE (GstRangeCamera, gst_range_camera, gst_range_camera_copy, gs
  * @camera: a camera
  *
  * Returns: (transfer full): a copy, to be freed with gst_range_camera_free()
- *
- * Since: 0.1
  */
 GstRangeCamera *
 gst_range_camera_copy (const GstRangeCamera *camera)
@@ -78,8 +76,6 @@ gst_range_camera_copy (const GstRangeCamera *camera)
 /**
  * gst_range_camera_free:
  * @camera: (transfer full): a camera of gst_range_camera_copy()
- *
- * Since: 0.1
  */
 void
 gst_range_camera_free (GstRangeCamera *camera)
@@ -98,8 +94,6 @@ gst_range_camera_free (GstRangeCamera *camera)
  * Describes a camera at the origin of the world with its principal point at the centre of the
  * image, a depth unit of 0.1 mm, and depth from 0.3 m to 3 m. It looks along -z, with y up. Change
  * the fields that differ.
- *
- * Since: 0.1
  */
 void
 gst_range_camera_init (
@@ -121,8 +115,6 @@ gst_range_camera_init (
  * t, metres
  *
  * Sets the pose, for languages that cannot write to the array in the struct.
- *
- * Since: 0.1
  */
 void
 gst_range_camera_set_pose (GstRangeCamera *camera, const gdouble *world_from_view)
@@ -141,8 +133,6 @@ gst_range_camera_set_pose (GstRangeCamera *camera, const gdouble *world_from_vie
  * Makes video/x-range caps. Their width and height are those of the largest view.
  *
  * Returns: (transfer full) (nullable): the caps, or %NULL on error
- *
- * Since: 0.1
  */
 GstCaps *
 gst_range_caps_new (
@@ -172,8 +162,6 @@ gst_range_caps_new (
  * @camera: (out caller-allocates): the view's calibration
  *
  * Returns: %FALSE if the caps have no valid rig, or the rig lacks the view
- *
- * Since: 0.1
  */
 gboolean
 gst_range_caps_get_camera (const GstCaps *caps, guint view_id, GstRangeCamera *camera)
@@ -194,8 +182,6 @@ gst_range_caps_get_camera (const GstCaps *caps, guint view_id, GstRangeCamera *c
  *
  * Returns: the views that can occur: bit i is set if the rig has a view of id i; 0 if the caps have
  *   no valid rig
- *
- * Since: 0.1
  */
 guint64
 gst_range_caps_get_view_ids (const GstCaps *caps)
