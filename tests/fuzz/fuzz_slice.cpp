@@ -44,10 +44,14 @@ views_of_all_depths ()
   return rig;
 }
 
-static SliceDecoder *
+struct Decoder : SliceDecoder {
+  SliceMemory memory;
+};
+
+static Decoder *
 make_decoder ()
 {
-  auto made = new SliceDecoder;
+  auto made = new Decoder;
   if (!made->set_rig (views_of_all_depths ()).ok ())
     std::abort ();
   return made;
@@ -166,7 +170,7 @@ struct Picture {
   DecodedPixels decoded;
   bool good = false;
 
-  void decode (SliceDecoder &decoder, std::span<const std::uint8_t> unit, const SliceHeader &header,
+  void decode (Decoder &decoder, std::span<const std::uint8_t> unit, const SliceHeader &header,
       const ReferencePlane *before, const ConstRangeImage *older)
   {
     const int width = header.roi.width, height = header.roi.height;
@@ -176,9 +180,10 @@ struct Picture {
         {colour.data (), width, height, width * 4}, 0};
     if (header.reference)
       kept.begin (header);
+    decoder.prepare (header);
     good = decoder
                .decode (unit, header, {before, header.reference ? &kept : nullptr, older}, image,
-                   decoded)
+                   decoded, decoder.memory)
                .ok ();
   }
 };
@@ -245,7 +250,7 @@ check_same (const SliceHeader &header, Picture &a, Picture &b)
 extern "C" int
 LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
 {
-  static SliceDecoder &decoder = *make_decoder (), &other = *make_decoder ();
+  static Decoder &decoder = *make_decoder (), &other = *make_decoder ();
   static const std::vector<std::uint16_t> older_depth (kWidth * kHeight / 4, 0x4321);
   static const std::vector<Rgbx> older_colour (older_depth.size ());
   static const ConstRangeImage older = {0, {kWidth / 4, kHeight / 4, kWidth / 2, kHeight / 2},

@@ -121,8 +121,8 @@ public:
 
   Status segment ()
   {
-    return segmenter_.clear_background (
-        image (), background_, scene_->rig ().views[0].depth_unit_m, trial_.settings);
+    const Status status = decide ();
+    return status.ok () ? clear () : status;
   }
 
   /** @name segment() in its parts @{ */

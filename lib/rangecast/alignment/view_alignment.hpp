@@ -69,7 +69,6 @@ public:
   {
     return of_[static_cast<std::size_t> (view_id)];
   }
-  [[nodiscard]] const ColourBalance &balance () const { return balance_; }
 
 private:
   void learn (std::span<const RangeImage> images, const AlignmentSettings &settings);

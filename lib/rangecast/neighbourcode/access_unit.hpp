@@ -98,7 +98,7 @@ public:
   };
 
   Status set_rig (const Rig &rig);
-  [[nodiscard]] const Rig &rig () const { return rig_; }
+  [[nodiscard]] const Rig &rig () const { return decoder_.rig (); }
   /** Forgets earlier frame sets, after a discontinuity. */
   void reset_references ();
 
@@ -149,7 +149,6 @@ private:
   void run (Job &job, const RangeImage &image, const ConstRangeImage &older, SliceMemory &memory);
   [[nodiscard]] DecoderResult sum_up (std::size_t index) const;
 
-  Rig rig_;
   SliceDecoder decoder_;
   std::array<ReferencePair, kMaxViews> references_; /* by view-id */
   std::array<PlannedView, kMaxViews> planned_;

@@ -20,7 +20,6 @@ AccessUnitDecoder::set_rig (const Rig &rig)
   if (Status s = decoder_.set_rig (rig); !s.ok ())
     return s;
   references_ = {}; /* frees memory, too: the views may differ */
-  rig_ = rig;
   count_ = 0;
   return {};
 }

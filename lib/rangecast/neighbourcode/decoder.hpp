@@ -30,26 +30,19 @@ public:
   /** Reads a slice's header and checks that its view is in the rig and its ROI in that view. */
   Status read_header (std::span<const std::uint8_t> unit, SliceHeader &header) const;
 
-  /** Decodes one slice into the planes of its view. Writes only pixels of its own rows and
-   *  columns; where it returns an error, those may be partly written.
+  /** Builds the tables for slices of this view and these bits, unless they exist. Threads may
+   * prepare different views concurrently. */
+  void prepare (const SliceHeader &header);
+
+  /** Decodes one slice, after prepare(), into the planes of its view. Writes only pixels of its own
+   * rows and columns; where it returns an error, those may be partly written. Threads may decode
+   * slices that share no pixel concurrently, each with its own memory.
    *  @param unit    the whole unit
    *  @param header  from read_header()
    *  @param image   has the slice's ROI
    *  @param reference  of this view; pixels that refer to missing ones become invalid
    *  @param[in,out] pixels  is added to
    *  @return kBadData or kTruncated for damaged symbols, kBadSize for another ROI */
-  Status decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
-      const DecoderReference &reference, const RangeImage &image, DecodedPixels &pixels)
-  {
-    prepare (header);
-    return decode (unit, header, reference, image, pixels, memory_);
-  }
-
-  /** Builds the tables for slices of this view and these bits, unless they exist. Threads may
-   * prepare different views concurrently. */
-  void prepare (const SliceHeader &header);
-  /** decode() after prepare(). Threads may decode slices that share no pixel concurrently, each
-   * with its own memory. */
   Status decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
       const DecoderReference &reference, const RangeImage &image, DecodedPixels &pixels,
       SliceMemory &memory) const;
@@ -68,7 +61,6 @@ private:
   std::array<std::unique_ptr<ViewTables>, kMaxViews> views_;
   std::array<ColourQuantiser, 5> colours_{ColourQuantiser (4), ColourQuantiser (5),
       ColourQuantiser (6), ColourQuantiser (7), ColourQuantiser (8)};
-  SliceMemory memory_;
 };
 
 } // namespace rangecast

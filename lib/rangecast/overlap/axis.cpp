@@ -40,6 +40,24 @@ rotate (double (&a)[3][3], double (&v)[3][3], int p, int q)
     std::tie (row[p], row[q]) = std::pair (c * row[p] - s * row[q], s * row[p] + c * row[q]);
 }
 
+/* Eigenvalues, largest first, and unit eigenvectors of a symmetric matrix (xx xy xz yy yz zz), by
+ * cyclic Jacobi rotations. */
+void
+eigen_symmetric (const double (&m)[6], double (&values)[3], Vec3 (&vectors)[3])
+{
+  double a[3][3] = {{m[0], m[1], m[2]}, {m[1], m[3], m[4]}, {m[2], m[4], m[5]}};
+  double v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int sweep = 0; sweep < 12; sweep++)
+    for (auto [p, q] : {std::pair (0, 1), std::pair (0, 2), std::pair (1, 2)})
+      rotate (a, v, p, q);
+  int order[3] = {0, 1, 2};
+  std::sort (order, order + 3, [&] (int i, int j) { return a[i][i] > a[j][j]; });
+  for (int k = 0; k < 3; k++) {
+    values[k] = a[order[k]][order[k]];
+    vectors[k] = {v[0][order[k]], v[1][order[k]], v[2][order[k]]};
+  }
+}
+
 /* The largest |cosine| between a direction and a camera's optical axis: 1 = some camera looks along
  * it. */
 double
@@ -79,22 +97,6 @@ Vec3
 Moments::centroid () const
 {
   return n > 0 ? Vec3{sum[0] / n, sum[1] / n, sum[2] / n} : Vec3{};
-}
-
-void
-eigen_symmetric (const double (&m)[6], double (&values)[3], Vec3 (&vectors)[3])
-{
-  double a[3][3] = {{m[0], m[1], m[2]}, {m[1], m[3], m[4]}, {m[2], m[4], m[5]}};
-  double v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  for (int sweep = 0; sweep < 12; sweep++)
-    for (auto [p, q] : {std::pair (0, 1), std::pair (0, 2), std::pair (1, 2)})
-      rotate (a, v, p, q);
-  int order[3] = {0, 1, 2};
-  std::sort (order, order + 3, [&] (int i, int j) { return a[i][i] > a[j][j]; });
-  for (int k = 0; k < 3; k++) {
-    values[k] = a[order[k]][order[k]];
-    vectors[k] = {v[0][order[k]], v[1][order[k]], v[2][order[k]]};
-  }
 }
 
 Axis

@@ -31,10 +31,6 @@ struct Moments {
   [[nodiscard]] Vec3 centroid () const;
 };
 
-/** Eigenvalues, largest first, and unit eigenvectors of a symmetric matrix (xx xy xz yy yz zz), by
- *  cyclic Jacobi rotations. */
-void eigen_symmetric (const double (&matrix)[6], double (&values)[3], Vec3 (&vectors)[3]);
-
 /** The axis of one frame's points: the principal axis; world y where the points have no direction
  * of largest spread (its variance is less than 1.3 times the next one's), or where a camera looks
  *  along it more nearly than any camera looks along y: a camera cannot see slices along the axis.
@@ -48,8 +44,6 @@ public:
   /** Updates the axis with that of a new frame; the first one is used unchanged. */
   const Axis &follow (const Axis &measured);
   void reset () { started_ = false; }
-  [[nodiscard]] bool started () const { return started_; }
-  [[nodiscard]] const Axis &axis () const { return axis_; }
 
 private:
   bool started_ = false;

@@ -360,12 +360,4 @@ Segmenter::clear (const RangeImage &image, const BackgroundModel &background, do
   return {};
 }
 
-Status
-Segmenter::clear_background (const RangeImage &image, const BackgroundModel &background,
-    double depth_unit_m, const SegmentationSettings &settings)
-{
-  const Status status = decide (image, background, depth_unit_m, settings);
-  return status.ok () ? clear (image, background, depth_unit_m, settings) : status;
-}
-
 } // namespace rangecast

@@ -58,10 +58,6 @@ public:
   Status clear (const RangeImage &image, const BackgroundModel &background, double depth_unit_m,
       const SegmentationSettings &settings);
 
-  /** decide() and clear(). */
-  Status clear_background (const RangeImage &image, const BackgroundModel &background,
-      double depth_unit_m, const SegmentationSettings &settings);
-
   /** Result of decide() for its ROI: 255 = foreground, with or without depth. */
   [[nodiscard]] const cv::Mat &mask () const { return mask_; }
   /** Where an image may update the background: 128 or more = matches its colour and brightness, and

@@ -68,7 +68,9 @@ public:
   {
     if (Status status = match (time_s, false, image); !status.ok ())
       return status;
-    const Status status = segmenter_.clear_background (image, background_, view_.depth_unit_m, {});
+    Status status = segmenter_.decide (image, background_, view_.depth_unit_m, {});
+    if (status.ok ())
+      status = segmenter_.clear (image, background_, view_.depth_unit_m, {});
     cut (image, bounding_box (image, 0));
     return status;
   }

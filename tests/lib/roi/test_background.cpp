@@ -70,7 +70,9 @@ void
 segment (Frame &frame, const SegmentationSettings &settings = {})
 {
   Segmenter segmenter;
-  ASSERT_TRUE (segmenter.clear_background (frame.image (), learnt_wall (), 1e-4, settings).ok ());
+  const BackgroundModel wall = learnt_wall ();
+  ASSERT_TRUE (segmenter.decide (frame.image (), wall, 1e-4, settings).ok ());
+  ASSERT_TRUE (segmenter.clear (frame.image (), wall, 1e-4, settings).ok ());
 }
 
 } // namespace
@@ -279,7 +281,8 @@ TEST (Background, roi_is_compared_with_its_own_part_of_the_background)
   const RangeImage part = {0, {15, 8, 40, 35}, frame.depth.view ().crop (15, 8, 40, 35),
       frame.colour.view ().crop (15, 8, 40, 35), 0};
   Segmenter segmenter;
-  ASSERT_TRUE (segmenter.clear_background (part, learnt_wall (), 1e-4, {}).ok ());
+  ASSERT_TRUE (segmenter.decide (part, learnt_wall (), 1e-4, {}).ok ());
+  ASSERT_TRUE (segmenter.clear (part, learnt_wall (), 1e-4, {}).ok ());
   EXPECT_EQ (frame.valid (15, 8, 40, 35), 400);
   EXPECT_EQ (frame.valid (0, 0, 15, 48), 15 * 48) << "outside the ROI nothing may be written";
 }
@@ -290,8 +293,7 @@ TEST (Background, roi_outside_the_background_is_refused)
   RangeImage image = frame.image ();
   image.roi.x = 1;
   Segmenter segmenter;
-  EXPECT_EQ (
-      segmenter.clear_background (image, learnt_wall (), 1e-4, {}).code (), StatusCode::kBadSize);
+  EXPECT_EQ (segmenter.decide (image, learnt_wall (), 1e-4, {}).code (), StatusCode::kBadSize);
   BackgroundModel model;
   model.reset (kWidth, kHeight);
   EXPECT_EQ (model.learn (image).code (), StatusCode::kBadSize);

@@ -106,7 +106,6 @@ public:
   void record_decrease ();
   /** The latest evaluate() found that sending less had not helped. */
   [[nodiscard]] bool was_usual () const { return was_usual_; }
-  [[nodiscard]] double usual () const { return usual_; }
   /** Share of packets lost in the latest evaluate(). */
   [[nodiscard]] double share () const { return share_; }
 

@@ -25,8 +25,6 @@ public:
   void reset () { *this = FrameThinning (); }
   /** To be called once for each frame set. @return false if it is to be dropped */
   bool keep (const ThinningInput &input);
-  /** n: one of so many frame sets is kept. */
-  [[nodiscard]] int one_of () const { return one_of_; }
 
 private:
   void measure (const ThinningInput &input, double elapsed_s);
