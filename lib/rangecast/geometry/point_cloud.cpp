@@ -2,13 +2,10 @@
 #include "point_cloud.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 
 namespace rangecast {
-
-static_assert (std::endian::native == std::endian::little, "points are copied as they lie");
 
 std::size_t
 count_points (const ConstRangeImage &image)

@@ -116,15 +116,13 @@ compare (const Rgbx *colour, const typename Lanes::F (&field)[kFields], const Cl
 {
   using F = typename Lanes::F;
   using I = typename Lanes::I;
-  constexpr bool kLittle = std::endian::native == std::endian::little;
-  constexpr int kShifts[] = {kLittle ? 0 : 24, kLittle ? 8 : 16, kLittle ? 16 : 8};
   const I pixels = Lanes::at (reinterpret_cast<const std::int32_t *> (colour));
   F rgb[3], mean[3], mixed{}, square{};
   to.distortion = F{};
 #pragma GCC unroll 3
   for (int c = 0; c < 3; c++) {
     /* Offset by one, so that black has a brightness. */
-    rgb[c] = __builtin_convertvector((pixels >> kShifts[c] & 255) + 1, F);
+    rgb[c] = __builtin_convertvector((pixels >> 8 * c & 255) + 1, F);
     mean[c] = field[c] * limits.light[std::size_t (c)] + 1;
     /* Saturated: only a lower bound is known. */
     mean[c] = rgb[c] > kBurntOut ? lesser (mean[c], F (F{} + 256)) : mean[c];

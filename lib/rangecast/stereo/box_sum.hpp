@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -67,7 +66,7 @@ inline void
 look_up (const std::int16_t *disparity, int n, const std::uint8_t *row, int width, int x,
     std::int16_t *grey)
 {
-  constexpr int kAtOnce = 64, kFirst = std::endian::native == std::endian::little ? 0 : 8;
+  constexpr int kAtOnce = 64;
   std::int16_t at[kAtOnce];
   std::uint16_t pairs[kAtOnce]; /* of neighbours: loops without gather loads are vectorized */
   const auto last = static_cast<std::int16_t> (width - 2);
@@ -82,7 +81,7 @@ look_up (const std::int16_t *disparity, int n, const std::uint8_t *row, int widt
     for (int i = 0; i < end; i++)
       std::memcpy (&pairs[i], row + at[i], 2);
     for (int i = 0; i < end; i++) {
-      const int a = pairs[i] >> kFirst & 255, b = pairs[i] >> (8 - kFirst) & 255, f = -d[i] & 15;
+      const int a = pairs[i] & 255, b = pairs[i] >> 8, f = -d[i] & 15;
       grey[begin + i] = static_cast<std::int16_t> ((a * 16 + (b - a) * f + 8) >> 4);
     }
   }

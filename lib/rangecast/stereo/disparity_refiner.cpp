@@ -4,7 +4,6 @@
 #include "disparity_refiner.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -36,12 +35,8 @@ constexpr int kIterations = 2;
 constexpr int kRows = 16;
 static_assert (kRows > kPatchSide);
 
-/* Positions in a word of bytes that are adjacent in memory. */
-constexpr int kFirst = std::endian::native == std::endian::little ? 0 : 24;
-constexpr int kNext = kFirst == 0 ? 8 : -8;
-constexpr int kByte[] = {kFirst, kFirst + kNext, kFirst + 2 * kNext, kFirst + 3 * kNext};
-/* Without the last of them. */
-constexpr std::uint32_t kColour = ~(std::uint32_t{255} << kByte[3]);
+/* R, G and B of a pixel, without the last byte. */
+constexpr std::uint32_t kColour = 0xffffff;
 
 /* The sum of kSide columns from x on, given also those of three successive columns. */
 template <int kSide, typename T>
@@ -486,7 +481,7 @@ DisparityRefiner::compare_row (const Job &job, const cv::Rect &at, int y, Memory
     F grey[4];
 #pragma GCC unroll 4
     for (int i = 0; i < 4; i++)
-      grey[i] = __builtin_convertvector(g >> kByte[i] & 255, F);
+      grey[i] = __builtin_convertvector(g >> 8 * i & 255, F);
     const F f = Lanes::at (&m.shares[std::size_t (x)]);
     F slope = 0.5f * ((grey[2] - grey[0]) * (1 - f) + (grey[3] - grey[1]) * f),
       differs = Lanes::at (levels + x) - (grey[1] + f * (grey[2] - grey[1]));

@@ -2,7 +2,6 @@
 #include "moving_blocks.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdlib>
 
@@ -29,9 +28,7 @@ using Pixels = Lanes<kBlock>;
 inline Pixels::I
 luma_of (const Pixels::I &pixels)
 {
-  constexpr bool kLittle = std::endian::native == std::endian::little;
-  constexpr int kRed = kLittle ? 0 : 24, kGreen = kLittle ? 8 : 16, kBlue = kLittle ? 16 : 8;
-  return (pixels >> kRed & 255) + 2 * (pixels >> kGreen & 255) + (pixels >> kBlue & 255);
+  return (pixels & 255) + 2 * (pixels >> 8 & 255) + (pixels >> 16 & 255);
 }
 
 /* In 16 bits, which vectors hold twice as many of. The sums of one image are not kept, but follow

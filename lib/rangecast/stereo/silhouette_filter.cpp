@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstdlib>
 #include <cstring>
 #include <numeric>
@@ -97,17 +96,15 @@ take_every_second (
     const std::uint32_t *__restrict pixels, int n, std::uint8_t *const (&planes)[4], int x0)
 {
   constexpr int kAtOnce = 64;
-  constexpr bool kLittle = std::endian::native == std::endian::little;
   for (int begin = 0; begin < n; begin += kAtOnce) {
     const int end = std::min (kAtOnce, n - begin);
     std::uint32_t chosen[kAtOnce];
     for (int i = 0; i < end; i++)
       chosen[i] = pixels[2 * (begin + i)];
     for (int c = 0; c < 3; c++) {
-      const int shift = kLittle ? 8 * c : 24 - 8 * c;
       std::uint8_t *__restrict to = planes[c] + x0 + begin;
       for (int i = 0; i < end; i++)
-        to[i] = std::uint8_t (chosen[i] >> shift);
+        to[i] = std::uint8_t (chosen[i] >> 8 * c);
     }
   }
 }

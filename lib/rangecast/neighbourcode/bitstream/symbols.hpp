@@ -11,6 +11,9 @@
 
 namespace rangecast {
 
+static_assert (std::endian::native == std::endian::little,
+    "bits, pixels and points are used as they lie in memory");
+
 /** One symbol a pixel; 3 bits in profile plain. 6 and 7 are reserved. */
 enum Symbol : std::uint8_t {
   kLeft = 0, ///< equals the pixel to the left
@@ -35,16 +38,12 @@ load_little_endian (const std::uint8_t *from)
 {
   std::uint64_t value;
   std::memcpy (&value, from, sizeof value);
-  if constexpr (std::endian::native == std::endian::big)
-    value = __builtin_bswap64 (value);
   return value;
 }
 
 inline void
 store_little_endian (std::uint64_t value, std::uint8_t *to)
 {
-  if constexpr (std::endian::native == std::endian::big)
-    value = __builtin_bswap64 (value);
   std::memcpy (to, &value, sizeof value);
 }
 

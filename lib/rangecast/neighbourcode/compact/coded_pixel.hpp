@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <span>
@@ -52,9 +51,6 @@ typedef std::uint64_t ComponentPairs __attribute__ ((vector_size (16)));
 inline Components
 components_of (PixelCode code)
 {
-  if constexpr (std::endian::native == std::endian::big)
-    return Components{static_cast<std::uint16_t> (code), static_cast<std::int16_t> (code >> 16),
-        static_cast<std::int16_t> (code >> 32), static_cast<std::int16_t> (code >> 48)};
   const auto halves = reinterpret_cast<ComponentHalves> (ComponentPairs{code, 0});
   const auto doubled = __builtin_shufflevector (halves, halves, 0, 0, 1, 1, 2, 2, 3, 3);
   return reinterpret_cast<Components> (doubled) >> 16 & Components{0xffff, -1, -1, -1};
@@ -63,12 +59,6 @@ components_of (PixelCode code)
 inline PixelCode
 pack_components (Components c)
 {
-  if constexpr (std::endian::native == std::endian::big) {
-    PixelCode code = 0;
-    for (int i = 0; i < kComponents; i++)
-      code |= PixelCode{static_cast<std::uint16_t> (c[i])} << 16 * i;
-    return code;
-  }
   const auto halves = reinterpret_cast<ComponentHalves> (c);
   const auto packed = __builtin_shufflevector (halves, halves, 0, 2, 4, 6, 0, 2, 4, 6);
   return reinterpret_cast<ComponentPairs> (packed)[0];

@@ -28,9 +28,7 @@ inline void
 write_pixel (std::uint64_t shown, std::uint16_t &depth, Rgbx &colour)
 {
   depth = static_cast<std::uint16_t> (shown >> 32);
-  auto rgbx = static_cast<std::uint32_t> (shown);
-  if constexpr (std::endian::native == std::endian::big)
-    rgbx = __builtin_bswap32 (rgbx);
+  const auto rgbx = static_cast<std::uint32_t> (shown);
   std::memcpy (&colour.r, &rgbx, sizeof rgbx);
 }
 

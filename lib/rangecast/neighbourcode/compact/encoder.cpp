@@ -85,8 +85,6 @@ CompactEncoder::load_row (const ConstRangeImage &image, int y)
       for (std::size_t x = begin; x < end; x++) {
         std::uint32_t rgbx = 0;
         std::memcpy (&rgbx, colour + x, sizeof rgbx);
-        if constexpr (std::endian::native == std::endian::big)
-          rgbx = __builtin_bswap32 (rgbx);
         own[x] |= key_of (0, rgbx);
       }
     run = run_end (valid, run_after, false);

@@ -28,8 +28,6 @@ inline PixelKey
 key_of (Components c)
 {
   typedef std::uint64_t Pairs __attribute__ ((vector_size (16)));
-  if constexpr (std::endian::native == std::endian::big)
-    c = __builtin_shufflevector (c, c, 1, 0, 3, 2);
   const Pairs pairs = reinterpret_cast<Pairs> (c);
   return pairs[0] | pairs[1] << 18;
 }
