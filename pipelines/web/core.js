@@ -2,17 +2,22 @@
 // rangecast.wasm for JavaScript: calls, and records by the names of their fields (wasm/border.hpp). Runs in pages, workers and node.
 
 const FIELDS = {
-  rc_frame: ['views', 'pts', 'captureTime', 'bytes', 'slices', 'badSlices', 'missingPixels', 'unknownPixels', 'points'],
-  rc_view: ['id', 'x', 'y', 'width', 'height', 'depth', 'colour'],
   rc_layer: ['id', 'vertices', 'size'],
-  rc_recording: ['duration', 'frameDuration', 'read'],
   rc_orbit: ['azimuth', 'elevation', 'distance', 'fieldOfView', 'panX', 'panY', 'panZ', 'homeRequests'],
   rc_ply: ['address', 'size'],
   rc_scene_state: ['address', 'size'],
-  rc_rig_view: ['id', 'width', 'height'],
 };
+// Structs of rangecast.h without struct_size; u and i: 32 bits, U: 64, d: double.
+const STRUCTS = {
+  stream: { cameras: 'u', framePeriod: 'U', duration: 'U', position: 'U' },
+  frame_set: { views: 'u', number: 'U', time: 'U', captureTime: 'U', bytes: 'U', points: 'U', slices: 'U', badSlices: 'U', missingPixels: 'U', unknownPixels: 'U', truncated: 'u' },
+  view: { id: 'i', x: 'i', y: 'i', width: 'i', height: 'i', depth: 'u', colour: 'u' },
+  camera: { id: 'i', width: 'i', height: 'i', fx: 'd', fy: 'd', cx: 'd', cy: 'd' },
+};
+const NO_TIME = 2n ** 64n - 1n;
+const milliseconds = (ns) => ns === Number (NO_TIME) ? -1 : ns / 1e6;
 
-export const DONE = 0, NOTHING = 1, END = 2, FAILED = 3;
+export const DONE = 0, NOTHING = 1, END = 2, FAILED = 3; // RangecastResult
 
 // What an instance threw: a trap or a refused allocation. The instance was made anew and knows nothing of the stream.
 export class CoreFailure extends Error {}
@@ -38,6 +43,7 @@ export class Core {
     this.exports = new WebAssembly.Instance (this.module, { wasi_snapshot_preview1: wasi, rangecast }).exports;
     this.memory = this.exports.memory;
     this.exports._initialize ();
+    this.decoder = this.exports.rc_decoder?.(); // a fuzz target has none
   }
 
   writeSizes (count, size) {
@@ -76,6 +82,21 @@ export class Core {
     return Object.fromEntries (FIELDS[name].map ((field, i) => [field, values[i]]));
   }
 
+  // A struct that a function rangecast_decoder_get_* fills, by names; null if there is none. 64-bit numbers lose their last bits.
+  struct (name, ...args) {
+    const address = this.call ('rc_struct'), view = new DataView (this.memory.buffer, address, 256);
+    view.setUint32 (0, 256, true);
+    if (this.call (`rangecast_decoder_get_${name}`, this.decoder, ...args, address) !== DONE)
+      return null;
+    let at = 4;
+    return Object.fromEntries (Object.entries (STRUCTS[name]).map (([field, type]) => {
+      const size = type === 'U' || type === 'd' ? 8 : 4, place = Math.ceil (at / size) * size;
+      at = place + size;
+      return [field, type === 'u' ? view.getUint32 (place, true) : type === 'i' ? view.getInt32 (place, true)
+        : type === 'd' ? view.getFloat64 (place, true) : Number (view.getBigUint64 (place, true))];
+    }));
+  }
+
   // @return false if no message is that long
   input (bytes) {
     const address = this.call ('rc_input', bytes.length);
@@ -84,23 +105,41 @@ export class Core {
     this.bytes (address, bytes.length).set (bytes);
     return true;
   }
-  addUnits (bytes) {
-    if (this.input (bytes))
-      this.call ('rc_add_units', bytes.length);
+  // state: what rc_scene_state gave in another instance
+  setScene (state) {
+    if (this.input (new Uint8Array (state)))
+      this.call ('rc_camera_scene', state.byteLength);
   }
-  decode () { return this.call ('rc_decode'); }
-  message () { return this.text (this.call ('rc_message')); }
-  frame () { return this.record ('rc_frame'); }
+  // kind: 'units' of an access unit, or 'bytes' of a byte stream
+  push (kind, bytes) {
+    if (this.input (bytes))
+      this.call (`rangecast_decoder_push_${kind}`, this.decoder, this.call ('rc_input', bytes.length), bytes.length);
+  }
+  next () { return this.call ('rangecast_decoder_next', this.decoder); }
+  seek (ms) { return this.call ('rangecast_decoder_seek', this.decoder, BigInt (Math.round (Math.max (0, ms) * 1e6))); }
+  discontinuity () { this.call ('rangecast_decoder_discontinuity', this.decoder); }
+  reset () { this.call ('rangecast_decoder_reset', this.decoder); }
+  message () { return this.text (this.call ('rangecast_decoder_get_message', this.decoder)); }
+
+  // Times in ms; -1: unknown.
+  stream () {
+    const stream = this.struct ('stream');
+    return { ...stream, framePeriod: stream.framePeriod / 1e6, duration: milliseconds (stream.duration) };
+  }
+  frame () {
+    const frame = this.struct ('frame_set');
+    return { ...frame, time: milliseconds (frame.time), captureTime: frame.captureTime / 1e6 };
+  }
 
   // Views of the last frame set. Planes are the module's memory: read them before the next call.
   views () {
     return Array.from ({ length: this.frame ().views }, (_, i) => {
-      const view = this.record ('rc_view', i), pixels = view.width * view.height;
+      const view = this.struct ('view', i), pixels = view.width * view.height;
       return { ...view, depth: new Uint16Array (this.memory.buffer, view.depth, pixels), colour: this.bytes (view.colour, 4 * pixels) };
     });
   }
 
-  rig () { return Array.from ({ length: this.call ('rc_rig_views') }, (_, i) => this.record ('rc_rig_view', i)); }
+  rig () { return Array.from ({ length: this.stream ().cameras }, (_, i) => this.struct ('camera', i)); }
 
   // @return the frame set as a PLY file, or null, which message () explains
   ply () {

@@ -51,7 +51,7 @@ export class LiveSource {
   handleState (name) {
     if (name === 'connecting') {
       this.forget (); // they are of the connection before
-      this.stage.core.call ('rc_forget_stream');
+      this.stage.core.reset ();
     }
     this.stage.post ({ type: 'live', state: name });
   }
@@ -62,9 +62,9 @@ export class LiveSource {
     try {
       outcome = this.stage.decode (() => {
         if (frameSet.discontinuity)
-          core.call ('rc_forget_references');
-        core.addUnits (frameSet.units);
-        return core.decode ();
+          core.discontinuity ();
+        core.push ('units', frameSet.units);
+        return core.next ();
       });
     } catch (error) { // a new instance of the core has no rig
       this.stage.say (error.message);
@@ -75,7 +75,7 @@ export class LiveSource {
       this.connection.acknowledge (frameSet);
     if (outcome === FAILED) // until the next frame set
       this.connection.say (core.message (), 'error');
-    if (outcome === NOTHING && core.call ('rc_rig_views') === 0)
+    if (outcome === NOTHING && core.stream ().cameras === 0)
       this.connection.say ('The stream has not described its cameras (rig) yet.');
     if (outcome !== DONE)
       return;

@@ -31,8 +31,8 @@ export class RecordingSource {
     this.read = (offset, size) => new Uint8Array (reader.readAsArrayBuffer (file.slice (offset, offset + size)));
     try {
       const core = new Core (this.stage.core.module, this.read);
-      core.call ('rc_recording_open', this.size);
-      return core.call ('rc_recording_next', 1) === DONE ? '' : core.message ();
+      core.call ('rc_open', this.size);
+      return core.next () === DONE ? '' : core.message ();
     } catch (error) {
       return error.message;
     }
@@ -49,8 +49,8 @@ export class RecordingSource {
   }
 
   open () {
-    this.stage.core.call ('rc_recording_open', this.size);
-    this.atEnd = this.failed = this.saidDamage = false;
+    this.stage.core.call ('rc_open', this.size);
+    this.atEnd = this.failed = this.saidDamage = this.shown = false;
     this.time = 0;
     this.last = { pts: 0, shift: 0 }; // of the last frame set
   }
@@ -64,17 +64,20 @@ export class RecordingSource {
     const { core } = this.stage;
     let outcome;
     try {
-      outcome = this.stage.decode (() => core.call ('rc_recording_next', 1));
+      do
+        outcome = this.stage.decode (() => core.next ());
+      while (outcome === DONE && core.frame ().truncated && this.shown); // it has a part of the person
     } catch (error) { // a new instance of the core has lost the stream
       this.failed = true;
       this.stage.say (error.message);
       return this.stop ();
     }
     if (outcome === DONE) {
-      const { pts, badSlices } = core.frame ();
+      const { time: pts, badSlices } = core.frame ();
       if (badSlices > 0 && !this.saidDamage)
         this.stage.say (`The recording is damaged: ${badSlices} slices of a frame set cannot be decoded.`, 'note');
       this.saidDamage ||= badSlices > 0;
+      this.shown = true;
       this.time = pts >= 0 ? this.timeOf (pts) : this.time + (this.frameDuration () || 40);
       this.stage.decoded (this.playing ? this.dueOf (this.time) : performance.timeOrigin + performance.now (), !this.playing);
       this.reportPosition ();
@@ -104,12 +107,12 @@ export class RecordingSource {
     return false;
   }
 
-  frameDuration () { return this.stage.core.record ('rc_recording')?.frameDuration ?? 0; }
+  frameDuration () { return this.stage.core.stream ().framePeriod; }
   dueOf (time) { return performance.timeOrigin + this.origin + time; } // ms since the epoch
 
   reportPosition () {
-    const duration = this.stage.core.record ('rc_recording')?.duration ?? -1;
-    this.stage.post ({ type: 'position', time: this.time, duration, playing: this.playing });
+    const duration = this.stage.core.stream ().duration;
+    this.stage.post ({ type: 'position', time: this.time, duration, playing: this.playing, ended: this.atEnd });
   }
 
   play () {
@@ -154,7 +157,7 @@ export class RecordingSource {
     const wasPlaying = this.playing;
     clearTimeout (this.timer);
     this.playing = false;
-    if (core.call ('rc_recording_seek', time) === NOTHING)
+    if (core.seek (time) === NOTHING)
       this.open ();
     this.last = { pts: 0, shift: 0 };
     this.atEnd = false;

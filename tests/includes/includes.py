@@ -34,10 +34,11 @@ LAYERS = (
     (VISION_FOLDERS, CORE_FOLDERS + RIGFILE_FOLDERS + VISION_FOLDERS),
     (SCENE_FOLDERS, CORE_FOLDERS + VISION_FOLDERS + SCENE_FOLDERS),
     (("lib/rangecast/pch",), ()),
+    (("lib/capi",), CORE_FOLDERS),
     (("lib/gstrange",), CORE_FOLDERS),
     (("gst/common",), ("lib/gstrange", "lib/rangecast")),
     (("gst",), ("gst/common", "lib/gstrange", "lib/rangecast")),
-    (("pipelines",), ("pipelines/common", "lib/gstrange", "lib/rangecast")),
+    (("pipelines",), ("pipelines/common", "lib/capi", "lib/gstrange", "lib/rangecast")),
 )
 # Headers of other projects that a folder must do without.
 GSTREAMER = ("gst/", "glib", "gio/", "gobject")

@@ -57,14 +57,14 @@ const expectGolden = (stream, digests) => {
 const playToEnd = (core) => {
   const digests = new Map ();
   let outcome;
-  while ((outcome = core.call ('rc_recording_next')) === DONE)
+  while ((outcome = core.next ()) === DONE)
     addDigests (core, digests);
   return { digests, outcome, message: core.message () };
 };
 
 const decodeFirst = (core = new Core (wasm)) => {
-  core.addUnits (joined (accessUnits (readStream ('default'))[0]));
-  assert.equal (core.decode (), DONE);
+  core.push ('units', joined (accessUnits (readStream ('default'))[0]));
+  assert.equal (core.next (), DONE);
   return core;
 };
 const memoryOf = (core) => core.memory.buffer.byteLength;
@@ -80,8 +80,8 @@ test ('access units decode as the recording does', () => {
   for (const stream of ['default', 'temporal-entropy', 'temporal-packed']) {
     const core = new Core (wasm), digests = new Map ();
     for (const units of accessUnits (readStream (stream))) {
-      core.addUnits (joined (units));
-      assert.equal (core.decode (), DONE);
+      core.push ('units', joined (units));
+      assert.equal (core.next (), DONE);
       addDigests (core, digests);
     }
     expectGolden (stream, digests);
@@ -91,8 +91,8 @@ test ('access units decode as the recording does', () => {
 test ('a lost slice costs its own pixels only', () => {
   const units = accessUnits (readStream ('packed'))[0], core = new Core (wasm);
   const lost = units.findIndex ((unit) => !isRigView (unit));
-  core.addUnits (joined (units.filter ((_, i) => i !== lost)));
-  assert.equal (core.decode (), DONE);
+  core.push ('units', joined (units.filter ((_, i) => i !== lost)));
+  assert.equal (core.next (), DONE);
   const frame = core.frame ();
   assert.ok (frame.missingPixels > 0 && frame.points > 0);
   assert.equal (frame.badSlices, 0);
@@ -100,9 +100,9 @@ test ('a lost slice costs its own pixels only', () => {
 
 test ('units without a rig are no frame set and no error', () => {
   const core = new Core (wasm);
-  core.addUnits (joined (accessUnits (readStream ('default'))[0].filter ((unit) => !isRigView (unit))));
-  assert.equal (core.decode (), NOTHING);
-  assert.equal (core.call ('rc_rig_views'), 0);
+  core.push ('units', joined (accessUnits (readStream ('default'))[0].filter ((unit) => !isRigView (unit))));
+  assert.equal (core.next (), NOTHING);
+  assert.equal (core.stream ().cameras, 0);
 });
 
 test ('every prefix of a recording ends with a sentence', () => {
@@ -140,8 +140,8 @@ test ('a future version is refused in one sentence', () => {
   assert.equal (outcome, FAILED);
   assert.equal (message, `The recording cannot be read: bitstream version ${version} is not supported, only version ${version - 1}.`);
   const core = decodeFirst ();
-  core.addUnits (joined (accessUnits (readStream ('default'))[0].map ((unit) => { unit[0] = version << 4 | unit[0] & 15; return unit; })));
-  assert.equal (core.decode (), NOTHING);
+  core.push ('units', joined (accessUnits (readStream ('default'))[0].map ((unit) => { unit[0] = version << 4 | unit[0] & 15; return unit; })));
+  assert.equal (core.next (), NOTHING);
 });
 
 test ('64 views are refused in one sentence', () => {
@@ -150,7 +150,7 @@ test ('64 views are refused in one sentence', () => {
   const slices = units.filter ((unit) => !isRigView (unit));
   const { outcome, message } = playToEnd (play (byteStream ([[...views, ...slices], slices])));
   assert.equal (outcome, FAILED);
-  assert.equal (message, 'The rig has 64 views; the browser shows at most 16.');
+  assert.equal (message, 'The rig has 64 views; the limit is 16.');
 });
 
 test ('a view of 16384 pixels is refused in one sentence', () => {
@@ -158,21 +158,21 @@ test ('a view of 16384 pixels is refused in one sentence', () => {
   const made = units.map ((unit) => isRigView (unit) && unit[4] === 0 ? changedRigView (unit, { number: 0, total: unit[5], id: unit[20], width: 16384 }) : unit);
   const { outcome, message } = playToEnd (play (byteStream ([made])));
   assert.equal (outcome, FAILED);
-  assert.equal (message, 'View 0 has 16384x36 pixels; the browser shows at most 8192 each way.');
+  assert.equal (message, 'View 0 has 16384x36 pixels; the limit is 8192 each way.');
 });
 
 test ('seeking comes to the frame sets that playing comes to', () => {
   for (const stream of ['coarse', 'temporal-packed']) {
     const bytes = readStream (stream), core = play (bytes), shown = [];
-    while (core.call ('rc_recording_next') === DONE)
-      shown.push ({ pts: core.frame ().pts, digest: digestOfFrame (core) });
-    assert.equal (core.record ('rc_recording').duration, shown.at (-1).pts);
+    while (core.next () === DONE)
+      shown.push ({ pts: core.frame ().time, digest: digestOfFrame (core) });
+    assert.equal (core.stream ().duration, shown.at (-1).pts);
     for (const { pts, digest } of shown.slice ().reverse ()) {
-      assert.equal (core.call ('rc_recording_seek', pts + 0.001), DONE);
+      assert.equal (core.seek (pts + 0.001), DONE);
       do
-        assert.equal (core.call ('rc_recording_next'), DONE);
-      while (core.frame ().pts < pts);
-      assert.equal (core.frame ().pts, pts);
+        assert.equal (core.next (), DONE);
+      while (core.frame ().time < pts);
+      assert.equal (core.frame ().time, pts);
       assert.equal (digestOfFrame (core), digest, `${stream} at ${pts} ms`);
     }
   }
@@ -183,13 +183,13 @@ test ('the corpus of the fuzzers leaves an instance that works', () => {
   let inputs = 0;
   for (const { name, bytes } of ['access_unit', 'byte_stream', 'parse', 'rig', 'rtp_depay', 'slice'].flatMap (corpus)) {
     play (bytes, core);
-    for (let frames = 0; frames < 100 && core.call ('rc_recording_next') === DONE; frames++)
+    for (let frames = 0; frames < 100 && core.next () === DONE; frames++)
       core.call ('rc_build', 1, 1, 40, 10, 0, 0, 0, 0, 0, 0);
     decodeFirst (core);
-    core.addUnits (bytes);
-    core.decode ();
+    core.push ('units', bytes);
+    core.next ();
     core.call ('rc_build', 0, 1, 0, 0, 0, 0, 0, 0, 0, 0);
-    core.call ('rc_forget_stream');
+    core.reset ();
     assert.equal (core.renewals, 0, name);
     assert.ok (memoryOf (core) < limit, `${name}: ${memoryOf (core)} bytes`);
     inputs++;
@@ -219,11 +219,11 @@ test ('an instance that runs out of memory is made anew', () => {
   const core = decodeFirst ();
   const left = (512 << 20) - memoryOf (core);
   core.memory.grow (left / 65536);
-  assert.throws (() => core.memory.grow (1), RangeError); // the limit that border.hpp states
+  assert.throws (() => core.memory.grow (1), RangeError); // the limit that meson.build states
   assert.throws (() => {
     for (let i = 0; i < 100; i++) {
       const units = joined (accessUnits (readStream ('exact'))[0]);
-      core.addUnits (joined (Array.from ({ length: 60 }, () => units)));
+      core.push ('units', joined (Array.from ({ length: 60 }, () => units)));
       core.input (new Uint8Array (20 << 20));
     }
   }, CoreFailure);

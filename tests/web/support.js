@@ -19,7 +19,7 @@ export const corpus = (name) => {
 // An instance with a recording of these bytes.
 export const play = (bytes, core = new Core (wasm)) => {
   core.read = (offset, size) => bytes.subarray (offset, offset + size);
-  core.call ('rc_recording_open', bytes.length);
+  core.call ('rc_open', bytes.length);
   return core;
 };
 

@@ -42,7 +42,7 @@ read_scene (std::span<const std::uint8_t> bytes, Scene &to)
   bytes = bytes.subspan (sizeof state);
   const std::uint64_t size = std::uint64_t{state.layers} * sizeof (web::LayerState) +
                              std::uint64_t{state.points} * sizeof (Vec3);
-  if (state.layers > web::kMaxViews || size != bytes.size ())
+  if (state.layers > rangecast::kMaxDecoderViews || size != bytes.size ())
     return false;
   to.home = state.home;
   to.layers.resize (state.layers);
@@ -152,12 +152,12 @@ look (std::int32_t width, std::int32_t height, bool top_first)
 
 } // namespace
 
-/** Takes what rc_scene_state() of any instance gave, from the input. @return Outcome */
+/** Takes what rc_scene_state() of any instance gave, from the input. @return RangecastResult */
 RC_EXPORT (rc_camera_scene) std::int32_t rc_camera_scene (std::uint32_t size)
 {
   if (!read_scene (web::input (size), camera ().scene))
-    return web::fail ("The scene's state is damaged.");
-  return web::kDone;
+    return web::decoder ().fail ("The scene's state is damaged.");
+  return RANGECAST_OK;
 }
 
 /** The camera's numbers for a picture of the scene, in OpenGL's coordinates (first row at the

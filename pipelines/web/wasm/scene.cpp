@@ -13,7 +13,8 @@ namespace {
 struct Scene {
   rangecast::SurfaceScene surfaces;
   rangecast::ViewFit fit;
-  unsigned rig_number = 0, frame_set = 0;
+  unsigned rig_number = 0;
+  std::uint64_t frame_set = 0;
   rangecast::SurfaceSettings settings;
   std::vector<std::uint8_t> state;
 
@@ -27,6 +28,16 @@ scene ()
   if (!made)
     made = new Scene;
   return *made;
+}
+
+/* Whether the vertices are those of the last frame set. */
+bool
+is_current ()
+{
+  const Scene &s = scene ();
+  const RangecastDecoder &decoder = web::decoder ();
+  return decoder.rig () && s.rig_number == decoder.rig_number () &&
+         s.frame_set == decoder.frame_set ().number;
 }
 
 template <typename T>
@@ -61,7 +72,7 @@ write_state (Scene &s, const rangecast::SceneFrame &home)
 /** Makes the vertices of the last frame set, unless it has those that would be made.
  *  @param fits    1: the camera's default position shows the person; 0: it is the first view's
  *  @param aspect  width / height of the picture; then the orbit, as rc_orbit() gives it
- *  @return kDone, kNothing if there is no frame set, kFailed if a view is too large */
+ *  @return RANGECAST_OK, or RANGECAST_NOTHING if there is no frame set */
 RC_EXPORT (rc_build)
 std::int32_t
 rc_build (std::int32_t fits, double aspect, double azimuth_deg, double elevation_deg,
@@ -69,35 +80,32 @@ rc_build (std::int32_t fits, double aspect, double azimuth_deg, double elevation
     std::uint32_t home_requests)
 {
   Scene &s = scene ();
-  const web::FrameSet set = web::frame_set ();
-  if (set.number == 0 || !web::has_rig ())
-    return web::kNothing;
+  const RangecastDecoder &decoder = web::decoder ();
+  if (!decoder.rig () || decoder.frame_set ().number == 0)
+    return RANGECAST_NOTHING;
   const rangecast::Orbit orbit = {
       azimuth_deg, elevation_deg, distance_m, fov_deg, {pan_x, pan_y, pan_z}};
-  if (s.rig_number != set.rig_number) {
-    s.surfaces.set_rig (*set.rig);
+  if (s.rig_number != decoder.rig_number ()) {
+    s.surfaces.set_rig (*decoder.rig ());
     s.fit.reset ();
   }
-  const bool same = s.rig_number == set.rig_number && s.frame_set == set.number;
-  s.surfaces.build (set.images, s.settings, orbit, same);
-  s.rig_number = set.rig_number;
-  s.frame_set = set.number;
+  const bool same = is_current ();
+  s.surfaces.build (decoder.images (), s.settings, orbit, same);
+  s.rig_number = decoder.rig_number ();
+  s.frame_set = decoder.frame_set ().number;
   if (!fits)
     s.fit.reset ();
-  write_state (s, fits ? s.fit.update (s.surfaces, {orbit, aspect, set.pts_ns, home_requests})
-                       : s.surfaces.frame ());
-  return web::kDone;
+  const std::uint64_t time = decoder.frame_set ().time; /* kNoPts: unknown */
+  write_state (s,
+      fits ? s.fit.update (s.surfaces, {orbit, aspect, time, home_requests}) : s.surfaces.frame ());
+  return RANGECAST_OK;
 }
 
 /** Number of layers of the last rc_build(): views that have an image; 0 if a frame set was decoded
  *  since. */
 RC_EXPORT (rc_layers) std::uint32_t rc_layers ()
 {
-  const Scene &s = scene ();
-  const web::FrameSet set = web::frame_set ();
-  const bool current =
-      web::has_rig () && s.rig_number == set.rig_number && s.frame_set == set.number;
-  return current ? std::uint32_t (s.surfaces.layers ().size ()) : 0;
+  return is_current () ? std::uint32_t (scene ().surfaces.layers ().size ()) : 0;
 }
 
 /** @return a record of a layer: view-id, address and bytes of its vertices (SurfaceVertex); nullptr

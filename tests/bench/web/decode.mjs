@@ -31,10 +31,10 @@ const native = (file, cpu) => Number (execFileSync (path.join (build, 'tests/ben
   { env: { ...process.env, ...cpu && { RANGECAST_CPU: cpu } } }));
 const core = new Core (wasm);
 const decodeAll = (frameSets) => {
-  core.call ('rc_forget_stream');
+  core.reset ();
   return frameSets.reduce ((done, units) => {
-    core.addUnits (units);
-    return done + (core.decode () === DONE);
+    core.push ('units', units);
+    return done + (core.next () === DONE);
   }, 0);
 };
 const inNode = (file) => {

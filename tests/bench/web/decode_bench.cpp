@@ -1,16 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Times rangecast.wasm's decoder, compiled for this machine: decode.mjs runs it beside the module.
+/* Times librangecast's decoder with one thread, which decode.mjs runs beside rangecast.wasm.
  * usage: decode_bench FILE.rcnc...: for each file prints the milliseconds of one frame set, mean of
  * one pass after another that was not timed. */
 #include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <rangecast.h>
 #include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
-#include <rangecast/surface/view_fit.hpp>
 #include <vector>
-
-#include "../../../pipelines/web/wasm/border.hpp"
 
 namespace {
 
@@ -33,13 +31,13 @@ access_units (std::span<const std::uint8_t> bytes)
 
 /* @return frame sets that were decoded */
 int
-decode_all (const std::vector<std::span<const std::uint8_t>> &frame_sets)
+decode_all (RangecastDecoder *decoder, const std::vector<std::span<const std::uint8_t>> &frame_sets)
 {
   int done = 0;
-  web::forget_stream ();
+  rangecast_decoder_reset (decoder);
   for (const auto &units : frame_sets) {
-    web::add_units (units);
-    done += web::decode (rangecast::kNoPts) == web::kDone;
+    rangecast_decoder_push_units (decoder, units.data (), units.size ());
+    done += rangecast_decoder_next (decoder) == RANGECAST_OK;
   }
   return done;
 }
@@ -50,10 +48,12 @@ measure (const char *path)
   std::ifstream file (path, std::ios::binary);
   const Bytes bytes{std::istreambuf_iterator<char> (file), {}};
   const auto frame_sets = access_units (bytes);
-  decode_all (frame_sets);
+  RangecastDecoder *const decoder = rangecast_decoder_new (1);
+  decode_all (decoder, frame_sets);
   const auto begin = std::chrono::steady_clock::now ();
-  const int done = decode_all (frame_sets);
+  const int done = decode_all (decoder, frame_sets);
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now () - begin;
+  rangecast_decoder_free (decoder);
   if (done == 0)
     std::fprintf (stderr, "decode_bench: %s: expected a recording (.rcnc)\n", path);
   else
