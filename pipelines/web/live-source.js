@@ -20,7 +20,7 @@ export class LiveSource {
       frameSet: (frameSet) => this.receive (frameSet),
       say: (text, kind) => stage.say (text, kind),
       state: (name) => this.handleState (name),
-      audio: (available) => stage.post ({ type: 'audio', available }),
+      audio: (available) => stage.post ({ type: 'sound', available }),
     } });
   }
   close () {
@@ -53,7 +53,7 @@ export class LiveSource {
       this.forget (); // they are of the connection before
       this.stage.core.reset ();
     }
-    this.stage.post ({ type: 'live', state: name });
+    this.stage.post ({ type: 'connection', state: name });
   }
 
   decode (frameSet, acknowledged) {

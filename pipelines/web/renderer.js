@@ -77,6 +77,7 @@ class SoftwareRenderer {
     this.context.putImageData (new ImageData (new Uint8ClampedArray (this.core.memory.buffer, address, 4 * width * height), width, height), 0, 0);
   }
   finished () { return Promise.resolve (); }
+  close () {}
 }
 
 class WebGlRenderer {
@@ -161,6 +162,7 @@ class WebGlRenderer {
       this.drawBlended (picture, width, height);
     gl.disable (gl.SCISSOR_TEST);
   }
+  close () { this.gl.getExtension ('WEBGL_lose_context')?.loseContext (); }
   // Resolves when the GPU has executed the commands issued so far, or its context was lost.
   finished () {
     const { gl } = this, fence = gl.fenceSync (gl.SYNC_GPU_COMMANDS_COMPLETE, 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Quality and latency of what is shown, once a second.
+// Quality and latency of what is shown, once a second: `last` has times in ms, sizes in bytes.
 export class Stats {
   // onSeen (latency): for each frame set
   constructor (place, visible, onSeen) {
@@ -33,17 +33,24 @@ export class Stats {
     this.draw += drawing;
     requestAnimationFrame (() => this.seen (performance.timeOrigin + performance.now () - frame.due));
     const elapsed = performance.now () - this.begin;
-    if (elapsed < 1000 || this.place.hidden)
+    if (elapsed < 1000)
       return;
-    const mean = (sum) => `${(sum / this.count).toFixed (1)} ms`;
+    this.last = { frameSetsPerSecond: 1000 * this.count / elapsed, skipped: this.skipped, dropped: frame.dropped, views: frame.views, points: frame.points,
+      bytes: this.bytes / this.count, decodeTime: this.decode / this.count, buildTime: this.build / this.count, drawTime: this.draw / this.count, scale,
+      latency: this.latencies.at (-1) };
+    if (!this.place.hidden)
+      this.print (frame, this.last);
+    this.reset ();
+  }
+  print (frame, last) {
+    const ms = (time) => `${time.toFixed (1)} ms`;
     this.place.textContent = [
-      `${(1000 * this.count / elapsed).toFixed (1)} frame sets/s shown, ${this.skipped} skipped`,
-      `${frame.views} views, ${frame.points} points, ${(this.bytes / this.count / 1024).toFixed (1)} KiB`,
+      `${last.frameSetsPerSecond.toFixed (1)} frame sets/s shown, ${last.skipped} skipped`,
+      `${frame.views} views, ${frame.points} points, ${(last.bytes / 1024).toFixed (1)} KiB`,
       `missing ${frame.missingPixels}, unknown ${frame.unknownPixels} pixels; ${frame.badSlices} damaged slices`,
-      `decode ${mean (this.decode)}, geometry ${mean (this.build)}, draw ${mean (this.draw)}${scale < 1 ? `, at ${Math.round (100 * scale)} % of the resolution` : ''}`,
-      `latency ${(this.latencies.at (-1) ?? 0).toFixed (0)} ms from ${frame.dropped === null ? 'due' : 'capture'} to drawn`,
+      `decode ${ms (last.decodeTime)}, geometry ${ms (last.buildTime)}, draw ${ms (last.drawTime)}${last.scale < 1 ? `, at ${Math.round (100 * last.scale)} % of the resolution` : ''}`,
+      `latency ${(last.latency ?? 0).toFixed (0)} ms from ${frame.dropped === null ? 'due' : 'capture'} to drawn`,
       ...frame.dropped === null ? [] : [`${frame.dropped} frame sets dropped by the server`],
     ].join ('\n');
-    this.reset ();
   }
 }

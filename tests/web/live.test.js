@@ -21,9 +21,9 @@ test ('a viewer of a stream with temporal prediction begins with a complete fram
   await framesShown (page, 20);
   assert.equal (await message (page), '');
   assert.equal (await page.title (), 'A person');
-  assert.equal (await page.$eval ('#bar', (bar) => bar.className), 'live');
-  await page.waitForFunction (() => / unknown 0 pixels.*\d+ frame sets dropped/s.test (document.getElementById ('stats').textContent));
-  const latencies = await page.evaluate (() => window.rangecastPage.stats.latencies);
+  assert.equal (await page.$eval ('>>> #bar', (bar) => bar.className), 'live');
+  await page.waitForFunction (() => / unknown 0 pixels.*\d+ frame sets dropped/s.test (window.rangecastView.element ('stats').textContent));
+  const latencies = await page.evaluate (() => window.rangecastView.meter.latencies);
   assert.ok (latencies.length > 10 && latencies.every ((ms) => ms > 0 && ms < 10000), JSON.stringify (latencies));
   fs.writeFileSync (path.join (work, 'page-live.png'), await page.screenshot ());
   await page.close ();

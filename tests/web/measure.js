@@ -18,7 +18,7 @@ const measure = async (browser, address, seconds, query) => {
   const firstPicture = await page.evaluate (() => window.firstPicture);
   await sleep (2000);
   const read = () => page.evaluate (() => {
-    const text = document.getElementById ('stats').textContent, { stats, scale } = window.rangecastPage;
+    const text = window.rangecastView.element ('stats').textContent, { meter: stats, scale } = window.rangecastView;
     const [, dropped] = /(\d+) frame sets dropped by the server/.exec (text) ?? [];
     const found = { frames: Number (document.body.dataset.frameSets), dropped: Number (dropped), latencies: stats.latencies, scale };
     stats.latencies = [];

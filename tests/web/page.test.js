@@ -46,7 +46,7 @@ const picture = async (page) => {
   let last = '';
   for (let i = 0; i < 50; i++) {
     const now = await page.evaluate (() => new Promise ((resolve) => requestAnimationFrame (() => requestAnimationFrame (() => {
-      const canvas = document.getElementById ('picture');
+      const canvas = window.rangecastView.element ('picture');
       resolve (canvas.width === canvas.clientWidth && document.body.dataset.frameSets > 0 ? canvas.toDataURL ('image/png') : '');
     }))));
     if (now !== '' && now === last)
@@ -57,7 +57,7 @@ const picture = async (page) => {
   return assert.fail ('the picture does not come to rest');
 };
 
-const rendererOf = (page) => page.evaluate (() => window.rangecastPage.renderer.constructor.name);
+const rendererOf = (page) => page.evaluate (() => window.rangecastView.renderer.constructor.name);
 // In the page: of two pictures, the mean difference of their grey in levels, and the share of pixels that are not background.
 const compare = (page, ours, theirs) => page.evaluate (async (a, b) => {
   const grey = async (url) => {
@@ -96,7 +96,7 @@ for (const renderer of ['webgl', 'software']) test (`a transparent page shows no
     return [[2, 2], [image.width / 2, image.height / 2]].map ((at) => context.getImageData (...at, 1, 1).data[3]);
   }, url);
   assert.deepEqual (alphas, [0, 255]);
-  assert.equal (await page.evaluate (() => getComputedStyle (document.getElementById ('bar')).display + getComputedStyle (document.body).backgroundColor),
+  assert.equal (await page.evaluate (() => getComputedStyle (window.rangecastView.element ('bar')).display + getComputedStyle (document.body).backgroundColor),
     'nonergba(0, 0, 0, 0)');
   await page.close ();
 });
@@ -106,7 +106,7 @@ test ('a recording that is cut off is shown to its end, and says so', async () =
   await messageMatches (page, '^The recording is cut off: ');
   assert.ok (await page.evaluate (() => Number (document.body.dataset.frameSets)) > 0);
   // The last whole frame set, number 39, stays.
-  assert.match (await page.evaluate (() => document.getElementById ('time').textContent), /^0:02\.5 /);
+  assert.match (await page.evaluate (() => window.rangecastView.element ('time').textContent), /^0:02\.5 /);
   await page.close ();
 });
 
@@ -131,9 +131,9 @@ test ('a file that is dropped onto the page is played, and the button and the sp
   await framesShown (page, 2);
   const stateIs = (state) => page.waitForFunction ((wanted) => document.body.dataset.state === wanted, {}, state);
   await stateIs ('playing');
-  await page.click ('#play');
+  await page.click ('>>> #play');
   await stateIs ('paused');
-  await page.focus ('#picture');
+  await page.focus ('>>> #picture');
   await page.keyboard.press ('Space');
   await stateIs ('playing');
   await page.close ();
@@ -149,9 +149,9 @@ test ('the picture and the point cloud are saved as files', async () => {
       fetch (href).then ((answer) => answer.arrayBuffer ()).then ((file) => window.saved.push ({ download, bytes: [...new Uint8Array (file.slice (0, 300))], size: file.byteLength }));
     };
   });
-  await page.click ('#save-picture');
+  await page.click ('>>> #save-picture');
   await page.waitForFunction (() => window.saved.length === 1);
-  await page.click ('#save-points');
+  await page.click ('>>> #save-points');
   await page.waitForFunction (() => window.saved.length === 2);
   const [picture, points] = await page.evaluate (() => window.saved);
   assert.equal (picture.download, 'rangecast.png');
@@ -165,14 +165,14 @@ test ('the picture and the point cloud are saved as files', async () => {
 test ('seeking shows the frame set at that time, paused or not', async () => {
   const page = await open ('src=moving.rcnc&paused&time=1000');
   await framesShown (page, 1);
-  await page.waitForFunction (() => /^0:01\.0 /.test (document.getElementById ('time').textContent));
+  await page.waitForFunction (() => /^0:01\.0 /.test (window.rangecastView.element ('time').textContent));
   assert.equal (await page.evaluate (() => document.body.dataset.state), 'paused');
   await page.close ();
 });
 
 test ('mouse, touch and keys move the camera', async () => {
   const page = await open ('src=scene.rcnc&paused');
-  const orbit = () => page.evaluate (() => window.rangecastPage.camera.record ('rc_orbit'));
+  const orbit = () => page.evaluate (() => window.rangecastView.camera.record ('rc_orbit'));
   await framesShown (page, 1);
   await page.mouse.move (320, 200);
   await page.mouse.down ();
@@ -182,7 +182,7 @@ test ('mouse, touch and keys move the camera', async () => {
   await page.keyboard.press ('ArrowLeft');
   assert.ok (Math.abs ((await orbit ()).azimuth - 40) < 1);
   await page.mouse.wheel ({ deltaY: -100 });
-  await page.waitForFunction (() => window.rangecastPage.camera.record ('rc_orbit').distance > 0);
+  await page.waitForFunction (() => window.rangecastView.camera.record ('rc_orbit').distance > 0);
   await page.keyboard.press ('Home');
   assert.equal ((await orbit ()).azimuth, 0);
   await page.close ();
@@ -191,11 +191,11 @@ test ('mouse, touch and keys move the camera', async () => {
 test ('on a phone one finger orbits, and every pixel of the screen is used', async () => {
   const page = await open ('src=scene.rcnc&paused', { width: 360, height: 640, deviceScaleFactor: 3, isMobile: true, hasTouch: true });
   await framesShown (page, 1);
-  await page.waitForFunction (() => document.getElementById ('picture').width === 1080 && document.getElementById ('picture').height === 1920);
+  await page.waitForFunction (() => window.rangecastView.element ('picture').width === 1080 && window.rangecastView.element ('picture').height === 1920);
   await page.touchscreen.touchStart (180, 300);
   await page.touchscreen.touchMove (90, 300);
   await page.touchscreen.touchEnd ();
-  await page.waitForFunction (() => Math.abs (window.rangecastPage.camera.record ('rc_orbit').azimuth - 45) < 2);
+  await page.waitForFunction (() => Math.abs (window.rangecastView.camera.record ('rc_orbit').azimuth - 45) < 2);
   fs.writeFileSync (path.join (work, 'page-phone.png'), await page.screenshot ());
   await page.close ();
 });
@@ -203,9 +203,9 @@ test ('on a phone one finger orbits, and every pixel of the screen is used', asy
 test ('a renderer that is too slow draws fewer pixels of moving pictures, and all of one that stands still', async () => {
   const page = await open ('src=moving.rcnc&paused', { width: 800, height: 600 });
   await framesShown (page, 1);
-  const widthIs = (condition) => page.waitForFunction (`((width) => ${condition}) (document.getElementById ('picture').width)`);
-  await page.evaluate (() => { window.rangecastPage.renderer.finished = () => new Promise ((resolve) => setTimeout (resolve, 150)); });
-  await page.click ('#play');
+  const widthIs = (condition) => page.waitForFunction (`((width) => ${condition}) (window.rangecastView.element ('picture').width)`);
+  await page.evaluate (() => { window.rangecastView.renderer.finished = () => new Promise ((resolve) => setTimeout (resolve, 150)); });
+  await page.click ('>>> #play');
   await widthIs ('width < 800');
   await page.waitForFunction (() => document.body.dataset.state === 'paused');
   await widthIs ('width === 800');
@@ -216,7 +216,7 @@ test ('a context that is lost and restored within a picture does not stop the pa
   const page = await open ('src=moving.rcnc&paused&renderer=webgl');
   await framesShown (page, 1);
   await page.evaluate (() => {
-    const { renderer } = window.rangecastPage, { gl } = renderer, finished = renderer.finished.bind (renderer);
+    const { renderer } = window.rangecastView, { gl } = renderer, finished = renderer.finished.bind (renderer);
     window.extension = gl.getExtension ('WEBGL_lose_context');
     renderer.finished = () => {
       renderer.finished = finished;
@@ -224,11 +224,11 @@ test ('a context that is lost and restored within a picture does not stop the pa
       window.extension.loseContext ();
       return wait;
     };
-    document.getElementById ('picture').addEventListener ('webglcontextlost', () => setTimeout (() => window.extension.restoreContext (), 0));
+    window.rangecastView.element ('picture').addEventListener ('webglcontextlost', () => setTimeout (() => window.extension.restoreContext (), 0));
   });
   await page.keyboard.press ('ArrowLeft'); // draws
-  await page.waitForFunction (() => !window.rangecastPage.renderer.gl.isContextLost ());
-  await page.click ('#play');
+  await page.waitForFunction (() => !window.rangecastView.renderer.gl.isContextLost ());
+  await page.click ('>>> #play');
   await framesShown (page, 4);
   await page.close ();
 });

@@ -28,11 +28,11 @@ test ('a stream that stops is not live any more, and is again when it goes on', 
     await stopped;
     await forever (client);
   }, async (page) => {
-    await page.waitForSelector ('#live:not([hidden])');
+    await page.waitForSelector ('>>> #live:not([hidden])');
     await messageMatches (page, '^No frame sets have arrived for some seconds\\.$');
-    await page.waitForSelector ('#live[hidden]');
+    await page.waitForSelector ('>>> #live[hidden]');
     goOn ();
-    await page.waitForSelector ('#live:not([hidden])');
+    await page.waitForSelector ('>>> #live:not([hidden])');
     assert.equal (await message (page), '');
   });
 });

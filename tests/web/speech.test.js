@@ -54,12 +54,12 @@ test ('a client that does not acknowledge frame sets is sent no more speech', as
 test ('speech is heard within 40 ms of when the picture of the same moment is seen', async () => {
   const server = await serveSpeech (), page = await openPage (browser, `${server.address}/`, undefined, (one) => one.setBypassCSP (true)); // for the listener below
   await framesShown (page, 20);
-  await page.click ('#sound');
+  await page.click ('>>> #sound');
   await page.evaluate (async () => {
-    const { speech } = window.rangecastPage, { context } = speech;
+    const { speech } = window.rangecastView.player, { context } = speech;
     window.heard = []; // beginnings of claps, ms since the epoch
     window.seen = []; // frame sets: { time, latency }
-    const { stats } = window.rangecastPage, { seen } = stats;
+    const { meter: stats } = window.rangecastView, { seen } = stats;
     stats.seen = function (latency) {
       window.seen.push ({ time: performance.timeOrigin + performance.now (), latency });
       return seen.call (this, latency);
@@ -94,10 +94,10 @@ test ('speech is heard within 40 ms of when the picture of the same moment is se
   }
   console.log (`sound after picture, ms: ${differences.map ((value) => value.toFixed (0)).join (' ')}`);
   assert.ok (Math.abs (median (differences)) < 40);
-  await page.click ('#sound');
-  assert.equal (await page.evaluate (() => window.rangecastPage.speech.context), null);
-  await page.click ('#sound'); // and on again
-  await page.waitForFunction (() => window.rangecastPage.speech.next > 1);
+  await page.click ('>>> #sound');
+  assert.equal (await page.evaluate (() => window.rangecastView.player.speech.context), null);
+  await page.click ('>>> #sound'); // and on again
+  await page.waitForFunction (() => window.rangecastView.player.speech.next > 1);
   await page.close ();
   await server.stop ();
 });
