@@ -17,6 +17,7 @@ class Program {
       gl.shaderSource (shader, source);
       gl.compileShader (shader);
       gl.attachShader (this.program, shader);
+      gl.deleteShader (shader); // with the program
       return shader;
     });
     gl.linkProgram (this.program);
@@ -80,7 +81,7 @@ class SoftwareRenderer {
   close () {}
 }
 
-class WebGlRenderer {
+export class WebGlRenderer {
   constructor (canvas, core, transparent, gl) {
     this.canvas = canvas;
     this.core = core;
@@ -100,6 +101,7 @@ class WebGlRenderer {
     this.layers = [];
     this.cellTarget = this.newTarget ();
     this.sumTarget = this.newTarget ();
+    this.ownTarget = this.newTarget ();
     this.largest = gl.getParameter (gl.MAX_TEXTURE_SIZE);
   }
 
@@ -149,20 +151,48 @@ class WebGlRenderer {
       gl.texParameteri (gl.TEXTURE_2D, name, value);
   }
 
-  draw () {
-    const { gl, canvas: { width, height } } = this, address = this.core.call ('rc_camera_picture', width, height, this.largest);
+  draw () { this.drawTo (null, this.canvas.width, this.canvas.height); }
+  // Draws into textures. Returns { colours (with alpha), depths (those of what is drawn), part (x, y, width, height: elsewhere is nothing) }
+  drawTextures (width, height) {
+    this.prepare (this.ownTarget, width, height);
+    const picture = this.drawTo (this.ownTarget.framebuffer, width, height);
+    return { colours: this.ownTarget.colours, depths: this.sumTarget.depths, part: picture[4] > 0 ? [...picture.subarray (8, 12)] : [0, 0, 0, 0] };
+  }
+  drawTo (framebuffer, width, height) {
+    const { gl } = this, address = this.core.call ('rc_camera_picture', width, height, this.largest);
     const picture = this.core.floats (address, HEAD + LAYER * this.layers.length);
-    gl.bindFramebuffer (gl.FRAMEBUFFER, null);
+    gl.bindFramebuffer (gl.FRAMEBUFFER, framebuffer);
     gl.viewport (0, 0, width, height);
     if (this.transparent)
       picture.fill (0, 0, 4);
     gl.clearColor (...picture.subarray (0, 4));
     gl.clear (gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     if (this.layers.length > 0 && picture[17] === this.layers.length)
-      this.drawBlended (picture, width, height);
+      this.drawBlended (picture, framebuffer, width, height);
+    else
+      picture[4] = 0;
     gl.disable (gl.SCISSOR_TEST);
+    return picture;
   }
   close () { this.gl.getExtension ('WEBGL_lose_context')?.loseContext (); }
+  // As close (), for a context that others use.
+  dispose () {
+    const { gl } = this;
+    for (const { program } of [this.blend, this.finish, ...this.sums.filter (Boolean)])
+      gl.deleteProgram (program);
+    for (const { array, buffer } of this.objects.values ()) {
+      gl.deleteVertexArray (array);
+      gl.deleteBuffer (buffer);
+    }
+    gl.deleteVertexArray (this.nothing);
+    for (const target of [this.cellTarget, this.sumTarget, this.ownTarget])
+      this.deleteTarget (target);
+  }
+  deleteTarget ({ framebuffer, colours, depths }) {
+    this.gl.deleteFramebuffer (framebuffer);
+    this.gl.deleteTexture (colours);
+    this.gl.deleteTexture (depths);
+  }
   // Resolves when the GPU has executed the commands issued so far, or its context was lost.
   finished () {
     const { gl } = this, fence = gl.fenceSync (gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -199,9 +229,7 @@ class WebGlRenderer {
     const gl = this.gl, step = 128;
     if (target.width >= width && target.height >= height)
       return;
-    gl.deleteFramebuffer (target.framebuffer);
-    gl.deleteTexture (target.colours);
-    gl.deleteTexture (target.depths);
+    this.deleteTarget (target);
     target.width = Math.max (target.width, Math.min (Math.ceil (width / step) * step, this.largest));
     target.height = Math.max (target.height, Math.min (Math.ceil (height / step) * step, this.largest));
     const texture = (internal, format, type) => {
@@ -245,7 +273,7 @@ class WebGlRenderer {
   }
 
   // As SurfacePainter::draw (); the framebuffer has been cleared.
-  drawBlended (picture, width, height) {
+  drawBlended (picture, framebuffer, width, height) {
     const gl = this.gl, [count, columns, rows] = picture.subarray (4, 7);
     if (count === 0)
       return;
@@ -258,7 +286,7 @@ class WebGlRenderer {
     gl.depthFunc (gl.ALWAYS);
     this.addUp (picture, cells, count);
     gl.disable (gl.DEPTH_TEST);
-    gl.bindFramebuffer (gl.FRAMEBUFFER, null);
+    gl.bindFramebuffer (gl.FRAMEBUFFER, framebuffer);
     this.finishPicture (picture, height);
   }
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Sourced by the tests in a browser: sets CHROMIUM, RANGECAST_SOURCE, RANGECAST_BUILD, and `work`, a folder of the build with puppeteer-core and ws.
+# Sourced by the tests in a browser: sets CHROMIUM, RANGECAST_SOURCE, RANGECAST_BUILD, and `work`, a folder of the build with
+# modules of npm.
 # Exit status 77 (skipped) where Chromium, or these and the network that they come from, are missing.
 RANGECAST_SOURCE=${RANGECAST_SOURCE:-$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)}
 RANGECAST_BUILD=${RANGECAST_BUILD:-$RANGECAST_SOURCE/build}
@@ -11,8 +12,10 @@ skip () { echo "skipped: $*"; exit 77; }
 [ -n "$CHROMIUM" ] || skip "chromium is missing"
 work=$RANGECAST_BUILD/web-test
 mkdir -p "$work"
-if ! [ -d "$work/node_modules/puppeteer-core" ] || ! [ -d "$work/node_modules/ws" ]; then
-  command -v npm >/dev/null || skip "npm is missing, which installs puppeteer-core and ws"
-  (cd "$work" && echo '{}' >package.json && timeout 120 npm install --silent --no-audit --no-fund puppeteer-core ws >/dev/null 2>&1) ||
-    skip "npm cannot install puppeteer-core and ws"
-fi
+packages=(puppeteer-core three vite ws)
+for package in "${packages[@]}"; do
+  [ -d "$work/node_modules/$package" ] && continue
+  command -v npm >/dev/null || skip "npm is missing, which installs ${packages[*]}"
+  (cd "$work" && echo '{}' >package.json && timeout 240 npm install --silent --no-audit --no-fund "${packages[@]}" >/dev/null 2>&1) ||
+    skip "npm cannot install ${packages[*]}"
+done

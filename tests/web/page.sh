@@ -21,4 +21,4 @@ for angle in -30 100; do
 done
 live=("$here/live.test.js" "$here/speech.test.js")
 compgen -G "$RANGECAST_BUILD/gst/web/*.so" >/dev/null || { echo "left out: live.test.js and speech.test.js, because rangewebsink is missing"; live=(); }
-exec node --test "$@" "$here/page.test.js" "$here/server.test.js" "${live[@]}"
+exec node --test "$@" "$here/embed.test.js" "$here/page.test.js" "$here/server.test.js" "${live[@]}"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <iterator>
+#include <optional>
 #include <rangecast/render/software_renderer.hpp>
 #include <rangecast/surface/orbit.hpp>
 #include <rangecast/surface/painting.hpp>
@@ -67,6 +68,7 @@ read_scene (std::span<const std::uint8_t> bytes, Scene &to)
 struct Camera {
   rangecast::OrbitMotion motion;
   Scene scene;
+  std::optional<Mat4> clip_from_world; /* in place of the orbit */
   std::vector<float> picture;
   rangecast::SoftwareRenderer renderer;
   std::vector<rangecast::SurfaceLayer> drawn;
@@ -143,6 +145,12 @@ Mat4
 look (std::int32_t width, std::int32_t height, bool top_first)
 {
   Camera &c = camera ();
+  if (c.clip_from_world) {
+    Mat4 m = *c.clip_from_world;
+    for (int i = 1; top_first && i < 16; i += 4)
+      m[i] = -m[i];
+    return m;
+  }
   const double room_m = std::max (2 * rangecast::kViewGap_m, rangecast::kBlendRange_m);
   const auto matrices = rangecast::orbit_matrices (
       c.scene.home, c.motion.orbit, double (width) / height, top_first, {}, c.scene.hull, room_m);
@@ -158,6 +166,16 @@ RC_EXPORT (rc_camera_scene) std::int32_t rc_camera_scene (std::uint32_t size)
   if (!read_scene (web::input (size), camera ().scene))
     return web::decoder ().fail ("The scene's state is damaged.");
   return RANGECAST_OK;
+}
+
+/** Later pictures are of this matrix: the input, 16 floats, column-major, OpenGL's coordinates.
+ *  @param size  bytes; 0: of the orbit again */
+RC_EXPORT (rc_set_clip) void rc_set_clip (std::uint32_t size)
+{
+  Camera &c = camera ();
+  c.clip_from_world.reset ();
+  if (size == sizeof (Mat4) && web::input (size).size () == size)
+    std::memcpy (&c.clip_from_world.emplace (), web::input (size).data (), size);
 }
 
 /** The camera's numbers for a picture of the scene, in OpenGL's coordinates (first row at the

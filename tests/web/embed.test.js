@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// What others embed, in headless Chromium: <rangecast-view> twice on a page, three.js, and the npm package built by vite.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import fs from 'node:fs';
+import http from 'node:http';
+import path from 'node:path';
+import test, { after, before } from 'node:test';
+import { launch, work } from './browser.js';
+import { build, source } from './support.js';
+
+const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
+const folder = path.join (work, 'embedded');
+let browser, server, address;
+
+before (async () => {
+  fs.rmSync (folder, { recursive: true, force: true });
+  fs.cpSync (path.join (build, 'pipelines/web'), folder, { recursive: true, filter: (from) => !/\.[od]$/.test (from) });
+  fs.cpSync (path.join (source, 'pipelines/web/examples'), path.join (folder, 'examples'), { recursive: true });
+  fs.symlinkSync (path.join (work, 'node_modules'), path.join (folder, 'node_modules'));
+  for (const name of ['scene', 'moving'])
+    fs.copyFileSync (path.join (work, `${name}.rcnc`), path.join (folder, 'examples', `${name}.rcnc`));
+  // With the policy that docs/guide/embed.md names.
+  server = http.createServer ((request, response) => {
+    const file = path.join (folder, new URL (request.url, 'http://host').pathname);
+    if (!fs.existsSync (file))
+      return response.writeHead (404).end ();
+    response.writeHead (200, { 'Content-Type': TYPES[path.extname (file)] ?? 'application/octet-stream',
+      'Content-Security-Policy': "default-src 'self'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; img-src 'self' blob:" });
+    fs.createReadStream (file).pipe (response);
+  });
+  await new Promise ((resolve) => server.listen (0, '127.0.0.1', resolve));
+  address = `http://127.0.0.1:${server.address ().port}`;
+  browser = await launch ();
+});
+after (async () => {
+  await browser?.close ();
+  server?.close ();
+});
+
+// errors: what the page threw
+const open = async (name) => {
+  const page = await browser.newPage (), errors = [];
+  page.setDefaultTimeout (60000);
+  page.on ('pageerror', (error) => errors.push (error.message));
+  await page.setViewport ({ width: 640, height: 480 });
+  await page.goto (`${address}/${name}`);
+  return { page, errors };
+};
+const write = (name, text) => fs.writeFileSync (path.join (folder, name), text);
+const screenshot = async (page, name) => fs.writeFileSync (path.join (work, name), await page.screenshot ());
+
+test ('two elements on a page play, seek and leave the document by themselves', async () => {
+  write ('two.html', `<!doctype html><body><script type="module" src="./view.js"></script>
+    <style>rangecast-view { width: 300px; height: 220px; display: inline-block; }</style>
+    <rangecast-view id="a" src="examples/moving.rcnc" controls></rangecast-view><rangecast-view id="b" src="examples/scene.rcnc" azimuth="90" autoplay="false"></rangecast-view>
+    <script>
+      window.seen = [];
+      for (const id of ['a', 'b'])
+        for (const type of ['loadedmetadata', 'play', 'pause', 'seeking', 'seeked', 'ended', 'error', 'framesetchange'])
+          document.getElementById (id).addEventListener (type, ({ detail }) => window.seen.push ([id, type, detail?.views]));
+    </script>`);
+  const { page, errors } = await open ('two.html');
+  const has = (id, type) => page.waitForFunction ((...wanted) => window.seen.some (([a, b]) => a === wanted[0] && b === wanted[1]), {}, id, type);
+  for (const [id, type] of [['a', 'loadedmetadata'], ['a', 'play'], ['a', 'framesetchange'], ['b', 'framesetchange'], ['a', 'ended']])
+    await has (id, type);
+  assert.ok (await page.evaluate (() => Math.abs (window.a.duration - 39 / 15) < 0.01 && window.a.ended && window.a.paused));
+  await page.evaluate (() => { window.a.currentTime = 1; });
+  await has ('a', 'seeked');
+  assert.ok (await page.evaluate (() => Math.abs (window.a.currentTime - 1) < 0.1));
+  assert.equal (await page.evaluate (() => window.b.orbit.azimuth), 90);
+  assert.equal (await page.evaluate (() => { window.b.orbit = { elevation: 20 }; return window.b.orbit.elevation; }), 20);
+  assert.ok (await page.evaluate (async () => (await window.b.picture ()).size) > 1000);
+  await screenshot (page, 'embed-two.png');
+  await page.evaluate (() => { window.seen = []; document.body.append (window.b); window.a.remove (); }); // b comes anew
+  await has ('b', 'framesetchange');
+  await page.evaluate (() => { window.b.src = 'nowhere.rcnc'; });
+  await has ('b', 'error');
+  assert.deepEqual (errors, []);
+  await page.close ();
+});
+
+// In the page of examples/three.html: SSIM of three.js's picture and of the software renderer's, in blocks of 8 pixels that show the person.
+const similarity = (page) => page.evaluate (async () => {
+  const { THREE, scene, camera, person, renderer } = window, { Core } = await import ('/core.js');
+  const others = scene.children.filter ((child) => child.isMesh && child !== person);
+  const frame = await new Promise ((resolve) => {
+    person.player.addEventListener ('frame', ({ detail }) => resolve ({ state: detail.state, layers: detail.layers.map (({ vertices }) => vertices.slice ()) }), { once: true });
+    person.player.again ();
+  });
+  for (const other of others)
+    other.visible = false;
+  scene.background = new THREE.Color (0x20242a);
+  window.draw ();
+  await new Promise (requestAnimationFrame);
+  window.draw ();
+  const { width, height } = renderer.domElement, canvas = new OffscreenCanvas (width, height), context = canvas.getContext ('2d');
+  context.drawImage (renderer.domElement, 0, 0);
+  const theirs = context.getImageData (0, 0, width, height).data.slice ();
+  const core = new Core (await person.player.ready), clip = new THREE.Matrix4 ().multiplyMatrices (camera.projectionMatrix, camera.matrixWorldInverse);
+  core.setScene (frame.state);
+  frame.layers.forEach ((vertices, i) => core.bytes (core.call ('rc_draw_layer', i, vertices.length), vertices.length).set (vertices));
+  core.input (new Uint8Array (Float32Array.from (clip.elements).buffer));
+  core.call ('rc_set_clip', 64);
+  const ours = core.bytes (core.call ('rc_draw', width, height, 0), 4 * width * height);
+  const grey = (pixels, i) => 0.299 * pixels[i] + 0.587 * pixels[i + 1] + 0.114 * pixels[i + 2];
+  let sum = 0, count = 0;
+  for (let y = 0; y + 8 <= height; y += 8)
+    for (let x = 0; x + 8 <= width; x += 8) {
+      let a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+      for (let i = 0; i < 64; i++) {
+        const at = 4 * ((y + (i >> 3)) * width + x + (i & 7)), p = grey (ours, at), q = grey (theirs, at);
+        a += p / 64; b += q / 64; aa += p * p / 64; bb += q * q / 64; ab += p * q / 64;
+      }
+      if (aa - a * a < 1)
+        continue;
+      count++;
+      sum += (2 * a * b + 6.5) * (2 * (ab - a * b) + 58.5) / ((a * a + b * b + 6.5) * (aa - a * a + bb - b * b + 58.5));
+    }
+  for (const other of others)
+    other.visible = true;
+  return { ssim: sum / count, blocks: count };
+});
+
+test ('three.js draws the person among other things as we do', async () => {
+  const { page, errors } = await open ('examples/three.html?src=scene.rcnc');
+  await page.waitForFunction (() => window.person?.painter);
+  for (const [i, place] of [[0.3, 0.2, 1.6], [-1.2, 0.3, 0.9], [0.2, 0.5, -1.5]].entries ()) {
+    await page.evaluate ((at) => { window.camera.position.set (...at); }, place);
+    const { ssim, blocks } = await similarity (page);
+    console.log (`SSIM ${ssim.toFixed (4)}`);
+    assert.ok (blocks > 200 && ssim > 0.97, `${ssim} in ${blocks} blocks`);
+    await screenshot (page, `three-${i}.png`);
+  }
+  // A box before the person hides it, one behind is hidden; pixels of the middle of the face.
+  const colours = await page.evaluate (() => {
+    const { THREE, scene, camera, person } = window, results = [];
+    camera.position.set (0, 0.05, 1.6);
+    const box = new THREE.Mesh (new THREE.BoxGeometry (0.1, 0.1, 0.02), new THREE.MeshBasicMaterial ({ color: 0x00ff00 })), gl = window.renderer.getContext ();
+    scene.add (box);
+    for (const z of [0.5, -0.5]) {
+      box.position.set (0, 0.05, z);
+      window.draw ();
+      const pixel = new Uint8Array (4);
+      gl.readPixels (gl.drawingBufferWidth / 2, gl.drawingBufferHeight / 2, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+      results.push (pixel[1] === 255 && pixel[0] === 0);
+    }
+    // Two eyes, as of WebXR; and lit.
+    const eyes = new THREE.ArrayCamera ([0, 1].map ((eye) => {
+      const one = camera.clone ();
+      one.viewport = new THREE.Vector4 (eye * 320, 0, 320, 480);
+      return one;
+    }));
+    scene.remove (box);
+    window.renderer.setAnimationLoop (null);
+    window.renderer.render (scene, eyes);
+    const row = new Uint8Array (4 * 640);
+    gl.readPixels (0, 240, 640, 1, gl.RGBA, gl.UNSIGNED_BYTE, row);
+    results.push ([0, 320].every ((x) => row[4 * (x + 160)] > row[4 * (x + 160) + 2]), gl.getError ());
+    person.dispose ();
+    scene.remove (person);
+    window.draw ();
+    results.push (gl.getError ());
+    return results;
+  });
+  assert.deepEqual (colours, [true, false, true, 0, 0]);
+  assert.deepEqual (errors, []);
+  await page.close ();
+});
+
+test ('the npm package is built by vite into a page of one folder', async () => {
+  const app = path.join (work, 'app');
+  fs.rmSync (app, { recursive: true, force: true });
+  fs.mkdirSync (app);
+  execFileSync ('npm', ['pack', '--silent', '--pack-destination', app], { cwd: folder });
+  fs.mkdirSync (path.join (app, 'node_modules/gst-rangecast'), { recursive: true });
+  execFileSync ('tar', ['xf', path.join (app, 'gst-rangecast-0.1.0.tgz'), '--strip-components=1', '-C', path.join (app, 'node_modules/gst-rangecast')]);
+  fs.writeFileSync (path.join (app, 'index.html'), `<!doctype html><body><rangecast-view src="./scene.rcnc" style="height: 300px"></rangecast-view>
+    <script type="module" src="./app.js"></script>`);
+  fs.writeFileSync (path.join (app, 'app.js'), "import 'gst-rangecast';\ndocument.querySelector ('rangecast-view').addEventListener ('framesetchange', () => { document.title = 'drawn'; });\n");
+  execFileSync ('node', [path.join (work, 'node_modules/vite/bin/vite.js'), 'build', '--base', './', '--outDir', path.join (folder, 'built'), '--emptyOutDir', '--logLevel', 'error'], { cwd: app });
+  fs.copyFileSync (path.join (work, 'scene.rcnc'), path.join (folder, 'built/scene.rcnc'));
+  const { page, errors } = await open ('built/index.html');
+  await page.waitForFunction (() => document.title === 'drawn');
+  assert.deepEqual (errors, []);
+  await page.close ();
+});
