@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // A live person or a recording as an object of a three.js scene, in the rig's coordinates (y up, metres), blended as <rangecast-view> does.
 // Each camera that sees it, also each eye of a WebXR session, gets a picture with depths, which a triangle before the camera copies.
-import { BufferAttribute, BufferGeometry, ExternalTexture, Matrix4, Mesh, ShaderMaterial, UniformsLib, UniformsUtils, Vector4 } from 'three';
+import { BufferAttribute, BufferGeometry, Matrix4, Mesh, ShaderMaterial, Texture, UniformsLib, UniformsUtils, Vector4 } from 'three';
 import { Core } from './core.js';
 import { Player } from './player.js';
 import { WebGlRenderer } from './renderer.js';
@@ -59,7 +59,7 @@ export class RangecastObject extends Mesh {
   constructor (source, { lit = false, ...options } = {}) {
     const geometry = new BufferGeometry ().setAttribute ('position', new BufferAttribute (new Float32Array ([-1, -1, 0, 3, -1, 0, -1, 3, 0]), 3));
     super (geometry, new ShaderMaterial ({ vertexShader: VERTEX, fragmentShader: FRAGMENT, transparent: true, lights: lit, toneMapped: false, defines: lit ? { LIT: 1 } : {},
-      uniforms: { ...UniformsUtils.clone (UniformsLib.lights), u_colours: { value: new ExternalTexture () }, u_depths: { value: new ExternalTexture () }, u_part: { value: new Vector4 () },
+      uniforms: { ...UniformsUtils.clone (UniformsLib.lights), u_colours: { value: new Texture () }, u_depths: { value: new Texture () }, u_part: { value: new Vector4 () },
         u_origin: { value: [0, 0] }, u_size: { value: [1, 1] }, u_view_from_clip: { value: new Matrix4 () }, opacity: { value: 1 } } }));
     this.frustumCulled = false;
     this.pending = null; // the newest frame set, not uploaded yet
@@ -86,7 +86,9 @@ export class RangecastObject extends Mesh {
     const [viewport, scissor] = [gl.VIEWPORT, gl.SCISSOR_BOX].map ((name) => new Vector4 ().fromArray (gl.getParameter (name)));
     const scissored = gl.isEnabled (gl.SCISSOR_TEST);
     try {
-      this.paint (gl, camera, viewport, uniforms);
+      const { colours, depths } = this.paint (gl, camera, viewport, uniforms);
+      for (const [{ value }, texture] of [[uniforms.u_colours, colours], [uniforms.u_depths, depths]]) // three never uploads them itself
+        Object.assign (renderer.properties.get (value), { __webglInit: true, __webglTexture: texture });
     } catch (error) {
       this.failed = true; // and not again in each picture
       this.player.say ({ text: error.message });
@@ -115,13 +117,12 @@ export class RangecastObject extends Mesh {
     const clip = new Matrix4 ().multiplyMatrices (camera.projectionMatrix, camera.matrixWorldInverse).multiply (this.matrixWorld);
     this.core.input (new Uint8Array (Float32Array.from (clip.elements).buffer));
     this.core.call ('rc_set_clip', 64);
-    const { colours, depths, part } = this.painter.drawTextures (width, height);
-    uniforms.u_colours.value.sourceTexture = colours;
-    uniforms.u_depths.value.sourceTexture = depths;
-    uniforms.u_part.value.fromArray (part);
+    const textures = this.painter.drawTextures (width, height);
+    uniforms.u_part.value.fromArray (textures.part);
     uniforms.u_origin.value = [x, y];
     uniforms.u_size.value = [width, height];
     uniforms.u_view_from_clip.value.copy (camera.projectionMatrixInverse);
+    return textures;
   }
 
   dispose () {

@@ -168,6 +168,23 @@ test ('three.js draws the person among other things as we do', async () => {
   await page.close ();
 });
 
+test ('the pages of docs/guide/embed.md show the person', async () => {
+  const guide = fs.readFileSync (path.join (source, 'docs/guide/embed.md'), 'utf8'), blocks = [...guide.matchAll (/^```html\n(.*?)^```/gms)];
+  assert.equal (blocks.length, 2);
+  fs.copyFileSync (path.join (work, 'scene.rcnc'), path.join (folder, 'person.rcnc'));
+  for (const [i, [, text]] of blocks.entries ()) {
+    write (`guide-${i}.html`, text);
+    const { page, errors } = await open (`guide-${i}.html`);
+    for (let tries = 0; (await page.screenshot ()).length < 12000; tries++) { // of an empty page: 3000
+      assert.ok (tries < 600, `page ${i} stays empty`);
+      await new Promise ((resolve) => setTimeout (resolve, 100));
+    }
+    await screenshot (page, `guide-${i}.png`);
+    assert.deepEqual (errors, []);
+    await page.close ();
+  }
+});
+
 test ('the npm package is built by vite into a page of one folder', async () => {
   const app = path.join (work, 'app');
   fs.rmSync (app, { recursive: true, force: true });
