@@ -98,28 +98,6 @@ home_frame (GstStripRenderPrivate *priv, const StripRenderSettings &settings,
       priv->scene, {orbit, layout.eyes ().front ().aspect, pts, settings.camera.home_requests});
 }
 
-/* Updates the panel of show-stats. */
-void
-update_panel (GstStripRender *self, GstClockTime frame_set_pts)
-{
-  GstStripRenderPrivate *priv = self->priv;
-  GstClockTime latency = GST_CLOCK_TIME_NONE;
-  const GstClockTime now = gst_element_get_current_running_time (GST_ELEMENT (self)),
-                     captured = strip_running_time (self, frame_set_pts);
-  const bool live = gst_aggregator_get_latency (GST_AGGREGATOR (self)) != GST_CLOCK_TIME_NONE;
-  if (live && GST_CLOCK_TIME_IS_VALID (now) && GST_CLOCK_TIME_IS_VALID (captured))
-    latency = now > captured ? now - captured : 0;
-  RenderStats stats;
-  {
-    std::lock_guard guard (priv->lock);
-    stats = priv->stats;
-  }
-  count_into (priv->scene, stats);
-  if (priv->stats_text.update (
-          stats, priv->scene.layers ().size (), latency, g_get_monotonic_time ()))
-    priv->stats_panel.draw (priv->stats_text.lines ());
-}
-
 /* Makes a scene of the frame set and draws it. May throw.
  * @param repeated  the last picture showed the same frame set */
 Status
@@ -138,12 +116,7 @@ draw (
   priv->scene.build (visible_images (self, frame.views (), settings.view_mask),
       {settings.strips, settings.tint_views}, orbit, repeated);
   const auto &home = home_frame (priv, settings, orbit, GST_BUFFER_PTS (frame_set));
-  RenderJob job = {&priv->scene, &settings, &home, orbit};
-  if (settings.show_stats) {
-    update_panel (self, GST_BUFFER_PTS (frame_set));
-    job.panel = priv->stats_panel.picture ();
-  }
-  result = priv->backend->draw (job, out);
+  result = priv->backend->draw ({&priv->scene, &settings, &home, orbit}, out);
   if (!result.failure) {
     std::lock_guard guard (priv->lock);
     priv->settings.camera.set_shown (result.matrices, home, result.width, result.height);

@@ -475,7 +475,14 @@ collect_stats (GstElement *element)
 static GstStructure *
 make_stats (const GstStripRenderPrivate *priv)
 {
-  return priv->stats.to_structure ();
+  const RenderStats &s = priv->stats;
+  return gst_structure_new ("application/x-striprender-stats", "frames", G_TYPE_UINT64, s.frames,
+      "frame-sets", G_TYPE_UINT64, s.frame_sets, "repeated", G_TYPE_UINT64, s.repeated, "dropped",
+      G_TYPE_UINT64, s.dropped, "points", G_TYPE_UINT64, s.points, "vertices", G_TYPE_UINT64,
+      s.vertices, "triangles", G_TYPE_UINT64, s.triangles, "strips", G_TYPE_UINT64, s.strips,
+      "isolated", G_TYPE_UINT64, s.isolated, "uploaded-bytes", G_TYPE_UINT64, s.uploaded_bytes,
+      "uploaded-total", G_TYPE_UINT64, s.uploaded_total, "backend", G_TYPE_STRING, s.backend,
+      nullptr);
 }
 
 static gboolean
@@ -484,7 +491,6 @@ gst_strip_render_start (GstAggregator *aggregator)
   auto self = GST_STRIP_RENDER (aggregator);
   GstStripRenderPrivate *priv = self->priv;
   priv->first_running = GST_CLOCK_TIME_NONE;
-  priv->stats_text = {};
   priv->lost_opengl = false;
   priv->fit.reset ();
   priv->reporter.start (GST_ELEMENT (self), collect_stats);

@@ -140,21 +140,6 @@ private:
         result.failure =
             painter_.draw (make_picture (job, eye, info_, result), job.scene->layers ());
     gst_gl_context_clear_framebuffer (context_);
-    for (const EyeViewport &eye : layout_.eyes ())
-      if (eye.memory == number && !job.panel.empty ())
-        paste_panel (job, memory, eye, result);
-  }
-
-  void paste_panel (
-      const RenderJob &job, GstGLMemory *memory, const EyeViewport &eye, RenderResult &result)
-  {
-    const GstGLFuncs *gl = context_->gl_vtable;
-    const auto panel = make_panel (job.panel, eye, panel_);
-    gl->BindTexture (GL_TEXTURE_2D, memory->tex_id);
-    gl->TexSubImage2D (GL_TEXTURE_2D, 0, eye.x + kPanelBorder, eye.y + kPanelBorder, panel.width,
-        panel.height, GL_RGBA, GL_UNSIGNED_BYTE, panel.data);
-    gl->BindTexture (GL_TEXTURE_2D, 0);
-    result.uploaded += panel_.size () * sizeof (rangecast::Rgbx);
   }
 
   GstGLContext *const context_;
@@ -164,7 +149,6 @@ private:
   bool is_started_ = false;
   guint64 uploaded_ = 0; /* serial of the scene that OpenGL has; 0: none */
   SurfacePainter painter_;
-  std::vector<rangecast::Rgbx> panel_;
 };
 
 } // namespace

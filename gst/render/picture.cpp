@@ -96,24 +96,6 @@ make_picture (const RenderJob &job, const EyeViewport &viewport, const GstVideoI
   return picture;
 }
 
-ImageView<const Rgbx>
-make_panel (
-    const ImageView<const Rgbx> &panel, const EyeViewport &viewport, std::vector<Rgbx> &memory)
-{
-  const int scale = std::max (1, (viewport.height + 240) / 480),
-            width = std::clamp (viewport.width - kPanelBorder, 0, panel.width * scale),
-            height = std::clamp (viewport.height - kPanelBorder, 0, panel.height * scale);
-  memory.resize (std::size_t (width) * std::size_t (height));
-  const ImageView<Rgbx> to = {
-      memory.data (), width, height, std::ptrdiff_t (sizeof (Rgbx)) * width};
-  for (int y = 0; y < height; y++)
-    for (int x = 0; x < width; x++) {
-      to.at (x, y) = panel.at (x / scale, y / scale);
-      to.at (x, y).x = 255;
-    }
-  return to;
-}
-
 namespace {
 
 class SoftwareBackend : public RenderBackend {
@@ -136,29 +118,16 @@ public:
     const bool is_bgra = format == GST_VIDEO_FORMAT_BGRA || format == GST_VIDEO_FORMAT_BGRx;
     const std::unique_ptr<GstVideoFrame, decltype (&gst_video_frame_unmap)> mapped (
         &frame, gst_video_frame_unmap);
-    for (const EyeViewport &eye : layout_.eyes ()) {
+    for (const EyeViewport &eye : layout_.eyes ())
       renderer_.draw (
           make_picture (job, eye, info_, result), job.scene->layers (), pixels, is_bgra);
-      if (!job.panel.empty ())
-        paste_panel (job, eye, pixels);
-    }
     return result;
   }
 
 private:
-  /* It is nearly grey: the order of bytes does not matter. */
-  void paste_panel (const RenderJob &job, const EyeViewport &eye, const ImageView<Rgbx> &pixels)
-  {
-    const auto panel = make_panel (job.panel, eye, panel_);
-    for (int y = 0; y < panel.height; y++)
-      std::copy_n (
-          panel.row (y), panel.width, pixels.row (eye.y + kPanelBorder + y) + eye.x + kPanelBorder);
-  }
-
   const GstVideoInfo info_;
   const MultiviewLayout layout_;
   rangecast::SoftwareRenderer renderer_;
-  std::vector<Rgbx> panel_;
 };
 
 } // namespace

@@ -44,7 +44,6 @@ struct RenderJob {
   const StripRenderSettings *settings;
   const rangecast::SceneFrame *frame; ///< the camera's default position
   rangecast::Orbit orbit;
-  rangecast::ImageView<const rangecast::Rgbx> panel = {}; ///< over the picture; empty: none
 };
 
 struct RenderResult {
@@ -54,7 +53,7 @@ struct RenderResult {
   int width = 0, height = 0;         ///< of the first eye's picture, pixels
 };
 
-/** Draws scenes: the frame set, for one or two eyes, the background and the panel. */
+/** Draws scenes: the frame set, for one or two eyes, and the background. */
 class RenderBackend {
 public:
   virtual ~RenderBackend () = default;
@@ -69,11 +68,3 @@ std::unique_ptr<RenderBackend> make_software_backend (const GstVideoInfo &info);
 /** The picture of one eye. @param[in,out] result  gets what is of the first eye */
 rangecast::SurfacePicture make_picture (const RenderJob &job, const EyeViewport &viewport,
     const GstVideoInfo &info, RenderResult &result);
-
-/** A panel as it is laid over a picture: opaque, larger in larger pictures.
- *  @param[out] memory  of the result; keeps its capacity */
-rangecast::ImageView<const rangecast::Rgbx> make_panel (
-    const rangecast::ImageView<const rangecast::Rgbx> &panel, const EyeViewport &viewport,
-    std::vector<rangecast::Rgbx> &memory);
-/** Pixels between a panel and the picture's edges. */
-inline constexpr int kPanelBorder = 8;

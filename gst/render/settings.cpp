@@ -70,8 +70,6 @@ strip_properties ()
           "Fit the view to the content at the start of the stream and on the keys r and Home; "
           "camera properties then count from that view",
           kControllable),
-      P::boolean<&S::show_stats> (
-          "show-stats", "Show statistics", "Overlay statistics on the output", kControllable),
       P::boolean<&S::keep_rate> ("keep-rate", "Keep rate",
           "Output at the negotiated frame rate even if it is the input's, repeating frames while a "
           "live stream stalls",

@@ -20,7 +20,6 @@ struct StripRenderSettings {
   guint64 view_mask = G_MAXUINT64;                              ///< bit n: view-id n is drawn
   double blend_range_m = rangecast::kBlendRange_m;
   bool tint_views = false;
-  bool show_stats = false;
   double eye_distance_m = 0.063; ///< most people's
   double convergence_m = 0;      ///< 0: the camera target's distance
   bool keep_rate = false;        ///< even if it is the input's

@@ -10,17 +10,29 @@
 
 #include <gstrange/gstrangeinfo.hpp>
 #include <mutex>
-#include <rangecast/overlay/stats_panel.hpp>
 #include <rangecast/surface/view_fit.hpp>
 
 #include "common/statsreporter.hpp"
 #include "opengl.hpp"
 #include "picture.hpp"
 #include "settings.hpp"
-#include "stats.hpp"
 
 GST_DEBUG_CATEGORY_EXTERN (strip_render_debug);
 #define GST_CAT_DEFAULT strip_render_debug
+
+/** Of property `stats`. */
+struct RenderStats {
+  /* since start */
+  guint64 frames = 0;         ///< pictures drawn
+  guint64 frame_sets = 0;     ///< received
+  guint64 repeated = 0;       ///< pictures of a frame set that an earlier one showed
+  guint64 dropped = 0;        ///< pictures not drawn because they would have been late
+  guint64 uploaded_total = 0; ///< bytes
+  guint64 points_total = 0;   ///< drawn
+  const char *backend = "";   ///< that draws
+  /* of the last picture */
+  guint64 points = 0, vertices = 0, triangles = 0, strips = 0, isolated = 0, uploaded_bytes = 0;
+};
 
 struct GstStripRenderPrivate {
   std::mutex lock; /* guards what follows; nothing is pushed, posted or queried with it */
@@ -44,8 +56,6 @@ struct GstStripRenderPrivate {
   rangecast::SurfaceScene scene;
   rangecast::ViewFit fit;
   std::array<rangecast::RangeImage, rangecast::kMaxViews> visible; /* selected by view-mask */
-  StatsText stats_text;
-  rangecast::StatsPanel stats_panel;
   GstClockTime first_running = GST_CLOCK_TIME_NONE; /* of the first picture: auto-orbit's begin */
 
   /* Of the same, if the output has a frame rate of its own: stream positions. */

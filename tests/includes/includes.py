@@ -17,20 +17,17 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
 SOURCES = (".c", ".cpp", ".h", ".hpp")
 CORE = ("base", "geometry", "neighbourcode", "alignment", "overlap", "surface", "render", "sync")
 RIGFILE = ("rigfile",)
-OVERLAY = ("overlay",)
 VISION = ("opencv", "stereo", "roi", "registration", "calibration")
 SCENE = ("scene",)
 
 # What a folder may include besides itself and its own subfolders: the first row whose prefix matches.
 CORE_FOLDERS = tuple(f"lib/rangecast/{name}" for name in CORE)
 RIGFILE_FOLDERS = tuple(f"lib/rangecast/{name}" for name in RIGFILE)
-OVERLAY_FOLDERS = tuple(f"lib/rangecast/{name}" for name in OVERLAY)
 VISION_FOLDERS = tuple(f"lib/rangecast/{name}" for name in VISION)
 SCENE_FOLDERS = tuple(f"lib/rangecast/{name}" for name in SCENE)
 LAYERS = (
     (CORE_FOLDERS, CORE_FOLDERS),
     (RIGFILE_FOLDERS, CORE_FOLDERS + RIGFILE_FOLDERS),
-    (OVERLAY_FOLDERS, CORE_FOLDERS + OVERLAY_FOLDERS),
     (VISION_FOLDERS, CORE_FOLDERS + RIGFILE_FOLDERS + VISION_FOLDERS),
     (SCENE_FOLDERS, CORE_FOLDERS + VISION_FOLDERS + SCENE_FOLDERS),
     (("lib/rangecast/pch",), ()),
@@ -44,7 +41,6 @@ LAYERS = (
 GSTREAMER = ("gst/", "glib", "gio/", "gobject")
 FOREIGN = (
     (CORE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "tiny_gltf.h", "tiny_obj_loader.h", "zlib.h", "yaml.h") + GSTREAMER),
-    (OVERLAY_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "tiny_gltf.h", "tiny_obj_loader.h", "zlib.h", "yaml.h") + GSTREAMER),
     (RIGFILE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "tiny_gltf.h", "tiny_obj_loader.h") + GSTREAMER),
     (VISION_FOLDERS, ("tiny_gltf.h", "tiny_obj_loader.h",) + GSTREAMER),
     (SCENE_FOLDERS, ("ceres/",) + GSTREAMER),

@@ -303,7 +303,7 @@ GST_START_TEST (test_opengl_is_left_as_it_was)
   SKIP_WITHOUT_OPENGL ();
   const Rig rig = ring_rig (1);
   for (const char *properties :
-      {"mode=points", "mode=strips", "mode=rectangles show-stats=true background=0"}) {
+      {"mode=points", "mode=strips", "mode=rectangles tint-views=true background=0"}) {
     GstHarness *h = render_harness (rig, {.properties = properties, .opengl = true});
     render (h, wall (rig));
     GstElement *element = gst_harness_find_element (h, "gldownload");

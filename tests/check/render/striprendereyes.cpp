@@ -104,7 +104,7 @@ GST_START_TEST (test_all_packings_hold_the_same_two_pictures)
 {
   const char *size = "width=320,height=240,multiview-mode=";
   const std::string single = size;
-  const RenderedPicture left = eyes ("show-stats=false", single + "left", 320, 8000);
+  const RenderedPicture left = eyes ("tint-views=false", single + "left", 320, 8000);
   const RenderedPicture right = eyes ("", single + "right", 320, 8000);
   const RenderedPicture mono = eyes ("", single + "mono", 320, 8000);
   fail_unless (bright (left).x > bright (mono).x + 1 || bright (left).x < bright (mono).x - 1);
@@ -210,31 +210,6 @@ GST_START_TEST (test_units_are_in_their_cameras_colours)
       fail_unless (std::abs (picture.at (160, 120)[c] - expected[c] * 355 / 510) <= 2,
           "view %d: channel %d is %d", int (i), c, picture.at (160, 120)[c]);
   }
-  gst_object_unref (r);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_statistics_are_in_a_corner_and_leave_the_rest_alone)
-{
-  const Rig rig = ring_rig (2);
-  GstHarness *h = render_harness (rig);
-  const RenderedPicture plain = render (h, make_frame_set (rig), 320);
-  GstElement *r = gst_bin_get_by_name (GST_BIN (h->element), "r");
-  g_object_set (r, "show-stats", TRUE, nullptr);
-  const RenderedPicture written = render (h, make_frame_set (rig), 320);
-  int light = 0;
-  for (int y = 8; y < 80; y++)
-    for (int x = 8; x < 100; x++) {
-      const guint8 *p = written.at (x, y);
-      light += p[0] > 180 && p[1] > 180 && p[2] > 180;
-      fail_unless_equals_int (p[3], 255);
-    }
-  fail_unless (light > 100, "no text: %d pixels", light);
-  fail_unless_equals_int (
-      pixels_that_differ (written.part (0, 120, 320, 120), plain.part (0, 120, 320, 120)), 0);
-  g_object_set (r, "show-stats", FALSE, nullptr);
-  fail_unless_cmp (render (h, make_frame_set (rig), 320).rgba, ==, plain.rgba);
   gst_object_unref (r);
   gst_harness_teardown (h);
 }
@@ -438,7 +413,6 @@ striprendereyes_suite ()
   tcase_add_test (tc, test_flags_as_text_are_one_error);
   tcase_add_test (tc, test_separated_pictures_are_memories_of_one_buffer);
   tcase_add_test (tc, test_units_are_in_their_cameras_colours);
-  tcase_add_test (tc, test_statistics_are_in_a_corner_and_leave_the_rest_alone);
   tcase_add_test (tc, test_transparent_background_lets_video_through);
   tcase_add_test (tc, test_lost_context_is_one_warning_or_one_error);
   tcase_add_test (tc, test_no_context_at_all_is_one_error);

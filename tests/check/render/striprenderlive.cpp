@@ -442,7 +442,7 @@ GST_END_TEST;
 /* A frame set whose first pictures are left out is drawn as if they had not been. */
 GST_START_TEST (test_thread_that_comes_too_late_leaves_pictures_out)
 {
-  Live live ("show-stats=false"), direct ("", "framerate=5/1");
+  Live live ("tint-views=false"), direct ("", "framerate=5/1");
   const Roi part = {100, 80, 60, 40};
   live.push (0);
   live.next ();
