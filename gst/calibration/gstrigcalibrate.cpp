@@ -20,6 +20,7 @@
 #include <gst/base/gstaggregator.h>
 
 #include "common/backgroundjobs.hpp"
+#include "common/capsadvice.hpp"
 #include "common/elementproperties.hpp"
 #include "common/matcher.hpp"
 #include "frames.hpp"
@@ -256,12 +257,6 @@ examine_job (GstRigCalibrate *self, CalibrationImages &set, std::stop_token stop
 }
 
 /* ---- output ---- */
-
-static GstFlowReturn
-gst_rig_calibrate_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
-{
-  return GST_AGGREGATOR_FLOW_NEED_DATA; /* push_still() sets caps */
-}
 
 /* Pushes the latest preview with the running time of the current set; if live, it shows an older
  * one. */
@@ -607,7 +602,7 @@ gst_rig_calibrate_class_init (GstRigCalibrateClass *klass)
   aggregator_class->propose_allocation = GST_DEBUG_FUNCPTR (propose_video_meta);
   aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_rig_calibrate_stop);
   aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_rig_calibrate_sink_event);
-  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_rig_calibrate_update_src_caps);
+  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (keep_src_caps);
   aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_rig_calibrate_get_next_time);
   aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
   aggregator_class->aggregate = aggregate_to_the_end<gst_rig_calibrate_aggregate>;

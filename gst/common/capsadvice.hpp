@@ -11,3 +11,10 @@ bool require_downstream (GstElement *element, GstPad *src, bool strict = true);
 
 /** GstAggregator's default negotiate(), after require_downstream(). */
 gboolean negotiate_downstream (GstAggregator *aggregator);
+
+/** update_src_caps() of aggregators that set caps with their first output. */
+inline GstFlowReturn
+keep_src_caps (GstAggregator *, GstCaps *, GstCaps **)
+{
+  return GST_AGGREGATOR_FLOW_NEED_DATA;
+}

@@ -310,12 +310,6 @@ negotiate (GstRangeCombine *self)
   return GST_FLOW_OK;
 }
 
-static GstFlowReturn
-gst_range_combine_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
-{
-  return GST_AGGREGATOR_FLOW_NEED_DATA; /* negotiate() sets caps with the first pair */
-}
-
 /* ---- data ---- */
 
 /* Warns once if the first frame with depth has hardly any between near and far: most likely
@@ -571,7 +565,7 @@ gst_range_combine_class_init (GstRangeCombineClass *klass)
   aggregator_class->stop = GST_DEBUG_FUNCPTR (gst_range_combine_stop);
   aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_range_combine_flush);
   aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_range_combine_sink_event);
-  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_range_combine_update_src_caps);
+  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (keep_src_caps);
   aggregator_class->negotiate = GST_DEBUG_FUNCPTR (negotiate_downstream);
   aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);
   aggregator_class->aggregate = aggregate_to_the_end<gst_range_combine_aggregate>;

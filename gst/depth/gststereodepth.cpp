@@ -282,12 +282,6 @@ negotiate (GstStereoDepth *self)
   return gst_range_flow_return (GST_ELEMENT (self), status);
 }
 
-static GstFlowReturn
-gst_stereo_depth_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
-{
-  return GST_AGGREGATOR_FLOW_NEED_DATA; /* negotiate() sets caps with the first pair */
-}
-
 /* ---- output ---- */
 
 /* Matches the images that the readers have open. */
@@ -608,7 +602,7 @@ gst_stereo_depth_class_init (GstStereoDepthClass *klass)
   aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_stereo_depth_flush);
   aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_stereo_depth_sink_event);
   aggregator_class->src_event = GST_DEBUG_FUNCPTR (gst_stereo_depth_src_event);
-  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_stereo_depth_update_src_caps);
+  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (keep_src_caps);
   aggregator_class->negotiate = GST_DEBUG_FUNCPTR (negotiate_downstream);
   aggregator_class->create_new_pad = GST_DEBUG_FUNCPTR (gst_stereo_depth_create_new_pad);
   aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);

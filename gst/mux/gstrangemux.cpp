@@ -487,12 +487,6 @@ gst_range_mux_sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstE
 }
 
 static GstFlowReturn
-gst_range_mux_update_src_caps (GstAggregator *, GstCaps *, GstCaps **)
-{
-  return GST_AGGREGATOR_FLOW_NEED_DATA; /* negotiate() sets them */
-}
-
-static GstFlowReturn
 gst_range_mux_flush (GstAggregator *aggregator)
 {
   GstRangeMuxPrivate *priv = GST_RANGE_MUX (aggregator)->priv;
@@ -682,7 +676,7 @@ gst_range_mux_class_init (GstRangeMuxClass *klass)
   aggregator_class->flush = GST_DEBUG_FUNCPTR (gst_range_mux_flush);
   aggregator_class->src_event = GST_DEBUG_FUNCPTR (gst_range_mux_src_event);
   aggregator_class->sink_event = GST_DEBUG_FUNCPTR (gst_range_mux_sink_event);
-  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (gst_range_mux_update_src_caps);
+  aggregator_class->update_src_caps = GST_DEBUG_FUNCPTR (keep_src_caps);
   aggregator_class->negotiate = GST_DEBUG_FUNCPTR (negotiate_downstream);
   aggregator_class->get_next_time = GST_DEBUG_FUNCPTR (gst_range_mux_get_next_time);
   aggregator_class->clip = GST_DEBUG_FUNCPTR (gstrange::clip_to_segment);

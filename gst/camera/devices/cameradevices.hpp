@@ -7,12 +7,12 @@
 #include "knownrigs.hpp"
 
 /** A device of class Source/Video that aravissrc opens. Its properties: device.api, device.bus,
- *  camera.protocol, .id, .vendor, .model, .serial, .address, launch (the string that opens it) and,
+ *  camera.protocol, .id, .vendor, .model, .serial, .address, and,
  *  if it cannot be opened, camera.problem (why, and what to do).
  *  @return (transfer floating) */
 GstDevice *new_camera_device (const CameraInfo &camera);
 
 /** A device of class Source/Video/Stereo that stereocamsrc opens. Its properties: device.api,
- *  rig.file, rig.view-id, camera.left, .right, .third and launch.
+ *  rig.file, rig.view-id, camera.left, .right and .third.
  *  @return (transfer floating) */
 GstDevice *new_pair_device (const KnownPair &pair);

@@ -17,26 +17,10 @@ G_DEFINE_TYPE (GstCameraDevice, gst_camera_device, GST_TYPE_DEVICE)
 
 namespace {
 
-/** "stereocamsrc left=1 right=2", as a launch string has it. */
-std::string
-launch_string (const std::string &factory, const GstStructure *settings)
-{
-  auto line = factory;
-  for (gint i = 0; i < gst_structure_n_fields (settings); ++i) {
-    const gchar *name = gst_structure_nth_field_name (settings, guint (i));
-    gchar *value = gst_value_serialize (gst_structure_get_value (settings, name));
-    line += std::string (" ") + name + "=" + value;
-    g_free (value);
-  }
-  return line;
-}
-
 GstDevice *
 new_device (const std::string &name, const gchar *klass, GstStructure *properties,
     const gchar *factory, GstStructure *settings)
 {
-  const auto line = launch_string (factory, settings);
-  gst_structure_set (properties, "launch", G_TYPE_STRING, line.c_str (), nullptr);
   GstCaps *caps = camera_caps (); // the camera's own are known only to who opens it
   auto self = GST_CAMERA_DEVICE (g_object_new (GST_TYPE_CAMERA_DEVICE, "display-name",
       name.c_str (), "device-class", klass, "caps", caps, "properties", properties, nullptr));

@@ -5,18 +5,6 @@
 
 namespace rangecast {
 
-/* GigE Vision numbers blocks with 16 bits, without 0; its extended mode and USB3 Vision use 64
- * bits. A number beyond 16 bits identifies the latter; below that, 64-bit numbers do not wrap. */
-std::int64_t
-frame_id_step (std::uint64_t from, std::uint64_t to)
-{
-  constexpr std::int64_t kMax = 65535;
-  const auto step = static_cast<std::int64_t> (to - from);
-  if (from > kMax || to > kMax || std::llabs (step) <= kMax / 2)
-    return step;
-  return step < 0 ? step + kMax : step - kMax;
-}
-
 void
 TriggerMatcher::start (std::int64_t period_ns)
 {
@@ -61,7 +49,7 @@ TriggerMatcher::by_id (std::uint64_t frame_id, std::int64_t &trigger) const
 {
   if (frame_id == 0 || last_id_ == 0)
     return false;
-  trigger = last_trigger_ + frame_id_step (last_id_, frame_id);
+  trigger = last_trigger_ + static_cast<std::int64_t> (frame_id - last_id_);
   return trigger_at (trigger) != nullptr;
 }
 

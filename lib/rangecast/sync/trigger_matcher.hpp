@@ -33,7 +33,7 @@ public:
     std::int64_t residual_ns = 0; ///< delay of the frame less the usual delay
   };
 
-  /** @param frame_id   the camera's number; 16 bits without 0, or 64; 0: it has none
+  /** @param frame_id   the camera's number, which does not wrap; 0: it has none
    *  @param camera_ns  the camera's time stamp; 0: it has none
    *  @param arrival_ns by the clock of fired() */
   Found find (std::uint64_t frame_id, std::int64_t camera_ns, std::int64_t arrival_ns);
@@ -72,9 +72,5 @@ private:
   std::int64_t contradiction_ = 0; ///< triggers between arrival and number
   int contradictions_ = 0, unmatched_ = 0;
 };
-
-/** Difference of two frame numbers; 16-bit numbers wrap from 65535 to 1.
- *  @return 1 for the next one, 0 if it is the same, negative if it is older */
-std::int64_t frame_id_step (std::uint64_t from, std::uint64_t to);
 
 } // namespace rangecast

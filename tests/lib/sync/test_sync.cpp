@@ -31,16 +31,6 @@ TEST (Ticks, do_not_drift_in_a_clock_of_1970)
   EXPECT_EQ (rate.time_of (tick + 59), 1'800'000'001 * kSecond);
 }
 
-/* ---- numbers of frames ---- */
-
-TEST (FrameIds, sixteen_bits_wrap_over_zero)
-{
-  EXPECT_EQ (frame_id_step (65535, 1), 1);
-  EXPECT_EQ (frame_id_step (65534, 2), 3);
-  EXPECT_EQ (frame_id_step (1, 65535), -1);
-  EXPECT_EQ (frame_id_step (10, 13), 3);
-}
-
 /* ---- which trigger a frame answers ---- */
 
 namespace {
