@@ -89,11 +89,6 @@ struct _GstCylinderFilter {
   GstCylinderFilterPrivate *priv;
 };
 
-static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
-    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
-static GstStaticPadTemplate src_template =
-    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
-
 G_DEFINE_TYPE (GstCylinderFilter, gst_cylinder_filter, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
     cylinderfilter, "cylinderfilter", GST_RANK_NONE, gst_cylinder_filter_get_type ())
@@ -221,8 +216,7 @@ gst_cylinder_filter_class_init (GstCylinderFilterClass *klass)
   install_properties<GstCylinderFilter, cylinder_properties, make_stats> (
       object_class, "Counters since READY: frames, points-in, points-out, cells, cells-shared");
 
-  gst_element_class_add_static_pad_template (element_class, &sink_template);
-  gst_element_class_add_static_pad_template (element_class, &src_template);
+  add_always_pads (element_class, GST_RANGE_CAPS, GST_RANGE_CAPS);
   gst_element_class_set_static_metadata (element_class, "Cylinder filter", "Filter/Effect/Video",
       "Removes redundant points of overlapping views", "gst-rangecast");
 

@@ -87,11 +87,6 @@ struct _GstRangeAlign {
   GstRangeAlignPrivate *priv;
 };
 
-static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
-    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
-static GstStaticPadTemplate src_template =
-    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
-
 G_DEFINE_TYPE (GstRangeAlign, gst_range_align, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (rangealign, "rangealign", GST_RANK_NONE, gst_range_align_get_type ())
 
@@ -300,8 +295,7 @@ gst_range_align_class_init (GstRangeAlignClass *klass)
   install_properties<GstRangeAlign, align_properties, make_stats> (
       object_class, "Counters since READY: frames, points-contradicted; of the last frame: views");
 
-  gst_element_class_add_static_pad_template (element_class, &sink_template);
-  gst_element_class_add_static_pad_template (element_class, &src_template);
+  add_always_pads (element_class, GST_RANGE_CAPS, GST_RANGE_CAPS);
   gst_element_class_set_static_metadata (element_class, "Range image alignment",
       "Filter/Effect/Video", "Corrects the poses and colours of views so that they agree",
       "gst-rangecast");

@@ -100,11 +100,6 @@ struct _GstNeighbourCodeDec {
   GstNeighbourCodeDecPrivate *priv;
 };
 
-static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
-    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
-static GstStaticPadTemplate src_template =
-    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
-
 G_DEFINE_TYPE (GstNeighbourCodeDec, gst_neighbour_code_dec, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
     neighbourcodedec, "neighbourcodedec", GST_RANK_PRIMARY, gst_neighbour_code_dec_get_type ())
@@ -526,8 +521,7 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
       "Counters since the element was started: frames, points, slices, bad-slices, "
       "missing-pixels, unknown-pixels, raw-bytes, coded-bytes");
 
-  gst_element_class_add_static_pad_template (element_class, &sink_template);
-  gst_element_class_add_static_pad_template (element_class, &src_template);
+  add_always_pads (element_class, GST_NEIGHBOUR_CODE_CAPS, GST_RANGE_CAPS);
   gst_element_class_set_static_metadata (element_class, "Neighbour code decoder", "Codec/Decoder",
       "Decodes neighbour-coded range images", "gst-rangecast");
 

@@ -89,11 +89,6 @@ struct _GstNeighbourCodeEnc {
   GstNeighbourCodeEncPrivate *priv;
 };
 
-static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
-    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
-static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
-    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
-
 G_DEFINE_TYPE (GstNeighbourCodeEnc, gst_neighbour_code_enc, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
     neighbourcodeenc, "neighbourcodeenc", GST_RANK_PRIMARY, gst_neighbour_code_enc_get_type ())
@@ -478,8 +473,7 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
       "delta-slices, raw-bytes, coded-bytes), the bitrate of the last 2 s, the thresholds and "
       "max-depth-error of the latest frame set and the state of adaptive-bitrate");
 
-  gst_element_class_add_static_pad_template (element_class, &sink_template);
-  gst_element_class_add_static_pad_template (element_class, &src_template);
+  add_always_pads (element_class, GST_RANGE_CAPS, GST_NEIGHBOUR_CODE_CAPS);
   gst_element_class_set_static_metadata (element_class, "Neighbour code encoder",
       "Codec/Encoder/Video",
       "Encodes depth and colour of range images jointly with the neighbour code", "gst-rangecast");

@@ -87,11 +87,6 @@ struct _GstNeighbourCodeParse {
   GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                                    \
   ", version = (int) 4, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS
 
-static GstStaticPadTemplate sink_template =
-    GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (STREAM_CAPS));
-static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
-    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (ACCESS_UNIT_CAPS));
-
 G_DEFINE_TYPE (GstNeighbourCodeParse, gst_neighbour_code_parse, GST_TYPE_BASE_PARSE)
 
 /* ---- typefinder ---- */
@@ -506,8 +501,7 @@ gst_neighbour_code_parse_class_init (GstNeighbourCodeParseClass *klass)
   auto parse_class = GST_BASE_PARSE_CLASS (klass);
 
   G_OBJECT_CLASS (klass)->finalize = delete_private<GstNeighbourCodeParse>;
-  gst_element_class_add_static_pad_template (element_class, &sink_template);
-  gst_element_class_add_static_pad_template (element_class, &src_template);
+  add_always_pads (element_class, STREAM_CAPS, ACCESS_UNIT_CAPS);
   gst_element_class_set_static_metadata (element_class, "Neighbour code parser",
       "Codec/Parser/Converter/Video", "Divides neighbour code byte streams into access units",
       "gst-rangecast");

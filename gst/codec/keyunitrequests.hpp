@@ -5,30 +5,32 @@
 
 #include <algorithm>
 #include <mutex>
-#include <vector>
+#include <utility>
 
 /** Requests for key frame sets (GstForceKeyUnit) that wait for their time. Any thread. */
 class KeyUnitRequests {
 public:
-  /** Handles an event from upstream or downstream. If too many requests wait, the latest are
-   *  replaced. @return false if the event is another one */
+  /** Handles an event from upstream or downstream. A request that comes while another one waits is
+   *  answered with it, at the earlier time. @return false if the event is another one */
   bool handle_event (GstEvent *event)
   {
-    constexpr std::size_t kMax = 32;
     if (!gst_video_event_is_force_key_unit (event))
       return false;
-    Request request{};
+    Request request;
     const bool parsed =
         GST_EVENT_TYPE (event) == GST_EVENT_CUSTOM_UPSTREAM
             ? gst_video_event_parse_upstream_force_key_unit (
                   event, &request.running_time, &request.all_headers, &request.count)
             : gst_video_event_parse_downstream_force_key_unit (event, nullptr, nullptr,
                   &request.running_time, &request.all_headers, &request.count);
+    if (!parsed)
+      return true;
+    if (!GST_CLOCK_TIME_IS_VALID (request.running_time))
+      request.running_time = 0; /* immediately */
     std::lock_guard guard (lock_);
-    if (parsed && waiting_.size () == kMax)
-      waiting_.pop_back ();
-    if (parsed)
-      waiting_.push_back (request);
+    waiting_.running_time = std::min (waiting_.running_time, request.running_time);
+    waiting_.all_headers |= request.all_headers;
+    waiting_.count = request.count;
     return true;
   }
 
@@ -36,49 +38,34 @@ public:
   bool is_due (GstClockTime running_time)
   {
     std::lock_guard guard (lock_);
-    return std::ranges::any_of (
-        waiting_, [&] (const Request &request) { return request.is_due (running_time); });
+    return GST_CLOCK_TIME_IS_VALID (waiting_.running_time) &&
+           running_time >= waiting_.running_time; /* NONE is the greatest */
   }
 
-  /** Removes the requests that a key frame set of this running time answers.
+  /** Removes the request if a key frame set of this running time answers it.
    *  @return the GstForceKeyUnit event for downstream, for the caller to push; nullptr if there was
    *  no request */
   GstEvent *answer (GstClockTime timestamp, GstClockTime stream_time, GstClockTime running_time)
   {
-    bool any = false;
-    gboolean all_headers = FALSE;
-    guint count = 0;
+    if (!is_due (running_time))
+      return nullptr;
     std::lock_guard guard (lock_);
-    std::erase_if (waiting_, [&] (const Request &request) {
-      if (!request.is_due (running_time))
-        return false;
-      any = true;
-      all_headers |= request.all_headers;
-      count = request.count;
-      return true;
-    });
-    return any ? gst_video_event_new_downstream_force_key_unit (
-                     timestamp, stream_time, running_time, all_headers, count)
-               : nullptr;
+    const Request request = std::exchange (waiting_, {});
+    return gst_video_event_new_downstream_force_key_unit (
+        timestamp, stream_time, running_time, request.all_headers, request.count);
   }
   void reset ()
   {
     std::lock_guard guard (lock_);
-    waiting_.clear ();
+    waiting_ = {};
   }
 
 private:
   struct Request {
-    GstClockTime running_time; /* GST_CLOCK_TIME_NONE: immediately */
-    gboolean all_headers;
-    guint count;
-
-    [[nodiscard]] bool is_due (GstClockTime now) const
-    {
-      return !GST_CLOCK_TIME_IS_VALID (running_time) || !GST_CLOCK_TIME_IS_VALID (now) ||
-             now >= running_time;
-    }
+    GstClockTime running_time = GST_CLOCK_TIME_NONE; /* NONE: there is none */
+    gboolean all_headers = FALSE;
+    guint count = 0;
   };
   std::mutex lock_;
-  std::vector<Request> waiting_;
+  Request waiting_;
 };

@@ -19,6 +19,17 @@ delete_private (GObject *object)
   G_OBJECT_CLASS (g_type_class_peek_parent (G_OBJECT_GET_CLASS (object)))->finalize (object);
 }
 
+/** Adds the templates of the pads "sink" and "src". */
+inline void
+add_always_pads (GstElementClass *element_class, const char *sink_caps, const char *src_caps)
+{
+  GstStaticPadTemplate templates[] = {
+      GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (sink_caps)),
+      GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (src_caps))};
+  for (GstStaticPadTemplate &one : templates)
+    gst_element_class_add_static_pad_template (element_class, &one);
+}
+
 /** A copy of an element's settings. Any thread, without the lock held. */
 template <typename Private>
 auto

@@ -132,11 +132,6 @@ struct _GstRoiExtract {
   GstRoiExtractPrivate *priv;
 };
 
-static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
-    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
-static GstStaticPadTemplate src_template =
-    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
-
 G_DEFINE_TYPE (GstRoiExtract, gst_roi_extract, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (roiextract, "roiextract", GST_RANK_NONE, GST_TYPE_ROI_EXTRACT)
 
@@ -668,8 +663,7 @@ gst_roi_extract_class_init (GstRoiExtractClass *klass)
       G_TYPE_FROM_CLASS (klass), GSignalFlags (G_SIGNAL_RUN_LAST | G_SIGNAL_ACTION),
       G_CALLBACK (gst_roi_extract_capture_background), nullptr, nullptr, nullptr, G_TYPE_NONE, 0);
 
-  gst_element_class_add_static_pad_template (element_class, &sink_template);
-  gst_element_class_add_static_pad_template (element_class, &src_template);
+  add_always_pads (element_class, GST_RANGE_CAPS, GST_RANGE_CAPS);
   gst_element_class_set_static_metadata (element_class, "Region of interest extractor",
       "Filter/Effect/Video",
       "Removes the background of range images by depth and colour and crops them to the rest",

@@ -86,15 +86,6 @@ struct _GstRtpNeighbourCodeDepay {
   GstRtpNeighbourCodeDepayPrivate *priv;
 };
 
-static GstStaticPadTemplate sink_template =
-    GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
-        GST_STATIC_CAPS ("application/x-rtp, media = (string) video, "
-                         "clock-rate = (int) 90000, encoding-name = (string) X-NEIGHBOUR-CODE"));
-static GstStaticPadTemplate src_template =
-    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
-        GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-            ", version = (int) 4, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS));
-
 G_DEFINE_TYPE (GstRtpNeighbourCodeDepay, gst_rtp_neighbour_code_depay, GST_TYPE_RTP_BASE_DEPAYLOAD)
 GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodedepay, "rtpneighbourcodedepay", GST_RANK_SECONDARY,
     gst_rtp_neighbour_code_depay_get_type ())
@@ -464,8 +455,11 @@ gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
       "unmarked, without-rig, lost-packets, bytes",
       "unit-stats");
 
-  gst_element_class_add_static_pad_template (element_class, &sink_template);
-  gst_element_class_add_static_pad_template (element_class, &src_template);
+  add_always_pads (element_class,
+      "application/x-rtp, media = (string) video, "
+      "clock-rate = (int) 90000, encoding-name = (string) X-NEIGHBOUR-CODE",
+      GST_NEIGHBOUR_CODE_MEDIA_TYPE
+      ", version = (int) 4, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS);
   gst_element_class_set_static_metadata (element_class, "RTP neighbour code depayloader",
       "Codec/Depayloader/Network/RTP", "Extracts neighbour-coded frame sets from RTP packets",
       "gst-rangecast");

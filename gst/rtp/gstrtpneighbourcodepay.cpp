@@ -73,14 +73,6 @@ struct _GstRtpNeighbourCodePay {
   GstRtpNeighbourCodePayPrivate *priv;
 };
 
-static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
-    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
-static GstStaticPadTemplate src_template =
-    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS,
-        GST_STATIC_CAPS ("application/x-rtp, media = (string) video, "
-                         "payload = (int) [ 96, 127 ], clock-rate = (int) 90000, "
-                         "encoding-name = (string) X-NEIGHBOUR-CODE"));
-
 G_DEFINE_TYPE (GstRtpNeighbourCodePay, gst_rtp_neighbour_code_pay, GST_TYPE_RTP_BASE_PAYLOAD)
 GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodepay, "rtpneighbourcodepay", GST_RANK_SECONDARY,
     gst_rtp_neighbour_code_pay_get_type ())
@@ -393,8 +385,10 @@ gst_rtp_neighbour_code_pay_class_init (GstRtpNeighbourCodePayClass *klass)
   object_class->finalize = delete_private<GstRtpNeighbourCodePay>;
   install_properties<GstRtpNeighbourCodePay, pay_properties> (object_class);
 
-  gst_element_class_add_static_pad_template (element_class, &sink_template);
-  gst_element_class_add_static_pad_template (element_class, &src_template);
+  add_always_pads (element_class, GST_NEIGHBOUR_CODE_CAPS,
+      "application/x-rtp, media = (string) video, "
+      "payload = (int) [ 96, 127 ], clock-rate = (int) 90000, "
+      "encoding-name = (string) X-NEIGHBOUR-CODE");
   gst_element_class_set_static_metadata (element_class, "RTP neighbour code payloader",
       "Codec/Payloader/Network/RTP", "Packs neighbour-coded frame sets into RTP packets",
       "gst-rangecast");

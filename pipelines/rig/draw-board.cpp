@@ -7,9 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <rangecast/calibration/board.hpp>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -21,19 +19,13 @@ using rangecast::BoardSpec;
 constexpr int kSquarePx = 256;
 
 /* @return whether the whole text is a number */
+template <typename Number>
 bool
-read_number (const std::string &text, double &value)
-{
-  char *end = nullptr;
-  value = std::strtod (text.c_str (), &end);
-  return !text.empty () && *end == 0 && std::isfinite (value);
-}
-
-bool
-read_number (const std::string &text, int &value)
+read_number (const std::string &text, Number &value)
 {
   const auto [end, error] = std::from_chars (text.data (), text.data () + text.size (), value);
-  return error == std::errc () && end == text.data () + text.size ();
+  return error == std::errc () && end == text.data () + text.size () &&
+         std::isfinite (double (value));
 }
 
 /* @return what is wrong with the value, or nullptr */
@@ -67,14 +59,11 @@ set (BoardSpec &board, const std::string &name, const std::string &value)
 bool
 read_properties (const std::vector<std::string> &words, BoardSpec &board)
 {
-  std::set<std::string> names;
   for (const std::string &word : words) {
     const std::size_t equals = word.find ('=');
-    const std::string name = word.substr (0, equals);
-    const char *wrong = "is not NAME=VALUE; see --help";
-    if (equals != std::string::npos)
-      wrong = names.insert (name).second ? set (board, name, word.substr (equals + 1))
-                                         : "is given twice";
+    const char *const wrong = equals == std::string::npos
+                                  ? "is not NAME=VALUE; see --help"
+                                  : set (board, word.substr (0, equals), word.substr (equals + 1));
     if (wrong) {
       std::fprintf (stderr, "draw-board: '%s': %s\n", word.c_str (), wrong);
       return false;

@@ -154,11 +154,6 @@ const Key kKeys[] = {
     {"period", true, [] (Viewer &v) { step (v, true); }},
 };
 
-struct KeyPress {
-  Viewer *viewer;
-  std::string name;
-};
-
 /* @return nullptr if the key is not ours; digits have no entry of their own */
 const Key *
 find_key (const Viewer &viewer, std::string_view name)
@@ -171,17 +166,14 @@ find_key (const Viewer &viewer, std::string_view name)
   return key == std::end (kKeys) ? nullptr : key;
 }
 
-gboolean
-act_on_key (gpointer user_data)
+void
+act_on_key (Viewer &viewer, const std::string &name)
 {
-  auto press = static_cast<KeyPress *> (user_data);
-  Viewer &viewer = *press->viewer;
-  if (const Key *key = find_key (viewer, press->name); key->act)
+  if (const Key *key = find_key (viewer, name); key->act)
     key->act (viewer);
   else
-    switch_view (viewer, guint (press->name[0] - '0'));
+    switch_view (viewer, guint (name[0] - '0'));
   viewer.playback->redraw_if_paused ();
-  return G_SOURCE_REMOVE;
 }
 
 /* ---- events, any thread ---- */
@@ -196,8 +188,7 @@ handle_event (Viewer &viewer, GstEvent *event)
       !gst_navigation_event_parse_key_event (event, &name) || !name || !find_key (viewer, name))
     return false;
   if (type == GST_NAVIGATION_EVENT_KEY_PRESS)
-    g_idle_add_full (G_PRIORITY_DEFAULT, act_on_key, new KeyPress{&viewer, name},
-        [] (gpointer press) { delete static_cast<KeyPress *> (press); });
+    in_main_loop ([&viewer, key = std::string (name)] { act_on_key (viewer, key); });
   return true;
 }
 

@@ -42,43 +42,24 @@ set_picture_size (Viewer &viewer, int width, int height)
   gst_caps_unref (caps);
 }
 
-struct Reshape {
-  Viewer *viewer;
-  int width, height; /* pixels */
-};
-
-gboolean
-follow_window (gpointer user_data)
-{
-  auto reshape = static_cast<Reshape *> (user_data);
-  set_picture_size (*reshape->viewer, reshape->width, reshape->height);
-  reshape->viewer->playback->redraw_if_paused ();
-  return G_SOURCE_REMOVE;
-}
-
 /* Renders at the window's size instead of scaling. */
 gboolean
 on_reshape (GstElement *, gpointer, guint width, guint height, gpointer user_data)
 {
   auto &viewer = *static_cast<Viewer *> (user_data);
   if (viewer.seen_frames && std::min (width, height) >= 16)
-    g_idle_add_full (G_PRIORITY_DEFAULT, follow_window,
-        new Reshape{&viewer, int (width), int (height)},
-        [] (gpointer reshape) { delete static_cast<Reshape *> (reshape); });
+    in_main_loop ([&viewer, width, height] {
+      set_picture_size (viewer, int (width), int (height));
+      viewer.playback->redraw_if_paused ();
+    });
   return FALSE; /* glimagesink reshapes, too */
-}
-
-gboolean
-redraw_if_paused (gpointer user_data)
-{
-  static_cast<Viewer *> (user_data)->playback->redraw_if_paused ();
-  return G_SOURCE_REMOVE;
 }
 
 void
 on_view_changed (GObject *, GParamSpec *, gpointer user_data)
 {
-  g_idle_add (redraw_if_paused, user_data);
+  in_main_loop (
+      [viewer = static_cast<Viewer *> (user_data)] { viewer->playback->redraw_if_paused (); });
 }
 
 GstElement *

@@ -5,9 +5,11 @@
 #include <gst/gst.h>
 
 #include <atomic>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "playback.hpp"
 
@@ -38,6 +40,16 @@ struct Viewer {
   std::mutex lock;                /* guards the frame set */
   GstSample *frame_set = nullptr; /* the last one drawn */
 };
+
+/** Calls it in the main thread, soon. Any thread. */
+inline void
+in_main_loop (std::function<void ()> call)
+{
+  using Call = std::function<void ()>;
+  g_idle_add_full (
+      G_PRIORITY_DEFAULT, [] (gpointer made) { return (*static_cast<Call *> (made)) (), FALSE; },
+      new Call (std::move (call)), [] (gpointer made) { delete static_cast<Call *> (made); });
+}
 
 /** Reports an error and quits the main loop. Main thread. */
 void fail (Viewer &viewer, const std::string &text);
