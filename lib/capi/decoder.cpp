@@ -2,7 +2,6 @@
 #include "decoder.hpp"
 
 #include <algorithm>
-#include <cstring>
 
 using rangecast::kAccessUnitHeaderSize;
 using rangecast::kNoTime;
@@ -35,10 +34,20 @@ limit_exceeded (const rangecast::Rig &rig)
 } // namespace
 
 RangecastResult
-RangecastDecoder::fail (std::string_view message)
+RangecastDecoder::fail (std::string_view message, RangecastResult result)
 {
   message_ = message;
-  return RANGECAST_ERROR;
+  return result;
+}
+
+void
+RangecastDecoder::drop_frame_set ()
+{
+  pending_.clear ();
+  images_.clear ();
+  const std::uint64_t number = frame_set_.number;
+  frame_set_ = {};
+  frame_set_.number = number;
 }
 
 void
@@ -49,11 +58,7 @@ RangecastDecoder::reset ()
   has_rig_ = false;
   refusal_.clear ();
   decoder_ = {};
-  pending_.clear ();
-  images_.clear ();
-  const std::uint64_t number = frame_set_.number;
-  frame_set_ = {};
-  frame_set_.number = number;
+  drop_frame_set ();
   has_stream_ = false;
   stream_ = {};
 }
@@ -91,6 +96,7 @@ RangecastDecoder::use_rig ()
   used_generation_ = collector_.generation ();
   refusal_ = limit_exceeded (collector_.info ().rig);
   images_.clear ();
+  frame_set_.n_views = 0;
   has_rig_ = refusal_.empty ();
   if (!has_rig_)
     return false;
@@ -136,25 +142,20 @@ RangecastDecoder::decode (std::uint64_t time)
   if (pending_.empty ())
     return RANGECAST_NOTHING;
   rangecast::DecoderResult result;
+  frame_set_.number++; /* images change even where memory runs out */
   decoder_.plan (pending_, result, false);
   Status status;
   const bool fits = make_images ();
   if (fits)
     status = decoder_.decode (images_, threads_, result);
-  frame_set_ = {0, static_cast<std::uint32_t> (images_.size ()), frame_set_.number + 1, time,
+  frame_set_ = {0, static_cast<std::uint32_t> (images_.size ()), frame_set_.number, time,
       images_.empty () ? 0 : images_[0].capture_time_ns, pending_.size (), result.points,
-      result.slices, result.bad_slices, result.missing_pixels, result.unknown_pixels, 0};
+      result.slices, result.bad_slices, result.missing_pixels, result.unknown_pixels};
   pending_.clear ();
   if (!fits)
     return fail ("A frame set has more than " + std::to_string (rangecast::kMaxDecoderPixels) +
                  " pixels, the limit.");
   return status.ok () ? RANGECAST_OK : fail (status.message ());
-}
-
-RangecastResult
-RangecastDecoder::next ()
-{
-  return has_stream_ ? next_of_stream () : decode (RANGECAST_NO_TIME);
 }
 
 /* ---- byte streams ---- */
@@ -164,6 +165,7 @@ RangecastDecoder::Stream::skip (std::size_t n)
 {
   begin += n;
   at += n;
+  wanted = 0;
 }
 
 /* Reads until the buffer has `wanted` bytes, or the file ends. */
@@ -252,21 +254,25 @@ RangecastDecoder::next_of_stream ()
 {
   Stream &s = stream_;
   while (true) {
-    const StreamPart part = rangecast::next_part (s.bytes (), s.end () >= s.size);
-    if (part.wanted) {
+    const bool at_end = s.end () >= s.size;
+    if (!at_end && s.bytes ().size () < s.wanted) {
       if (!s.read)
         return RANGECAST_NOTHING;
-      if (!s.fill (part.wanted))
-        return fail ("The recording can no longer be read.");
-      continue;
+      if (!s.fill (s.wanted))
+        return fail ("The recording can no longer be read.", RANGECAST_FATAL);
     }
+    const StreamPart part = rangecast::next_part (s.bytes (), s.end () >= s.size);
+    s.wanted = part.wanted;
+    if (part.wanted)
+      continue;
     if (part.expected)
       s.ending = "The recording is cut off: its last frame set has " +
                  std::to_string (part.length + part.garbage) + " of " +
                  std::to_string (part.expected) + " bytes.";
-    if (part.length) {
+    if (part.expected && s.any_frame_set) {
+      s.skip (part.length + part.garbage); /* it has a part of the person only */
+    } else if (part.length) {
       const RangecastResult result = decode_part (part);
-      frame_set_.is_truncated = part.expected != 0;
       s.skip (part.length);
       if (result != RANGECAST_NOTHING)
         return result;
@@ -279,12 +285,12 @@ RangecastDecoder::next_of_stream ()
       s.garbage += s.any_access_unit ? 0 : part.garbage;
       s.skip (part.garbage);
       if (s.garbage > kMaxLeadingGarbage)
-        return fail (missing_data ());
+        return fail (missing_data (), RANGECAST_FATAL);
     } else if (s.any_frame_set) {
       message_ = s.ending;
       return RANGECAST_END;
     } else {
-      return fail (missing_data ());
+      return fail (missing_data (), RANGECAST_FATAL);
     }
   }
 }
@@ -301,7 +307,7 @@ RangecastDecoder::seek (std::uint64_t time)
     return RANGECAST_NOTHING;
   stream_.at = place->offset;
   stream_.buffer.clear ();
-  stream_.begin = 0;
+  stream_.begin = stream_.wanted = 0;
   stream_.ending.clear ();
   discontinuity ();
   return RANGECAST_OK;
@@ -319,7 +325,7 @@ RangecastDecoder::stream () const
       info.fps_n > 0 ? std::uint64_t{1'000'000'000} * static_cast<std::uint64_t> (info.fps_d) /
                            static_cast<std::uint64_t> (info.fps_n)
                      : 0,
-      timed ? stream_.last_ns - stream_.first_ns : RANGECAST_NO_TIME, stream_.at};
+      timed ? stream_.last_ns - stream_.first_ns : RANGECAST_NO_TIME};
 }
 
 std::span<const rangecast::BlendPlanes>

@@ -28,7 +28,7 @@ inline constexpr std::uint64_t kMaxDecoderPixels = std::uint64_t{kMaxRigPixels};
 
 } // namespace rangecast
 
-/** @name of rangecast.h; fields that do not change while a stream goes on come first @{ */
+/** See rangecast.h. */
 struct RangecastDecoder {
 public:
   using Bytes = std::span<const std::uint8_t>;
@@ -40,11 +40,13 @@ public:
   RangecastResult open (std::uint64_t size, RangecastRead read, void *user_data);
   void discontinuity () { decoder_.reset_references (); }
   void reset ();
-  RangecastResult next ();
+  RangecastResult next () { return has_stream_ ? next_of_stream () : decode (RANGECAST_NO_TIME); }
   RangecastResult seek (std::uint64_t time);
 
-  /** Keeps a sentence. @return RANGECAST_ERROR */
-  RangecastResult fail (std::string_view message);
+  /** Keeps a sentence. @return the result */
+  RangecastResult fail (std::string_view message, RangecastResult result = RANGECAST_ERROR);
+  /** Also the units that were pushed for the next one. */
+  void drop_frame_set ();
   [[nodiscard]] const std::string &message () const { return message_; }
 
   /** nullptr: none was complete, or it is too large. */
@@ -70,7 +72,7 @@ private:
     std::uint64_t size = UINT64_MAX; /* bytes; of pushed ones known at the end */
     std::uint64_t at = 0;            /* offset of what `buffer` holds from `begin` on */
     std::vector<std::uint8_t> buffer;
-    std::size_t begin = 0, garbage = 0;
+    std::size_t begin = 0, garbage = 0, wanted = 0; /* as next_part() says */
     bool any_access_unit = false, any_frame_set = false;
     std::uint64_t first_ns = rangecast::kNoTime, last_ns = rangecast::kNoTime;
     std::string ending;  /* how it is cut off; empty: it is not */
@@ -109,4 +111,3 @@ private:
   bool has_stream_ = false;
   Stream stream_;
 };
-/** @} */

@@ -27,6 +27,7 @@ guarded (RangecastDecoder *decoder, const Call &call)
   try {
     return call ();
   } catch (...) {
+    decoder->drop_frame_set ();
     try {
       return decoder->fail ("Out of memory.");
     } catch (...) {
@@ -125,8 +126,8 @@ MeshWriter::add_triangle (std::uint32_t a, std::uint32_t b, std::uint32_t c)
 {
   if (indices_ && n_indices_ + 3 <= max_indices_) {
     indices_[n_indices_] = a;
-    indices_[n_indices_ + 1] = b;
-    indices_[n_indices_ + 2] = c;
+    indices_[n_indices_ + 1] = layout_.flags & RANGECAST_CLOCKWISE ? c : b;
+    indices_[n_indices_ + 2] = layout_.flags & RANGECAST_CLOCKWISE ? b : c;
   }
   n_indices_ += 3;
 }
@@ -168,10 +169,12 @@ MeshWriter::add (const RangeImage &image, const View &view, const BlendPlanes &p
   }
 }
 
+/* Fields that are added later must count as absent in a struct of the first version's size. */
 bool
 is_valid (const RangecastLayout *layout)
 {
-  if (!layout || layout->struct_size < sizeof *layout)
+  constexpr std::uint32_t kFirstSize = 32;
+  if (!layout || layout->struct_size < kFirstSize)
     return false;
   const auto fits = [layout] (std::int32_t offset, std::int32_t size) {
     return offset < 0 || (size <= std::int64_t{layout->stride} - offset);
@@ -288,7 +291,7 @@ rangecast_decoder_get_view (const RangecastDecoder *decoder, uint32_t index, Ran
     return decoder ? RANGECAST_NOTHING : RANGECAST_ERROR;
   const RangeImage &image = decoder->images ()[index];
   return give ({0, image.view_id, image.roi.x, image.roi.y, image.roi.width, image.roi.height,
-                   image.depth.data, &image.colour.data->r},
+                   image.depth.data, reinterpret_cast<const std::uint8_t *> (image.colour.data)},
       view);
 }
 
@@ -297,6 +300,10 @@ rangecast_decoder_get_triangles (RangecastDecoder *decoder, const RangecastLayou
     void *vertices, size_t max_vertices, size_t *n_vertices, uint32_t *indices, size_t max_indices,
     size_t *n_indices)
 {
+  if (n_vertices)
+    *n_vertices = 0;
+  if (n_indices)
+    *n_indices = 0;
   return guarded (decoder, [&] {
     if (decoder->images ().empty ())
       return RANGECAST_NOTHING;

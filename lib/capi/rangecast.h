@@ -18,7 +18,8 @@
  * waits, and nothing throws.
  *
  * Versions: callers set struct_size of each struct to its sizeof; a newer library fills no more
- * than that. Functions and fields are added, never changed, within librangecast-1.0.
+ * than that, and leaves the rest as it is. Functions and fields are added, never changed, within
+ * librangecast-1.0.
  *
  * Coordinates are those of the rig: right-handed, y up, metres. Times are nanoseconds.
  */
@@ -46,8 +47,10 @@ typedef struct RangecastDecoder RangecastDecoder;
 typedef enum RangecastResult {
   RANGECAST_OK = 0,
   RANGECAST_NOTHING = 1, /**< no frame set yet, or nothing to return; no error */
-  RANGECAST_END = 2,     /**< of the input; the message says if it is cut off */
-  RANGECAST_ERROR = 3,   /**< the message says why; the decoder can be used further */
+  RANGECAST_END = 2,     /**< of the input; the message says if it is cut off, or is empty */
+  RANGECAST_ERROR = 3,   /**< this frame set or call failed, later ones may not; the message says
+                              why, but for a struct_size that is missing */
+  RANGECAST_FATAL = 4,   /**< the input cannot be decoded; the message says why */
 } RangecastResult;
 
 /** Reads up to @a size bytes at @a offset.
@@ -59,8 +62,7 @@ typedef struct RangecastStream {
   uint32_t struct_size;
   uint32_t n_cameras;    /**< of the rig; 0: it has not arrived yet */
   uint64_t frame_period; /**< 0: unknown */
-  uint64_t duration;     /**< from first to last frame set, after rangecast_decoder_open() */
-  uint64_t position;     /**< bytes of a byte stream or file that were decoded or skipped */
+  uint64_t duration;     /**< from first to last frame set; of a file, once one was decoded */
 } RangecastStream;
 
 /** A camera of the rig: a pinhole camera without distortion. A point in its frame (x right, y down,
@@ -89,7 +91,6 @@ typedef struct RangecastFrameSet {
   uint64_t n_missing;    /**< pixels in slices that did not arrive */
   uint64_t n_unknown;    /**< pixels that refer to a frame set that did not arrive: request a
                               key frame set from the sender */
-  uint32_t is_truncated; /**< the input ends within this frame set */
 } RangecastFrameSet;
 
 /** A range image of the last frame set: the part of a camera's image that holds the person. */
@@ -102,9 +103,10 @@ typedef struct RangecastView {
 } RangecastView;
 
 typedef enum RangecastFlags {
-  RANGECAST_LEFT_HANDED = 1, /**< z is negated, as in Unity; triangles are clockwise then */
-  RANGECAST_Z_UP = 2,        /**< (x, y, z) becomes (x, -z, y), as in Blender; with both flags
+  RANGECAST_LEFT_HANDED = 1, /**< z is negated, as in Unity */
+  RANGECAST_Z_UP = 2,        /**< (x, y, z) becomes (x, -z, y), as in Blender; with LEFT_HANDED
                                   (x, z, y) */
+  RANGECAST_CLOCKWISE = 4,   /**< of triangles seen from outside, as in Unity and Godot */
 } RangecastFlags;
 
 /** Where the attributes of a vertex go; bytes from its beginning, -1: it has none. */
@@ -123,7 +125,7 @@ typedef struct RangecastLayout {
 /** @param n_threads  that decode; 0: the number of cores. @return NULL without memory */
 RANGECAST_API RangecastDecoder *rangecast_decoder_new (uint32_t n_threads);
 RANGECAST_API void rangecast_decoder_free (RangecastDecoder *decoder);
-/** A sentence about the last RANGECAST_ERROR or RANGECAST_END; UTF-8, valid until the next call. */
+/** A sentence about the last END, ERROR or FATAL; UTF-8, valid until the next call. */
 RANGECAST_API const char *rangecast_decoder_get_message (const RangecastDecoder *decoder);
 
 /** @name Input @{ */
@@ -133,7 +135,8 @@ RANGECAST_API const char *rangecast_decoder_get_message (const RangecastDecoder 
  *  set. */
 RANGECAST_API RangecastResult rangecast_decoder_push_units (
     RangecastDecoder *decoder, const void *bytes, size_t size);
-/** Adds bytes of a byte stream, such as the buffers of video/x-neighbour-code or a .rcnc file.
+/** Adds bytes of a byte stream, such as buffers of video/x-neighbour-code with
+ * alignment=access-unit or a .rcnc file.
  *  @param size  0: the stream ends here */
 RANGECAST_API RangecastResult rangecast_decoder_push_bytes (
     RangecastDecoder *decoder, const void *bytes, size_t size);
@@ -151,7 +154,7 @@ RANGECAST_API void rangecast_decoder_reset (RangecastDecoder *decoder);
 RANGECAST_API RangecastResult rangecast_decoder_next (RangecastDecoder *decoder);
 /** Goes to the last key frame set of a file that is not later than a time.
  *  @param time  since the first frame set
- *  @return RANGECAST_NOTHING, and stays, if the file has no times */
+ *  @return RANGECAST_NOTHING, and stays, before the first frame set and in files without times */
 RANGECAST_API RangecastResult rangecast_decoder_seek (RangecastDecoder *decoder, uint64_t time);
 
 /** @name Output
@@ -166,12 +169,12 @@ RANGECAST_API RangecastResult rangecast_decoder_get_frame_set (
 RANGECAST_API RangecastResult rangecast_decoder_get_view (
     const RangecastDecoder *decoder, uint32_t index, RangecastView *view);
 /** Writes the vertices and triangles of all views of the last frame set: a vertex for each valid
- *  pixel, triangles between pixels of one surface, counter-clockwise from outside. The surfaces of
- *  several cameras overlap.
+ *  pixel, triangles between pixels of one surface, counter-clockwise seen from outside. The
+ * surfaces of several cameras overlap.
  *  @param vertices      NULL: none are wanted; n_points of them always suffice
  *  @param[out] n_vertices  NULL, or how many there are
  *  @param indices       NULL: none are wanted (points); 6 x n_points of them always suffice
- *  @param[out] n_indices   NULL, or how many there are
+ *  @param[out] n_indices   NULL, or how many there are; 0 without `indices`
  *  @return RANGECAST_ERROR if an array is too small; it is then partly written */
 RANGECAST_API RangecastResult rangecast_decoder_get_triangles (RangecastDecoder *decoder,
     const RangecastLayout *layout, void *vertices, size_t max_vertices, size_t *n_vertices,

@@ -65,9 +65,10 @@ main (int argc, char **argv)
   size_t n_vertices, n_indices;
   struct vertex *vertices = calloc (frame_set.n_points, sizeof *vertices);
   uint32_t *indices = calloc (frame_set.n_points, 6 * sizeof *indices);
-  rangecast_decoder_get_triangles (decoder, &layout, vertices, frame_set.n_points, &n_vertices,
-      indices, 6 * frame_set.n_points, &n_indices);
-  if (write_ply (argv[2], vertices, n_vertices, indices, n_indices) != 0)
+  if (rangecast_decoder_get_triangles (decoder, &layout, vertices, frame_set.n_points, &n_vertices,
+          indices, 6 * frame_set.n_points, &n_indices) == RANGECAST_ERROR)
+    fprintf (stderr, "%s: %s\n", argv[1], rangecast_decoder_get_message (decoder));
+  else if (write_ply (argv[2], vertices, n_vertices, indices, n_indices) != 0)
     perror (argv[2]);
   free (vertices);
   free (indices);

@@ -22,6 +22,11 @@ test_application_builds_against_the_installed_library () {
     $(pkg-config --define-variable="prefix=$prefix" --cflags --libs gstrange-1.0) \
     $(pkg-config --cflags --libs gstreamer-app-1.0) "-Wl,-rpath,$(dirname "$(find "$prefix" -name 'libgstrange-1.0.so')")"
   expect_error "usage" ./count-points
+  # shellcheck disable=SC2046
+  cc "$pipelines/examples/points.c" -o points $(pkg-config --define-variable="prefix=$prefix" --cflags --libs rangecast-1.0) \
+    "-Wl,-rpath,$(dirname "$(find "$prefix" -name 'librangecast-1.0.so')")"
+  ./points "$pipelines/examples/head.rcnc" head.ply
+  grep -q "^element vertex [1-9]" head.ply || fail "$(head -3 head.ply)"
 }
 
 test_python_reads_frame_sets_with_the_installed_library () {
@@ -46,6 +51,8 @@ test_library_exports_what_its_headers_declare () {
   grep -oh 'gst_[a-z_]* (' "$prefix"/include/gst-rangecast-1.0/gstrange/*.h | tr -d ' (' | grep -v 'get_type$\|get_info$' | sort -u >declared.txt
   ! grep -v '^gst_\(range_\|buffer_[a-z_]*range_meta\)' exported.txt || fail "exported, too: $(cat exported.txt)"
   grep -v 'get_type$\|get_info$' exported.txt | diff - declared.txt || fail "exported and declared symbols differ"
+  nm -D --defined-only "$(find "$prefix" -name 'librangecast-1.0.so')" | awk '{ print $3 }' | grep -v '^rangecast_run_workers$' | sort >exported.txt
+  grep -oh 'rangecast_[a-z_]* (' "$prefix"/include/rangecast-1.0/rangecast.h | tr -d ' (' | sort -u | diff exported.txt - || fail "exported and declared symbols differ"
 }
 
 test_elements_are_found_where_they_were_installed () {
