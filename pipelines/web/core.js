@@ -9,15 +9,15 @@ const FIELDS = {
 };
 // Structs of rangecast.h without struct_size; u and i: 32 bits, U: 64, d: double.
 const STRUCTS = {
-  stream: { cameras: 'u', framePeriod: 'U', duration: 'U', position: 'U' },
-  frame_set: { views: 'u', number: 'U', time: 'U', captureTime: 'U', bytes: 'U', points: 'U', slices: 'U', badSlices: 'U', missingPixels: 'U', unknownPixels: 'U', truncated: 'u' },
+  stream: { cameras: 'u', framePeriod: 'U', duration: 'U' },
+  frame_set: { views: 'u', number: 'U', time: 'U', captureTime: 'U', bytes: 'U', points: 'U', slices: 'U', badSlices: 'U', missingPixels: 'U', unknownPixels: 'U' },
   view: { id: 'i', x: 'i', y: 'i', width: 'i', height: 'i', depth: 'u', colour: 'u' },
   camera: { id: 'i', width: 'i', height: 'i', fx: 'd', fy: 'd', cx: 'd', cy: 'd' },
 };
 const NO_TIME = 2n ** 64n - 1n;
 const milliseconds = (ns) => ns === Number (NO_TIME) ? -1 : ns / 1e6;
 
-export const DONE = 0, NOTHING = 1, END = 2, FAILED = 3; // RangecastResult
+export const DONE = 0, NOTHING = 1, END = 2, FAILED = 3, FATAL = 4; // RangecastResult
 
 // What an instance threw: a trap or a refused allocation. The instance was made anew and knows nothing of the stream.
 export class CoreFailure extends Error {}
@@ -110,13 +110,13 @@ export class Core {
     if (this.input (new Uint8Array (state)))
       this.call ('rc_camera_scene', state.byteLength);
   }
-  // kind: 'units' of an access unit, or 'bytes' of a byte stream
-  push (kind, bytes) {
+  // Units of an access unit.
+  pushUnits (bytes) {
     if (this.input (bytes))
-      this.call (`rangecast_decoder_push_${kind}`, this.decoder, this.call ('rc_input', bytes.length), bytes.length);
+      this.call ('rangecast_decoder_push_units', this.decoder, this.call ('rc_input', bytes.length), bytes.length);
   }
   next () { return this.call ('rangecast_decoder_next', this.decoder); }
-  seek (ms) { return this.call ('rangecast_decoder_seek', this.decoder, BigInt (Math.round (Math.max (0, ms) * 1e6))); }
+  seek (ms) { return this.call ('rangecast_decoder_seek', this.decoder, BigInt (Math.round (Math.min (Math.max (0, ms), 1e12) * 1e6))); }
   discontinuity () { this.call ('rangecast_decoder_discontinuity', this.decoder); }
   reset () { this.call ('rangecast_decoder_reset', this.decoder); }
   message () { return this.text (this.call ('rangecast_decoder_get_message', this.decoder)); }

@@ -108,10 +108,20 @@ class Stage {
     this.post ({ type: 'opened' });
     source.start (paused, time);
   }
+  close () {
+    this.wanted = null;
+    this.source?.close ();
+    this.source = null;
+  }
   points () {
-    const file = this.core.ply ();
-    if (!file)
-      this.say (this.core.message (), 'note');
+    let file = null;
+    try {
+      file = this.core.ply ();
+      if (!file)
+        this.say (this.core.message (), 'note');
+    } catch (error) {
+      this.say (error.message);
+    }
     postMessage ({ type: 'points', file: file?.buffer });
   }
 }
@@ -125,7 +135,13 @@ onmessage = ({ data }) => {
     shown: () => stage.shown (),
     again: () => stage.again (),
     toggle: () => stage.source?.toggle?.(),
-    seek: () => stage.source?.seek?.(data.time),
+    play: () => stage.source?.play?.(),
+    pause: () => stage.source?.pause?.(),
+    seek: () => {
+      stage.source?.seek?.(data.time);
+      stage.post ({ type: 'sought' });
+    },
+    close: () => stage.close (),
     points: () => stage.points (),
     hold: () => stage.source?.hold?.(data),
   };

@@ -63,7 +63,7 @@ export class LiveSource {
       outcome = this.stage.decode (() => {
         if (frameSet.discontinuity)
           core.discontinuity ();
-        core.push ('units', frameSet.units);
+        core.pushUnits (frameSet.units);
         return core.next ();
       });
     } catch (error) { // a new instance of the core has no rig

@@ -11,9 +11,10 @@ const view = document.createElement ('rangecast-view');
 const report = document.body.dataset;
 let server = null; // address of the stream
 
-for (const name of ['azimuth', 'elevation', 'renderer', 'stats', 'transparent'])
+for (const name of ['azimuth', 'elevation', 'renderer', 'transparent'])
   if (parameters.has (name))
     view.setAttribute (name, parameters.get (name));
+view.toggleAttribute ('show-stats', parameters.has ('stats'));
 view.toggleAttribute ('controls', !parameters.has ('transparent'));
 if (parameters.get ('fit') === '0')
   view.setAttribute ('fit', 'false');

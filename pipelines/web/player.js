@@ -26,6 +26,8 @@ export class Player extends EventTarget {
     this.duration = NaN; // seconds
     this.time = 0; // ms
     this.seekingTo = null;
+    this.takePoints = []; // for each savePoints () that waits
+    this.plays = false; // what the last event said
     this.loading = false; // nothing was shown yet of what was opened last
     this.worker = new Worker (new URL ('./decoder.js', import.meta.url), { type: 'module' });
     this.worker.onmessage = ({ data }) => this[data.type] (data);
@@ -47,20 +49,21 @@ export class Player extends EventTarget {
     this.live = typeof source === 'string' && /^wss?:/.test (source);
     this.post (this.live ? { type: 'open', live: { url: source, token } } : { type: 'open', recording: source, paused, time: 1000 * time });
   }
+  // Ends the stream or recording; the last frame stays.
+  stop () {
+    this.post ({ type: 'close' });
+    this.setState ('empty');
+  }
   toggle () { this.post ({ type: 'toggle' }); }
-  play () {
-    if (this.paused)
-      this.toggle ();
-  }
-  pause () {
-    if (this.state === 'playing')
-      this.toggle ();
-  }
+  play () { this.post ({ type: 'play' }); }
+  pause () { this.post ({ type: 'pause' }); }
   get paused () { return this.state === 'paused'; }
   get ended () { return this.paused && this.atEnd; }
   get seeking () { return this.seekingTo !== null; }
   get currentTime () { return this.time / 1000; }
   set currentTime (seconds) {
+    if (!Number.isFinite (seconds))
+      throw new TypeError (`currentTime takes a finite number of seconds, not ${seconds}`);
     this.seekingTo = 1000 * seconds;
     this.emit ('seeking');
     this.post ({ type: 'seek', time: this.seekingTo });
@@ -68,7 +71,7 @@ export class Player extends EventTarget {
   // Asks for the points of the current frame set. Resolves to a PLY file (ArrayBuffer), undefined if there are none
   savePoints () {
     this.post ({ type: 'points' });
-    return new Promise ((resolve) => { this.takePoints = resolve; });
+    return new Promise ((resolve) => this.takePoints.push (resolve));
   }
   // In answer to a click: plays the sound, or no longer.
   toggleSound () {
@@ -83,6 +86,7 @@ export class Player extends EventTarget {
   again () { this.post ({ type: 'again' }); }
   close () {
     this.worker.terminate ();
+    this.takePoints.splice (0).forEach ((take) => take ());
     if (this.speech.isOn)
       this.speech.stop ();
   }
@@ -95,10 +99,10 @@ export class Player extends EventTarget {
     if (state === before)
       return;
     this.emit ('statechange');
-    if (state === 'playing' || (state === 'receiving' && before !== 'waiting'))
-      this.emit ('play');
-    else if (state === 'paused')
-      this.emit ('pause');
+    const plays = state === 'playing' || state === 'receiving' || (state === 'waiting' && this.plays);
+    if (plays !== this.plays && (plays || state === 'paused'))
+      this.emit (plays ? 'play' : 'pause');
+    this.plays = plays;
     if (this.ended || state === 'ended')
       this.emit ('ended');
   }
@@ -117,9 +121,10 @@ export class Player extends EventTarget {
     this.atEnd = ended;
     this.setState (playing ? 'playing' : 'paused');
     this.emit ('timeupdate');
-    if (this.seeking)
-      this.emit ('seeked');
+  }
+  sought () {
     this.seekingTo = null;
+    this.emit ('seeked');
   }
   say ({ text, kind = 'error' }) {
     this.emit ('message', { text, kind });
@@ -135,11 +140,12 @@ export class Player extends EventTarget {
     this.audio = available;
     this.emit ('audiochange');
   }
-  points ({ file }) { this.takePoints?.(file); }
+  points ({ file }) { this.takePoints.shift ()?.(file); }
   // What was asked for last is shown from now on.
   opened () {
     this.loading = true;
     this.time = 0;
+    this.duration = NaN;
     if (this.speech.isOn)
       this.speech.stop ();
     this.sound ({ available: false }); // until there is some

@@ -1,43 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-import type { Mesh } from 'three';
-
-/** Address of a stream (ws:, wss:) or of a recording, or a recording. */
-export type Source = string | File;
-export interface OpenOptions {
-  token?: string;
-  /** Where a recording begins, seconds. */
-  time?: number;
-  paused?: boolean;
-}
-/** Of a recording: playing, paused; of a stream the others. */
-export type State = 'empty' | 'playing' | 'paused' | 'connecting' | 'waiting' | 'receiving' | 'ended' | 'closed' | 'token';
-export interface Message {
-  text: string;
-  kind: 'error' | 'note';
-}
-
-/** Plays without drawing. Events: loadedmetadata, play, pause, timeupdate, seeking, seeked, ended, error, frame, message, statechange, audiochange. */
-export class Player extends EventTarget {
-  readonly ready: Promise<WebAssembly.Module>;
-  readonly state: State;
-  readonly live: boolean;
-  /** Whether the stream has sound. */
-  readonly audio: boolean;
-  /** Seconds; NaN: unknown, Infinity: live. */
-  readonly duration: number;
-  readonly paused: boolean;
-  readonly ended: boolean;
-  readonly seeking: boolean;
-  currentTime: number;
-  open (source: Source, options?: OpenOptions): Promise<void>;
-  play (): void;
-  pause (): void;
-  /** In answer to a click. */
-  toggleSound (): void;
-  /** The points of the current frame set as a PLY file. */
-  savePoints (): Promise<ArrayBuffer | undefined>;
-  close (): void;
-}
+import type { OpenOptions, Player, Source, State } from './player.js';
 
 export interface Orbit {
   /** Degrees. */
@@ -93,12 +55,4 @@ declare global {
   interface HTMLElementTagNameMap {
     'rangecast-view': RangecastView;
   }
-}
-
-/** gst-rangecast/three.js: an object of a WebGLRenderer's scene. */
-export class RangecastObject extends Mesh {
-  constructor (source?: Source, options?: OpenOptions & { lit?: boolean });
-  readonly player: Player;
-  open (source: Source, options?: OpenOptions): void;
-  dispose (): void;
 }

@@ -50,7 +50,7 @@ export class RecordingSource {
 
   open () {
     this.stage.core.call ('rc_open', this.size);
-    this.atEnd = this.failed = this.saidDamage = this.shown = false;
+    this.atEnd = this.failed = this.saidDamage = false;
     this.time = 0;
     this.last = { pts: 0, shift: 0 }; // of the last frame set
   }
@@ -64,9 +64,7 @@ export class RecordingSource {
     const { core } = this.stage;
     let outcome;
     try {
-      do
-        outcome = this.stage.decode (() => core.next ());
-      while (outcome === DONE && core.frame ().truncated && this.shown); // it has a part of the person
+      outcome = this.stage.decode (() => core.next ());
     } catch (error) { // a new instance of the core has lost the stream
       this.failed = true;
       this.stage.say (error.message);
@@ -77,10 +75,9 @@ export class RecordingSource {
       if (badSlices > 0 && !this.saidDamage)
         this.stage.say (`The recording is damaged: ${badSlices} slices of a frame set cannot be decoded.`, 'note');
       this.saidDamage ||= badSlices > 0;
-      this.shown = true;
       this.time = pts >= 0 ? this.timeOf (pts) : this.time + (this.frameDuration () || 40);
-      this.stage.decoded (this.playing ? this.dueOf (this.time) : performance.timeOrigin + performance.now (), !this.playing);
       this.reportPosition ();
+      this.stage.decoded (this.playing ? this.dueOf (this.time) : performance.timeOrigin + performance.now (), !this.playing);
       return true;
     }
     this.atEnd = outcome === END;
@@ -116,7 +113,7 @@ export class RecordingSource {
   }
 
   play () {
-    if (this.failed)
+    if (this.failed || this.playing)
       return;
     if (this.atEnd) {
       this.open ();
@@ -142,6 +139,10 @@ export class RecordingSource {
     }, Math.max (0, wait));
   }
 
+  pause () {
+    if (this.playing)
+      this.stop ();
+  }
   toggle () {
     if (this.playing)
       this.stop ();

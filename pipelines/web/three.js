@@ -6,7 +6,8 @@ import { Core } from './core.js';
 import { Player } from './player.js';
 import { WebGlRenderer } from './renderer.js';
 
-const VERTEX = 'void main () { gl_Position = vec4 (position.xy, 0.0, 1.0); }';
+// Nothing but here knows of a triangle: whatever else draws the mesh, draws a point.
+const VERTEX = 'void main () { gl_Position = vec4 (float (gl_VertexID & 1) * 4.0 - 1.0, float (gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }';
 // Outlines are drawn over what lies half a pixel beside them, whose depth is that of the nearest pixel next to them.
 const FRAGMENT = `
 uniform sampler2D u_colours, u_depths;
@@ -48,7 +49,8 @@ void main ()
     light += RECIPROCAL_PI * max (dot (normal, directionalLights[i].direction), 0.0) * directionalLights[i].color;
   #endif
 #endif
-  gl_FragColor = vec4 (sRGBTransferEOTF (vec4 (colour.rgb, 1.0)).rgb * light, colour.a * opacity);
+  vec3 linear = mix (colour.rgb / 12.92, pow ((colour.rgb + 0.055) / 1.055, vec3 (2.4)), vec3 (greaterThan (colour.rgb, vec3 (0.04045))));
+  gl_FragColor = vec4 (linear * light, colour.a * opacity);
   #include <tonemapping_fragment>
   #include <colorspace_fragment>
 }`;
@@ -57,7 +59,7 @@ export class RangecastObject extends Mesh {
   // source, options: as Player.open (); lit: by ambient and directional lights of the scene. Messages and errors are events of `player`, whose
   // 'frame' says that there is something new to render.
   constructor (source, { lit = false, ...options } = {}) {
-    const geometry = new BufferGeometry ().setAttribute ('position', new BufferAttribute (new Float32Array ([-1, -1, 0, 3, -1, 0, -1, 3, 0]), 3));
+    const geometry = new BufferGeometry ().setAttribute ('position', new BufferAttribute (new Float32Array (9), 3));
     super (geometry, new ShaderMaterial ({ vertexShader: VERTEX, fragmentShader: FRAGMENT, transparent: true, lights: lit, toneMapped: false, defines: lit ? { LIT: 1 } : {},
       uniforms: { ...UniformsUtils.clone (UniformsLib.lights), u_colours: { value: new Texture () }, u_depths: { value: new Texture () }, u_part: { value: new Vector4 () },
         u_origin: { value: [0, 0] }, u_size: { value: [1, 1] }, u_view_from_clip: { value: new Matrix4 () }, opacity: { value: 1 } } }));
@@ -67,6 +69,8 @@ export class RangecastObject extends Mesh {
     this.player = new Player ();
     this.player.addEventListener ('frame', ({ detail }) => { this.pending = detail; });
     this.player.ready.then ((module) => {
+      if (this.disposed)
+        return;
       this.core = new Core (module);
       // From above, so that no view counts as one behind the person, which would be reduced.
       this.player.setView ({ ...this.core.record ('rc_orbit'), elevation: 90, aspect: 1, fit: false });
@@ -74,14 +78,23 @@ export class RangecastObject extends Mesh {
     if (source)
       this.open (source, options);
   }
-  open (source, options) { this.player.open (source, options).catch (() => {}); }
+  open (source, options) {
+    this.failed = false;
+    this.player.open (source, options).catch (() => {});
+  }
   raycast () {}
 
   onBeforeRender (renderer, scene, camera) {
     const gl = renderer.getContext (), { uniforms } = this.material;
     uniforms.u_part.value.set (0, 0, 0, 0);
-    if (!this.core || renderer.state.buffers.depth.getReversed?.() || this.failed)
+    if (!this.core || this.failed)
       return;
+    if (renderer.state.buffers.depth.getReversed?.()) {
+      this.failed = true;
+      return this.player.say ({ text: 'RangecastObject does not support reversedDepthBuffer.' });
+    }
+    if (this.painter?.gl !== gl)
+      this.begin (renderer);
     const target = [renderer.getRenderTarget (), renderer.getActiveCubeFace (), renderer.getActiveMipmapLevel ()];
     const [viewport, scissor] = [gl.VIEWPORT, gl.SCISSOR_BOX].map ((name) => new Vector4 ().fromArray (gl.getParameter (name)));
     const scissored = gl.isEnabled (gl.SCISSOR_TEST);
@@ -99,14 +112,18 @@ export class RangecastObject extends Mesh {
     renderer.state.scissor (scissor);
     renderer.state.setScissorTest (scissored);
   }
+  // With the first picture, and after the context was lost.
+  begin (renderer) {
+    this.painter = new WebGlRenderer (null, this.core, true, renderer.getContext ());
+    this.player.again ();
+    renderer.domElement.addEventListener ('webglcontextrestored', () => { this.painter = null; }, { once: true });
+  }
   paint (gl, camera, { x, y, z: width, w: height }, uniforms) {
     for (const test of [gl.BLEND, gl.CULL_FACE, gl.STENCIL_TEST, gl.POLYGON_OFFSET_FILL, gl.SAMPLE_ALPHA_TO_COVERAGE, gl.SCISSOR_TEST])
       gl.disable (test);
     gl.colorMask (true, true, true, true);
     gl.depthMask (true);
     gl.clearDepth (1);
-    if (this.painter?.gl !== gl)
-      this.painter = new WebGlRenderer (null, this.core, true, gl);
     const frame = this.pending;
     if (frame) {
       this.pending = null;
@@ -126,6 +143,7 @@ export class RangecastObject extends Mesh {
   }
 
   dispose () {
+    this.disposed = true;
     this.player.close ();
     this.painter?.dispose ();
     this.geometry.dispose ();

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // <rangecast-view>: a live person or a recording in 3D, with the camera in the viewer's hands. Attributes (docs/guide/embed.md):
 //   src (ws: or wss: of a stream, or a recording), token, autoplay=false, controls, azimuth, elevation (degrees), distance (m), fit=false,
-//   renderer (webgl or software), transparent, stats
-// Properties, methods and events are those of Player, and picture (), savePicture (), home (), orbit; the event framesetchange follows each
-// frame set that was drawn.
+//   renderer (webgl or software), transparent, show-stats
+// The event framesetchange follows each frame set that was drawn; `player` is the Player.
 import { Core } from './core.js';
 import { Player } from './player.js';
 import { followPointers } from './pointers.js';
@@ -63,49 +62,61 @@ const save = (blob, name) => {
 const timeText = (seconds) => `${Math.floor (seconds / 60)}:${(seconds % 60).toFixed (1).padStart (4, '0')}`;
 
 export class RangecastView extends HTMLElement {
-  static observedAttributes = ['src', 'token', 'azimuth', 'elevation', 'distance', 'stats'];
+  static observedAttributes = ['src', 'token', 'azimuth', 'elevation', 'distance', 'show-stats'];
 
   constructor () {
     super ();
     this.attachShadow ({ mode: 'open' }).adoptedStyleSheets = [style];
     this.addEventListener ('keydown', (event) => this.key (event));
+    this.wantedOrbit = {}; // until there is a camera
+    this.loading = null; // what a load () asked for that has not begun yet: [source, options]
   }
   element (id) { return this.shadowRoot.getElementById (id); }
 
   // ---- in and out of the document ----
 
   async connectedCallback () {
+    for (const name of ['src', 'token', 'orbit'])
+      if (Object.hasOwn (this, name)) { // set before the element was defined
+        const value = this[name];
+        delete this[name];
+        this[name] = value;
+      }
     this.shadowRoot.innerHTML = CONTENT;
     this.canvas = this.element ('picture');
     this.pending = null; // the newest frame set, not uploaded yet
     this.scale = 1; // of the resolution of moving pictures
     this.wanted = this.painting = false; // another picture; one is under way
     this.resting = false; // the next one is to have all pixels
+    this.postedView = ''; // what the player was told last
     const player = this.player = new Player ();
-    this.meter = new Stats (this.element ('stats'), this.hasAttribute ('stats'), (latency) => player.speech.follow (latency));
+    this.meter = new Stats (this.element ('stats'), this.hasAttribute ('show-stats'), (latency) => player.speech.follow (latency));
     this.follow (player);
+    const asked = this.loading ?? []; // before it was in the document
+    this.loading = null;
+    this.load (...asked);
     const module = await player.ready.catch (() => null);
     if (!module || this.player !== player)
       return;
     this.camera = new Core (module);
     this.renderer = makeRenderer (this.canvas, this.camera, this.hasAttribute ('transparent'), this.getAttribute ('renderer') ?? undefined);
     this.setOrbit ();
+    this.orbit = this.wantedOrbit;
     this.watch ();
     this.draw ();
-    if (this.src)
-      this.load ();
   }
   disconnectedCallback () {
     this.player.close ();
+    this.wantedOrbit = this.orbit;
     this.observer?.disconnect ();
     this.renderer?.close ();
     clearTimeout (this.rest);
     this.player = this.camera = this.renderer = null;
   }
   attributeChangedCallback (name, before, value) {
-    if (!this.camera || before === value)
+    if (!this.player || before === value)
       return;
-    if (name === 'stats')
+    if (name === 'show-stats')
       this.element ('stats').hidden = value === null;
     else if (name === 'src' || name === 'token')
       this.load ();
@@ -118,27 +129,55 @@ export class RangecastView extends HTMLElement {
   get src () { return this.getAttribute ('src') ?? ''; }
   set src (address) { this.setAttribute ('src', address); }
   get token () { return this.getAttribute ('token') ?? undefined; }
-  set token (token) { this.setAttribute ('token', token); }
+  set token (token) {
+    if (token === undefined || token === null)
+      this.removeAttribute ('token');
+    else
+      this.setAttribute ('token', token);
+  }
   get state () { return this.player?.state ?? 'empty'; }
   get paused () { return this.player?.paused ?? true; }
   get ended () { return this.player?.ended ?? false; }
   get seeking () { return this.player?.seeking ?? false; }
   get duration () { return this.player?.duration ?? NaN; }
   get currentTime () { return this.player?.currentTime ?? 0; }
-  set currentTime (seconds) { this.player.currentTime = seconds; }
-  play () { this.player.play (); }
-  pause () { this.player.pause (); }
-  // Shows src, or a File; options: see Player.open ()
-  load (source = this.src && new URL (this.src, document.baseURI).href, options = {}) {
-    if (source)
-      this.player.open (source, { token: this.token, paused: this.getAttribute ('autoplay') === 'false', ...options }).catch (() => {});
+  set currentTime (seconds) {
+    if (this.player)
+      this.player.currentTime = seconds;
+  }
+  play () { this.player?.play (); }
+  pause () { this.player?.pause (); }
+  // Shows src, an address or a File, soon: the last call counts. Without any, the stream ends. options: see Player.open ()
+  load (source = this.src, options = {}) {
+    if (!this.loading)
+      queueMicrotask (() => this.openLoading ());
+    this.loading = [source, options];
+  }
+  openLoading () {
+    const { player } = this;
+    if (!player || !this.loading) // once it is in the document
+      return;
+    const [source, options] = this.loading;
+    this.loading = null;
+    if (!source)
+      return player.state !== 'empty' && player.stop ();
+    try {
+      const address = typeof source === 'string' ? new URL (source, document.baseURI).href : source;
+      player.open (address, { token: this.token, paused: this.getAttribute ('autoplay') === 'false', ...options }).catch (() => {});
+    } catch {
+      this.report (`'${source}' is no address.`);
+    }
   }
 
   // ---- of the picture ----
 
   // { azimuth, elevation (degrees), distance (m, 0: default), fieldOfView (degrees, 0: default), panX, panY, panZ (m) }; any of them may be set
-  get orbit () { return this.camera.record ('rc_orbit'); }
+  get orbit () { return this.camera?.record ('rc_orbit') ?? this.wantedOrbit; }
   set orbit (values) {
+    if (!this.camera) {
+      this.wantedOrbit = { ...this.wantedOrbit, ...values };
+      return;
+    }
     const o = { ...this.orbit, ...values };
     this.move ('rc_set_orbit', o.azimuth, o.elevation, o.distance, o.fieldOfView, o.panX, o.panY, o.panZ);
   }
@@ -152,7 +191,9 @@ export class RangecastView extends HTMLElement {
   // Of the last second: see Stats
   get stats () { return this.meter?.last; }
   // Resolves to a PNG with all pixels (Blob).
-  picture () {
+  async picture () {
+    if (!this.renderer)
+      return null;
     this.setSize (1);
     this.shown (this.paint (), performance.now ());
     return new Promise ((resolve) => this.canvas.toBlob (resolve));
@@ -208,7 +249,7 @@ export class RangecastView extends HTMLElement {
     place.hidden = text === '';
   }
   // What the renderer says.
-  report (text) { this.player.say ({ text }); }
+  report (text) { this.player?.say ({ text }); }
 
   // ---- drawing ----
 
@@ -222,7 +263,7 @@ export class RangecastView extends HTMLElement {
   // The next picture has to wait until this one has been drawn, so that it is of the newest frame set.
   async drawNext () {
     const { renderer } = this;
-    if (!renderer)
+    if (!renderer) // it has left the document
       return;
     clearTimeout (this.rest);
     const whole = this.resting, scale = whole ? 1 : this.scale;
@@ -232,7 +273,7 @@ export class RangecastView extends HTMLElement {
       this.setSize (scale);
       const frame = this.paint ();
       await renderer.finished ();
-      if (this.renderer !== renderer) // it has left the document
+      if (this.renderer !== renderer)
         return;
       const time = performance.now () - begin, factor = time > SLOW ? 0.8 : time < FAST ? 1.1 : 1;
       if (!whole)
@@ -301,7 +342,7 @@ export class RangecastView extends HTMLElement {
   // ---- from the user ----
 
   move (name, ...args) {
-    this.camera.call (name, ...args);
+    this.camera?.call (name, ...args);
     this.draw ();
   }
   key (event) {
@@ -327,10 +368,12 @@ export class RangecastView extends HTMLElement {
     followPointers (canvas, (name, ...args) => this.move (name, ...args));
     canvas.addEventListener ('webglcontextlost', (event) => {
       event.preventDefault ();
-      if (this.renderer)
+      if (canvas === this.canvas && this.renderer)
         this.report ('The browser has reset WebGL; rendering resumes when it is restored.');
     });
     canvas.addEventListener ('webglcontextrestored', () => {
+      if (canvas !== this.canvas || !this.renderer)
+        return;
       this.renderer.start ();
       this.report ('');
       this.postedView = '';

@@ -26,7 +26,7 @@ before (async () => {
     if (!fs.existsSync (file))
       return response.writeHead (404).end ();
     response.writeHead (200, { 'Content-Type': TYPES[path.extname (file)] ?? 'application/octet-stream',
-      'Content-Security-Policy': "default-src 'self'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; img-src 'self' blob:" });
+      'Content-Security-Policy': "default-src 'self'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; img-src 'self' blob:; connect-src 'self'" });
     fs.createReadStream (file).pipe (response);
   });
   await new Promise ((resolve) => server.listen (0, '127.0.0.1', resolve));
@@ -70,6 +70,9 @@ test ('two elements on a page play, seek and leave the document by themselves', 
   assert.ok (await page.evaluate (() => Math.abs (window.a.currentTime - 1) < 0.1));
   assert.equal (await page.evaluate (() => window.b.orbit.azimuth), 90);
   assert.equal (await page.evaluate (() => { window.b.orbit = { elevation: 20 }; return window.b.orbit.elevation; }), 20);
+  assert.ok (await page.evaluate (() => { try { window.a.currentTime = Infinity; } catch (error) { return error instanceof TypeError; } return false; }));
+  await page.evaluate (() => { window.a.play (); window.a.play (); });
+  await page.waitForFunction (() => !window.a.paused);
   assert.ok (await page.evaluate (async () => (await window.b.picture ()).size) > 1000);
   await screenshot (page, 'embed-two.png');
   await page.evaluate (() => { window.seen = []; document.body.append (window.b); window.a.remove (); }); // b comes anew
@@ -145,7 +148,7 @@ test ('three.js draws the person among other things as we do', async () => {
       gl.readPixels (gl.drawingBufferWidth / 2, gl.drawingBufferHeight / 2, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
       results.push (pixel[1] === 255 && pixel[0] === 0);
     }
-    // Two eyes, as of WebXR; and lit.
+    // Two eyes, as of WebXR.
     const eyes = new THREE.ArrayCamera ([0, 1].map ((eye) => {
       const one = camera.clone ();
       one.viewport = new THREE.Vector4 (eye * 320, 0, 320, 480);
@@ -164,6 +167,27 @@ test ('three.js draws the person among other things as we do', async () => {
     return results;
   });
   assert.deepEqual (colours, [true, false, true, 0, 0]);
+  // Lit by a red light, and again after the context was lost.
+  const reds = await page.evaluate (async () => {
+    const { THREE, renderer, camera } = window, gl = renderer.getContext (), dark = new THREE.Scene (), { RangecastObject } = await import ('/three.js');
+    dark.add (new THREE.DirectionalLight (0xff0000, 3), new RangecastObject (new URL ('scene.rcnc', location).href, { lit: true }));
+    dark.children[0].position.set (0, 0, 1);
+    const red = async () => {
+      for (const pixel = new Uint8Array (4); ; await new Promise (requestAnimationFrame)) {
+        renderer.render (dark, camera);
+        gl.readPixels (gl.drawingBufferWidth / 2, gl.drawingBufferHeight / 2, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+        if (pixel[0] > 20)
+          return [...pixel.subarray (1, 3)];
+      }
+    };
+    const first = await red (), restored = new Promise ((resolve) => renderer.domElement.addEventListener ('webglcontextrestored', resolve));
+    renderer.forceContextLoss ();
+    await new Promise ((resolve) => setTimeout (resolve, 100));
+    renderer.forceContextRestore ();
+    await restored;
+    return [...first, ...await red ()];
+  });
+  assert.deepEqual (reds, [0, 0, 0, 0]);
   assert.deepEqual (errors, []);
   await page.close ();
 });
