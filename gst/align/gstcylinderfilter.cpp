@@ -81,13 +81,7 @@ struct GstCylinderFilterPrivate {
   rangecast::Rig rig; /* of core; no views: none */
 };
 
-G_DECLARE_FINAL_TYPE (
-    GstCylinderFilter, gst_cylinder_filter, GST, CYLINDER_FILTER, GstBaseTransform)
-
-struct _GstCylinderFilter {
-  GstBaseTransform parent;
-  GstCylinderFilterPrivate *priv;
-};
+DECLARE_ELEMENT (GstCylinderFilter, gst_cylinder_filter, CYLINDER_FILTER, GstBaseTransform)
 
 G_DEFINE_TYPE (GstCylinderFilter, gst_cylinder_filter, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (

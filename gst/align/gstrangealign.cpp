@@ -80,12 +80,7 @@ struct GstRangeAlignPrivate {
   guint64 skipped = 0;      /* views that a warning was posted for, a bit each */
 };
 
-G_DECLARE_FINAL_TYPE (GstRangeAlign, gst_range_align, GST, RANGE_ALIGN, GstBaseTransform)
-
-struct _GstRangeAlign {
-  GstBaseTransform parent;
-  GstRangeAlignPrivate *priv;
-};
+DECLARE_ELEMENT (GstRangeAlign, gst_range_align, RANGE_ALIGN, GstBaseTransform)
 
 G_DEFINE_TYPE (GstRangeAlign, gst_range_align, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (rangealign, "rangealign", GST_RANK_NONE, gst_range_align_get_type ())

@@ -90,12 +90,7 @@ struct GstRigCalibratePrivate {
   TileLayout layout; /* of the output caps */
 };
 
-G_DECLARE_FINAL_TYPE (GstRigCalibrate, gst_rig_calibrate, GST, RIG_CALIBRATE, GstAggregator)
-
-struct _GstRigCalibrate {
-  GstAggregator parent;
-  GstRigCalibratePrivate *priv;
-};
+DECLARE_ELEMENT (GstRigCalibrate, gst_rig_calibrate, RIG_CALIBRATE, GstAggregator)
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink_%u", GST_PAD_SINK,
     GST_PAD_REQUEST, GST_STATIC_CAPS (GST_VIDEO_CAPS_MAKE (GST_VIDEO_FORMATS_ALL)));

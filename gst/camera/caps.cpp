@@ -65,19 +65,12 @@ formats_of (const CameraAbilities &camera)
   return text.empty () ? "none" : text;
 }
 
-/* Cameras with equal lists are named together. */
 std::string
 list_of (std::span<const CameraAbilities> cameras, std::span<const std::string> labels)
 {
-  std::string text, who;
-  for (std::size_t i = 0; i < cameras.size (); i++) {
-    who += (who.empty () ? "" : " and ") + labels[i];
-    const std::string formats = formats_of (cameras[i]);
-    if (i + 1 < cameras.size () && formats == formats_of (cameras[i + 1]))
-      continue;
-    text += (text.empty () ? "" : "; ") + who + ": " + formats;
-    who.clear ();
-  }
+  std::string text;
+  for (std::size_t i = 0; i < cameras.size (); i++)
+    text += (text.empty () ? "" : "; ") + labels[i] + ": " + formats_of (cameras[i]);
   return text;
 }
 

@@ -58,12 +58,7 @@ struct GstStereoCamSrcPrivate {
   }
 };
 
-G_DECLARE_FINAL_TYPE (GstStereoCamSrc, gst_stereo_cam_src, GST, STEREO_CAM_SRC, GstElement)
-
-struct _GstStereoCamSrc {
-  GstElement parent;
-  GstStereoCamSrcPrivate *priv;
-};
+DECLARE_ELEMENT (GstStereoCamSrc, gst_stereo_cam_src, STEREO_CAM_SRC, GstElement)
 
 #define CAMERA_CAPS                                                                                \
   "video/x-raw, format = (string) { GRAY8, RGB, BGR }, width = (int) [ 1, max ], height = (int) "  \

@@ -92,13 +92,7 @@ struct GstNeighbourCodeDecPrivate {
   bool complete = false;      /* its last slice has come */
 };
 
-G_DECLARE_FINAL_TYPE (
-    GstNeighbourCodeDec, gst_neighbour_code_dec, GST, NEIGHBOUR_CODE_DEC, GstBaseTransform)
-
-struct _GstNeighbourCodeDec {
-  GstBaseTransform parent;
-  GstNeighbourCodeDecPrivate *priv;
-};
+DECLARE_ELEMENT (GstNeighbourCodeDec, gst_neighbour_code_dec, NEIGHBOUR_CODE_DEC, GstBaseTransform)
 
 G_DEFINE_TYPE (GstNeighbourCodeDec, gst_neighbour_code_dec, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (

@@ -81,13 +81,7 @@ struct GstNeighbourCodeEncPrivate {
   std::span<const guint8> slice;   /* by_slices: the next slice; empty before the first */
 };
 
-G_DECLARE_FINAL_TYPE (
-    GstNeighbourCodeEnc, gst_neighbour_code_enc, GST, NEIGHBOUR_CODE_ENC, GstBaseTransform)
-
-struct _GstNeighbourCodeEnc {
-  GstBaseTransform parent;
-  GstNeighbourCodeEncPrivate *priv;
-};
+DECLARE_ELEMENT (GstNeighbourCodeEnc, gst_neighbour_code_enc, NEIGHBOUR_CODE_ENC, GstBaseTransform)
 
 G_DEFINE_TYPE (GstNeighbourCodeEnc, gst_neighbour_code_enc, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (

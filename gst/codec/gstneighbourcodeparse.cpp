@@ -74,13 +74,8 @@ struct GstNeighbourCodeParsePrivate {
   Stream stream;
 };
 
-G_DECLARE_FINAL_TYPE (
-    GstNeighbourCodeParse, gst_neighbour_code_parse, GST, NEIGHBOUR_CODE_PARSE, GstBaseParse)
-
-struct _GstNeighbourCodeParse {
-  GstBaseParse parent;
-  GstNeighbourCodeParsePrivate *priv;
-};
+DECLARE_ELEMENT (
+    GstNeighbourCodeParse, gst_neighbour_code_parse, NEIGHBOUR_CODE_PARSE, GstBaseParse)
 
 #define STREAM_CAPS GST_NEIGHBOUR_CODE_STREAM_CAPS
 #define ACCESS_UNIT_CAPS                                                                           \

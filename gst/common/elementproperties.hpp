@@ -10,6 +10,14 @@
 /* set_property, get_property and the installation of properties for elements that have the usual
  * three kinds: settings in a table, `stats` and `stats-interval`. */
 
+/** Declares the type of an element, and its struct, whose state is in `priv`. */
+#define DECLARE_ELEMENT(Name, name, MODULE, Parent)                                                \
+  G_DECLARE_FINAL_TYPE (Name, name, GST, MODULE, Parent)                                           \
+  struct _##Name {                                                                                 \
+    Parent parent;                                                                                 \
+    struct Name##Private *priv;                                                                    \
+  };
+
 /** finalize() of an element whose `priv` was made by new and is all that it owns. */
 template <typename Element>
 void

@@ -38,12 +38,7 @@ struct GstPlyEncPrivate {
   guint64 frames = 0; /* since start or flush */
 };
 
-G_DECLARE_FINAL_TYPE (GstPlyEnc, gst_ply_enc, GST, PLY_ENC, GstBaseTransform)
-
-struct _GstPlyEnc {
-  GstBaseTransform parent;
-  GstPlyEncPrivate *priv;
-};
+DECLARE_ELEMENT (GstPlyEnc, gst_ply_enc, PLY_ENC, GstBaseTransform)
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));

@@ -97,12 +97,7 @@ struct GstRangeSplitPrivate {
   ~GstRangeSplitPrivate () { gst_flow_combiner_free (combiner); }
 };
 
-G_DECLARE_FINAL_TYPE (GstRangeSplit, gst_range_split, GST, RANGE_SPLIT, GstElement)
-
-struct _GstRangeSplit {
-  GstElement parent;
-  GstRangeSplitPrivate *priv;
-};
+DECLARE_ELEMENT (GstRangeSplit, gst_range_split, RANGE_SPLIT, GstElement)
 
 #define DEPTH_CAPS GST_VIDEO_CAPS_MAKE ("{ GRAY16_LE, GRAY16_BE, GRAY8, RGBx }")
 #define COLOUR_CAPS GST_VIDEO_CAPS_MAKE ("RGBx")

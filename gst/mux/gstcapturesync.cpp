@@ -100,12 +100,7 @@ struct GstCaptureSyncPrivate {
   }
 };
 
-G_DECLARE_FINAL_TYPE (GstCaptureSync, gst_capture_sync, GST, CAPTURE_SYNC, GstElement)
-
-struct _GstCaptureSync {
-  GstElement parent;
-  GstCaptureSyncPrivate *priv;
-};
+DECLARE_ELEMENT (GstCaptureSync, gst_capture_sync, CAPTURE_SYNC, GstElement)
 
 static GstStaticPadTemplate sink_template =
     GST_STATIC_PAD_TEMPLATE ("sink_%u", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS_ANY);

@@ -77,12 +77,7 @@ struct GstRangeDemuxPrivate {
   ~GstRangeDemuxPrivate () { gst_flow_combiner_free (combiner); }
 };
 
-G_DECLARE_FINAL_TYPE (GstRangeDemux, gst_range_demux, GST, RANGE_DEMUX, GstElement)
-
-struct _GstRangeDemux {
-  GstElement parent;
-  GstRangeDemuxPrivate *priv;
-};
+DECLARE_ELEMENT (GstRangeDemux, gst_range_demux, RANGE_DEMUX, GstElement)
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (FRAME_SET_CAPS));

@@ -106,12 +106,7 @@ struct GstRangeMuxPrivate {
   GstClockTime frame_duration = GST_CLOCK_TIME_NONE;
 };
 
-G_DECLARE_FINAL_TYPE (GstRangeMux, gst_range_mux, GST, RANGE_MUX, GstAggregator)
-
-struct _GstRangeMux {
-  GstAggregator parent;
-  GstRangeMuxPrivate *priv;
-};
+DECLARE_ELEMENT (GstRangeMux, gst_range_mux, RANGE_MUX, GstAggregator)
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink_%u", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS (FRAME_SET_CAPS));

@@ -12,7 +12,7 @@
 #include <mutex>
 #include <rangecast/surface/view_fit.hpp>
 
-#include "common/statsreporter.hpp"
+#include "common/elementproperties.hpp"
 #include "opengl.hpp"
 #include "picture.hpp"
 #include "settings.hpp"
@@ -67,12 +67,7 @@ struct GstStripRenderPrivate {
   bool discont = true; /* there is no picture right before the next one */
 };
 
-G_DECLARE_FINAL_TYPE (GstStripRender, gst_strip_render, GST, STRIP_RENDER, GstAggregator)
-
-struct _GstStripRender {
-  GstAggregator parent;
-  GstStripRenderPrivate *priv;
-};
+DECLARE_ELEMENT (GstStripRender, gst_strip_render, STRIP_RENDER, GstAggregator)
 
 /** @name scheduling.cpp: which frame set is drawn when. On the aggregator's thread @{ */
 GstFlowReturn gst_strip_render_aggregate (GstAggregator *aggregator, gboolean timeout);

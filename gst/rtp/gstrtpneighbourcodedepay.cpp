@@ -78,13 +78,8 @@ struct GstRtpNeighbourCodeDepayPrivate {
   GstClockTime pts = GST_CLOCK_TIME_NONE, capture_time = GST_CLOCK_TIME_NONE;
 };
 
-G_DECLARE_FINAL_TYPE (GstRtpNeighbourCodeDepay, gst_rtp_neighbour_code_depay, GST,
-    RTP_NEIGHBOUR_CODE_DEPAY, GstRTPBaseDepayload)
-
-struct _GstRtpNeighbourCodeDepay {
-  GstRTPBaseDepayload parent;
-  GstRtpNeighbourCodeDepayPrivate *priv;
-};
+DECLARE_ELEMENT (GstRtpNeighbourCodeDepay, gst_rtp_neighbour_code_depay, RTP_NEIGHBOUR_CODE_DEPAY,
+    GstRTPBaseDepayload)
 
 G_DEFINE_TYPE (GstRtpNeighbourCodeDepay, gst_rtp_neighbour_code_depay, GST_TYPE_RTP_BASE_DEPAYLOAD)
 GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodedepay, "rtpneighbourcodedepay", GST_RANK_SECONDARY,

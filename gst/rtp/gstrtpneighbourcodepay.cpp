@@ -65,13 +65,8 @@ struct GstRtpNeighbourCodePayPrivate {
   GstClockTime pts = GST_CLOCK_TIME_NONE;         /* of the last slice */
 };
 
-G_DECLARE_FINAL_TYPE (GstRtpNeighbourCodePay, gst_rtp_neighbour_code_pay, GST,
-    RTP_NEIGHBOUR_CODE_PAY, GstRTPBasePayload)
-
-struct _GstRtpNeighbourCodePay {
-  GstRTPBasePayload parent;
-  GstRtpNeighbourCodePayPrivate *priv;
-};
+DECLARE_ELEMENT (
+    GstRtpNeighbourCodePay, gst_rtp_neighbour_code_pay, RTP_NEIGHBOUR_CODE_PAY, GstRTPBasePayload)
 
 G_DEFINE_TYPE (GstRtpNeighbourCodePay, gst_rtp_neighbour_code_pay, GST_TYPE_RTP_BASE_PAYLOAD)
 GST_ELEMENT_REGISTER_DEFINE (rtpneighbourcodepay, "rtpneighbourcodepay", GST_RANK_SECONDARY,

@@ -45,12 +45,7 @@ struct GstAvatarTestSrcPrivate {
   explicit GstAvatarTestSrcPrivate (GstElement *element) : stream (element) {}
 };
 
-G_DECLARE_FINAL_TYPE (GstAvatarTestSrc, gst_avatar_test_src, GST, AVATAR_TEST_SRC, GstElement)
-
-struct _GstAvatarTestSrc {
-  GstElement parent;
-  GstAvatarTestSrcPrivate *priv;
-};
+DECLARE_ELEMENT (GstAvatarTestSrc, gst_avatar_test_src, AVATAR_TEST_SRC, GstElement)
 
 #define SIZE_CAPS                                                                                  \
   "width = (int) [ 16, 4096 ], height = (int) [ 16, 4096 ], "                                      \

@@ -60,12 +60,7 @@ struct GstRangeWebSinkPrivate {
   bool new_caps = false; /* since the last frame set */
 };
 
-G_DECLARE_FINAL_TYPE (GstRangeWebSink, gst_range_web_sink, GST, RANGE_WEB_SINK, GstBaseSink)
-
-struct _GstRangeWebSink {
-  GstBaseSink parent;
-  GstRangeWebSinkPrivate *priv;
-};
+DECLARE_ELEMENT (GstRangeWebSink, gst_range_web_sink, RANGE_WEB_SINK, GstBaseSink)
 
 static GstStaticPadTemplate sink_template =
     GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,

@@ -39,19 +39,6 @@ struct CylinderFrame {
   }
 };
 
-Status
-check (const CylinderSettings &settings)
-{
-  const auto bad = [] (const char *what) { return Status{StatusCode::kBadValue, what}; };
-  if (!(settings.slice_height_m >= 0.0002 && settings.slice_height_m <= 10))
-    return bad ("cylinder: slice height must be 0.0002 to 10 metres");
-  if (settings.columns < 8 || settings.columns > 3600)
-    return bad ("cylinder: columns must be 8 to 3600");
-  if (!(settings.overlap >= 0 && settings.overlap <= kMaxOverlap))
-    return bad ("cylinder: overlap must be 0 to 16 pixels");
-  return {};
-}
-
 } // namespace
 
 Status
@@ -197,8 +184,6 @@ CylinderFilter::process (
   result = {};
   bool began = false;
   const Status status = guarded ("cylinder", [&] () -> Status {
-    if (Status bad = check (settings); !bad.ok ())
-      return bad;
     if (Status bad = find_cameras (images); !bad.ok ())
       return bad;
     began = true;

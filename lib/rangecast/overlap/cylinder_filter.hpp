@@ -64,7 +64,7 @@ public:
 
   /** Clears depths in place. A frame set of less than two images with points is left alone.
    *  Nothing is allocated once the largest frame set has been seen.
-   *  @return kBadValue for settings out of range, kNotFound for a view that the rig has not,
+   *  @return kNotFound for a view that the rig has not,
    *  kBadSize for more than kMaxViews images, kNoSpace without memory; depth is then untouched. */
   Status process (
       std::span<const RangeImage> images, const CylinderSettings &settings, CylinderResult &result);

@@ -33,7 +33,7 @@ const core = new Core (wasm);
 const decodeAll = (frameSets) => {
   core.reset ();
   return frameSets.reduce ((done, units) => {
-    core.push ('units', units);
+    core.pushUnits (units);
     return done + (core.next () === DONE);
   }, 0);
 };

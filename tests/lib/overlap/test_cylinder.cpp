@@ -268,9 +268,6 @@ TEST (Filter, refuses_views_that_the_rig_lacks_and_settings_out_of_range)
   const Status status = filter.process (images, {}, result);
   EXPECT_EQ (status.code (), StatusCode::kNotFound);
   EXPECT_NE (status.message ().find ("view 7"), std::string::npos);
-  CylinderSettings settings;
-  settings.columns = 0;
-  EXPECT_EQ (filter.process (frame.images (), settings, result).code (), StatusCode::kBadValue);
 }
 
 /* ---- what is kept from frame to frame ---- */

@@ -94,7 +94,7 @@ CongestionControl::record_report (std::uint64_t now_ns)
 
 /* Lowers the rate after congestion. Whether loss persists then is what LossEvaluator observes. */
 void
-CongestionControl::decrease (double delivered, std::uint64_t now_ns)
+CongestionControl::decrease (double delivered)
 {
   const double wanted = kDecrease * delivered;
   const double min = rate_ > 0 ? kMaxDecrease * rate_ : 0;
@@ -130,7 +130,7 @@ CongestionControl::increase (double delivered, double elapsed_s)
 }
 
 void
-CongestionControl::evaluate_queue (std::uint64_t sent_ns, std::uint64_t now_ns)
+CongestionControl::evaluate_queue (std::uint64_t sent_ns)
 {
   if (!delays_.poll_update ())
     return;
@@ -146,12 +146,12 @@ CongestionControl::evaluate_queue (std::uint64_t sent_ns, std::uint64_t now_ns)
   const double delivered = arrivals_.delivered_bits_per_s ();
   if (delivered <= 0)
     return;
-  decrease (delivered, now_ns);
+  decrease (delivered);
   drains_ = true;
 }
 
 void
-CongestionControl::evaluate_loss (std::uint64_t now_ns)
+CongestionControl::evaluate_loss ()
 {
   if (static_cast<std::int64_t> (last_sent_ns_ - losses_since_ns_) <
       static_cast<std::int64_t> (kLossIntervalNs)) /* also where old reports come late */
@@ -171,7 +171,7 @@ CongestionControl::evaluate_loss (std::uint64_t now_ns)
   if (!congestion || delivered <= 0)
     return;
   const double before = bits_per_s ();
-  decrease (delivered, now_ns);
+  decrease (delivered);
   before_loss_ = before;
 }
 
@@ -200,9 +200,9 @@ CongestionControl::packets (std::span<const PacketReport> packets, std::uint64_t
       counted_++;
       counted_lost_ += packet.lost ? 1 : 0;
     }
-    evaluate_queue (packet.sent_ns, now_ns);
+    evaluate_queue (packet.sent_ns);
   }
-  evaluate_loss (now_ns);
+  evaluate_loss ();
   const bool waits = last_sent_ns_ < valid_sent_ns_;
   if (!decreased_ && !was_decreased && !waits && !drains_)
     increase (arrivals_.delivered_bits_per_s (), elapsed);

@@ -53,10 +53,10 @@ public:
 private:
   [[nodiscard]] double limited (double bits_per_s) const;
   void record_report (std::uint64_t now_ns);
-  void decrease (double delivered, std::uint64_t now_ns);
+  void decrease (double delivered);
   void increase (double delivered, double elapsed_s);
-  void evaluate_queue (std::uint64_t sent_ns, std::uint64_t now_ns);
-  void evaluate_loss (std::uint64_t now_ns);
+  void evaluate_queue (std::uint64_t sent_ns);
+  void evaluate_loss ();
 
   CongestionSettings settings_;
   double rate_ = 0;        /* 0: no limit known */
