@@ -88,21 +88,6 @@ gst_camera_device_create_element (GstDevice *device, const gchar *name)
   return element;
 }
 
-static gboolean
-gst_camera_device_reconfigure_element (GstDevice *device, GstElement *element)
-{
-  auto self = GST_CAMERA_DEVICE (device);
-  GstElementFactory *factory = gst_element_get_factory (element);
-  if (!factory || g_strcmp0 (GST_OBJECT_NAME (factory), self->factory) != 0)
-    return FALSE;
-  GstState state = GST_STATE_NULL;
-  gst_element_get_state (element, &state, nullptr, 0);
-  if (state > GST_STATE_READY)
-    return FALSE; // the camera is chosen when streaming starts
-  gst_structure_foreach (self->settings, set_field, element);
-  return TRUE;
-}
-
 static void
 gst_camera_device_finalize (GObject *object)
 {
@@ -124,5 +109,4 @@ gst_camera_device_class_init (GstCameraDeviceClass *klass)
   auto device_class = GST_DEVICE_CLASS (klass);
   G_OBJECT_CLASS (klass)->finalize = gst_camera_device_finalize;
   device_class->create_element = gst_camera_device_create_element;
-  device_class->reconfigure_element = gst_camera_device_reconfigure_element;
 }
