@@ -10,7 +10,7 @@ if [ -d "$rangecast_top/build/gst" ]; then
   export GST_PLUGIN_PATH="$rangecast_top/build/gst${GST_PLUGIN_PATH:+:$GST_PLUGIN_PATH}"
   export GST_REGISTRY="${GST_REGISTRY:-$rangecast_top/build/registry.bin}"
   export PATH="$rangecast_top/build/pipelines:$rangecast_top/build/tests/simulators:$PATH"
-  export LD_LIBRARY_PATH="$rangecast_top/build/lib/gstrange${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
+  export LD_LIBRARY_PATH="$rangecast_top/build/lib/gstrange:$rangecast_top/build/lib/capi${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
   export GI_TYPELIB_PATH="$rangecast_top/build/lib/gstrange${GI_TYPELIB_PATH:+:$GI_TYPELIB_PATH}"
   export PYTHONPATH="$rangecast_top/lib/gstrange/python${PYTHONPATH:+:$PYTHONPATH}"
   export PKG_CONFIG_PATH="$rangecast_top/build/meson-uninstalled${PKG_CONFIG_PATH:+:$PKG_CONFIG_PATH}"

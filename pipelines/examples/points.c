@@ -44,6 +44,7 @@ int
 main (int argc, char **argv)
 {
   FILE *file = argc == 3 ? fopen (argv[1], "rb") : NULL;
+  int status = 1;
   if (!file || fseek (file, 0, SEEK_END) != 0) {
     fprintf (stderr, "usage: points RECORDING.rcnc POINTS.ply\n");
     return 2;
@@ -68,11 +69,11 @@ main (int argc, char **argv)
   if (rangecast_decoder_get_triangles (decoder, &layout, vertices, frame_set.n_points, &n_vertices,
           indices, 6 * frame_set.n_points, &n_indices) == RANGECAST_ERROR)
     fprintf (stderr, "%s: %s\n", argv[1], rangecast_decoder_get_message (decoder));
-  else if (write_ply (argv[2], vertices, n_vertices, indices, n_indices) != 0)
+  else if ((status = write_ply (argv[2], vertices, n_vertices, indices, n_indices)) != 0)
     perror (argv[2]);
   free (vertices);
   free (indices);
   rangecast_decoder_free (decoder);
   fclose (file);
-  return 0;
+  return status;
 }

@@ -94,6 +94,7 @@ class Stage {
   async open ({ recording, live, paused, time }) {
     const source = live ? new LiveSource (this, live) : new RecordingSource (this, recording), before = this.wanted;
     this.wanted = source;
+    this.begin = { paused, time };
     const failure = recording ? await source.load () : '';
     if (this.wanted !== source)
       return;
@@ -106,7 +107,14 @@ class Stage {
     this.dropped = null;
     this.source = source;
     this.post ({ type: 'opened' });
-    source.start (paused, time);
+    source.start (this.begin.paused, this.begin.time);
+  }
+  // While a recording is loading, its beginning is changed.
+  control (name, begin, ...args) {
+    if (this.wanted !== this.source)
+      Object.assign (this.begin, begin);
+    else
+      this.source?.[name]?.(...args);
   }
   close () {
     this.wanted = null;
@@ -135,10 +143,10 @@ onmessage = ({ data }) => {
     shown: () => stage.shown (),
     again: () => stage.again (),
     toggle: () => stage.source?.toggle?.(),
-    play: () => stage.source?.play?.(),
-    pause: () => stage.source?.pause?.(),
+    play: () => stage.control ('play', { paused: false }),
+    pause: () => stage.control ('pause', { paused: true }),
     seek: () => {
-      stage.source?.seek?.(data.time);
+      stage.control ('seek', { time: data.time }, data.time);
       stage.post ({ type: 'sought' });
     },
     close: () => stage.close (),

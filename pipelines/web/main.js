@@ -31,7 +31,6 @@ view.addEventListener ('statechange', () => {
 });
 
 const openStream = (token) => view.load (server, { token });
-const openFile = (file) => view.load (file);
 element ('token').onsubmit = (event) => {
   event.preventDefault ();
   view.report ('');
@@ -41,7 +40,7 @@ element ('token').onsubmit = (event) => {
 };
 element ('file').onchange = ({ target }) => {
   if (target.files.length > 0)
-    openFile (target.files[0]);
+    view.load (target.files[0]);
   target.value = ''; // so that the same file can be chosen again
 };
 addEventListener ('keydown', (event) => event.target.matches ('input, button') || view.key (event));
@@ -54,7 +53,7 @@ addEventListener ('drop', (event) => {
   event.preventDefault ();
   document.body.classList.remove ('dropping');
   if (event.dataTransfer.files.length > 0)
-    openFile (event.dataTransfer.files[0]);
+    view.load (event.dataTransfer.files[0]);
 });
 
 document.body.prepend (view);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /** Address of a stream (ws:, wss:) or of a recording, or a recording. */
-export type Source = string | File;
+export type Source = string | Blob;
 export interface OpenOptions {
   token?: string;
   /** Where a recording begins, seconds. */
@@ -10,6 +10,7 @@ export interface OpenOptions {
 /** Of a recording: playing, paused; of a stream the others. */
 export type State = 'empty' | 'playing' | 'paused' | 'connecting' | 'waiting' | 'receiving' | 'ended' | 'closed' | 'token';
 export interface Message {
+  /** Empty: hides the one before. */
   text: string;
   kind: 'error' | 'note';
 }

@@ -27,14 +27,14 @@ export class Player extends EventTarget {
     this.time = 0; // ms
     this.seekingTo = null;
     this.takePoints = []; // for each savePoints () that waits
-    this.plays = false; // what the last event said
+    this.plays = this.stopped = false; // plays: what the last event said
     this.loading = false; // nothing was shown yet of what was opened last
     this.worker = new Worker (new URL ('./decoder.js', import.meta.url), { type: 'module' });
     this.worker.onmessage = ({ data }) => this[data.type] (data);
     this.worker.onerror = (event) => this.say ({ text: `The decoder could not be started: ${event.message ?? 'its file could not be loaded'}.` });
     this.speech = new Speech ((text, kind) => this.say ({ text, kind }), (wait) => this.post ({ type: 'hold', wait }));
     this.ready = loadModule ().then ((module) => {
-      this.post ({ type: 'start', module });
+      this.worker.postMessage ({ type: 'start', module });
       return module;
     });
     this.ready.catch ((error) => {
@@ -45,6 +45,11 @@ export class Player extends EventTarget {
 
   // source: address of a stream (ws:, wss:) or of a recording, or a File; time: s
   async open (source, { token, time = 0, paused = false } = {}) {
+    try {
+      source = typeof source === 'string' ? new URL (source, document.baseURI).href : source;
+    } catch {
+      return this.say ({ text: `'${source}' is no address.` });
+    }
     await this.ready;
     this.live = typeof source === 'string' && /^wss?:/.test (source);
     this.post (this.live ? { type: 'open', live: { url: source, token } } : { type: 'open', recording: source, paused, time: 1000 * time });
@@ -52,12 +57,13 @@ export class Player extends EventTarget {
   // Ends the stream or recording; the last frame stays.
   stop () {
     this.post ({ type: 'close' });
+    this.stopped = true;
     this.setState ('empty');
   }
   toggle () { this.post ({ type: 'toggle' }); }
   play () { this.post ({ type: 'play' }); }
   pause () { this.post ({ type: 'pause' }); }
-  get paused () { return this.state === 'paused'; }
+  get paused () { return !this.plays; }
   get ended () { return this.paused && this.atEnd; }
   get seeking () { return this.seekingTo !== null; }
   get currentTime () { return this.time / 1000; }
@@ -91,7 +97,7 @@ export class Player extends EventTarget {
       this.speech.stop ();
   }
 
-  post (message) { this.worker.postMessage (message); }
+  post (message) { this.ready.then (() => this.worker.postMessage (message), () => {}); }
   emit (type, detail) { this.dispatchEvent (new CustomEvent (type, { detail })); }
   setState (state) {
     const before = this.state;
@@ -103,7 +109,7 @@ export class Player extends EventTarget {
     if (plays !== this.plays && (plays || state === 'paused'))
       this.emit (plays ? 'play' : 'pause');
     this.plays = plays;
-    if (this.ended || state === 'ended')
+    if ((state === 'paused' && this.atEnd) || state === 'ended')
       this.emit ('ended');
   }
 
@@ -116,6 +122,8 @@ export class Player extends EventTarget {
     this.emit ('frame', frame);
   }
   position ({ time, duration, playing, ended }) {
+    if (this.stopped) // it was under way
+      return;
     this.time = time;
     this.duration = duration < 0 ? NaN : duration / 1000;
     this.atEnd = ended;
@@ -126,14 +134,15 @@ export class Player extends EventTarget {
     this.seekingTo = null;
     this.emit ('seeked');
   }
-  say ({ text, kind = 'error' }) {
+  say ({ text, kind = text ? 'error' : 'note' }) {
     this.emit ('message', { text, kind });
     if (text !== '' && kind === 'error')
       this.emit ('error', { message: text });
   }
   connection ({ state }) {
     this.duration = Infinity;
-    this.setState (state);
+    if (!this.stopped)
+      this.setState (state);
   }
   hear ({ packet }) { this.speech.add (packet); }
   sound ({ available }) {
@@ -144,6 +153,7 @@ export class Player extends EventTarget {
   // What was asked for last is shown from now on.
   opened () {
     this.loading = true;
+    this.stopped = false;
     this.time = 0;
     this.duration = NaN;
     if (this.speech.isOn)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-import type { OpenOptions, Player, Source, State } from './player.js';
+import type { Message, OpenOptions, Player, Source, State } from './player.js';
 
 export interface Orbit {
   /** Degrees. */
@@ -33,8 +33,10 @@ export interface Stats {
 /** <rangecast-view>. Events: those of Player without frame, and framesetchange (detail: views, points, captureTime) after each that was drawn. */
 export class RangecastView extends HTMLElement {
   src: string;
-  token: string | undefined;
-  orbit: Orbit;
+  get token (): string | undefined;
+  set token (token: string | null | undefined);
+  get orbit (): Orbit;
+  set orbit (orbit: Partial<Orbit>);
   currentTime: number;
   readonly state: State;
   readonly paused: boolean;
@@ -50,6 +52,10 @@ export class RangecastView extends HTMLElement {
   home (): void;
   /** A PNG with all pixels. */
   picture (): Promise<Blob | null>;
+  addEventListener (type: 'framesetchange', listener: (event: CustomEvent<{ views: number; points: number; captureTime: number }>) => void): void;
+  addEventListener (type: 'message', listener: (event: CustomEvent<Message>) => void): void;
+  addEventListener (type: 'error', listener: (event: CustomEvent<{ message: string }>) => void): void;
+  addEventListener (type: string, listener: EventListenerOrEventListenerObject, options?: boolean | AddEventListenerOptions): void;
 }
 declare global {
   interface HTMLElementTagNameMap {

@@ -139,16 +139,8 @@ export class RecordingSource {
     }, Math.max (0, wait));
   }
 
-  pause () {
-    if (this.playing)
-      this.stop ();
-  }
-  toggle () {
-    if (this.playing)
-      this.stop ();
-    else
-      this.play ();
-  }
+  pause () { return this.playing && this.stop (); }
+  toggle () { return this.playing ? this.stop () : this.play (); }
 
   // Shows the frame set at a time, ms.
   seek (time) {

@@ -87,7 +87,7 @@ export class RangecastObject extends Mesh {
   onBeforeRender (renderer, scene, camera) {
     const gl = renderer.getContext (), { uniforms } = this.material;
     uniforms.u_part.value.set (0, 0, 0, 0);
-    if (!this.core || this.failed)
+    if (!this.core || this.failed || gl.isContextLost ())
       return;
     if (renderer.state.buffers.depth.getReversed?.()) {
       this.failed = true;

@@ -142,11 +142,19 @@ export class RangecastView extends HTMLElement {
   get duration () { return this.player?.duration ?? NaN; }
   get currentTime () { return this.player?.currentTime ?? 0; }
   set currentTime (seconds) {
-    if (this.player)
+    if (this.loading)
+      this.load (this.loading[0], { ...this.loading[1], time: seconds });
+    else if (this.player)
       this.player.currentTime = seconds;
   }
-  play () { this.player?.play (); }
-  pause () { this.player?.pause (); }
+  play () { this.control ('play', false); }
+  pause () { this.control ('pause', true); }
+  control (name, paused) {
+    if (this.loading)
+      this.load (this.loading[0], { ...this.loading[1], paused });
+    else
+      this.player?.[name] ();
+  }
   // Shows src, an address or a File, soon: the last call counts. Without any, the stream ends. options: see Player.open ()
   load (source = this.src, options = {}) {
     if (!this.loading)
@@ -161,12 +169,7 @@ export class RangecastView extends HTMLElement {
     this.loading = null;
     if (!source)
       return player.state !== 'empty' && player.stop ();
-    try {
-      const address = typeof source === 'string' ? new URL (source, document.baseURI).href : source;
-      player.open (address, { token: this.token, paused: this.getAttribute ('autoplay') === 'false', ...options }).catch (() => {});
-    } catch {
-      this.report (`'${source}' is no address.`);
-    }
+    player.open (source, { token: this.token, paused: this.getAttribute ('autoplay') === 'false', ...options }).catch (() => {});
   }
 
   // ---- of the picture ----
@@ -179,12 +182,14 @@ export class RangecastView extends HTMLElement {
       return;
     }
     const o = { ...this.orbit, ...values };
+    if (!Object.values (o).every (Number.isFinite))
+      throw new TypeError ('orbit takes finite numbers');
     this.move ('rc_set_orbit', o.azimuth, o.elevation, o.distance, o.fieldOfView, o.panX, o.panY, o.panZ);
   }
   setOrbit () {
     const given = ['azimuth', 'elevation', 'distance'].filter ((name) => this.hasAttribute (name));
     if (given.length > 0)
-      this.orbit = Object.fromEntries (given.map ((name) => [name, Number (this.getAttribute (name)) || 0]));
+      this.orbit = Object.fromEntries (given.map ((name) => [name, Math.max (-1e6, Math.min (1e6, Number (this.getAttribute (name)) || 0))]));
   }
   // Shows the whole person again.
   home () { this.move ('rc_go_home'); }

@@ -71,12 +71,25 @@ test ('two elements on a page play, seek and leave the document by themselves', 
   assert.equal (await page.evaluate (() => window.b.orbit.azimuth), 90);
   assert.equal (await page.evaluate (() => { window.b.orbit = { elevation: 20 }; return window.b.orbit.elevation; }), 20);
   assert.ok (await page.evaluate (() => { try { window.a.currentTime = Infinity; } catch (error) { return error instanceof TypeError; } return false; }));
+  assert.ok (await page.evaluate (() => { try { window.b.orbit = { azimuth: NaN }; } catch (error) { return error instanceof TypeError; } return false; }));
   await page.evaluate (() => { window.a.play (); window.a.play (); });
   await page.waitForFunction (() => !window.a.paused);
   assert.ok (await page.evaluate (async () => (await window.b.picture ()).size) > 1000);
   await screenshot (page, 'embed-two.png');
   await page.evaluate (() => { window.seen = []; document.body.append (window.b); window.a.remove (); }); // b comes anew
   await has ('b', 'framesetchange');
+  // What is asked for before the recording is there is about its beginning.
+  await page.evaluate (() => {
+    window.b.setAttribute ('src', 'examples/moving.rcnc');
+    window.b.play ();
+    window.b.currentTime = 2;
+  });
+  await page.waitForFunction (() => window.b.ended);
+  assert.ok (await page.evaluate (() => window.seen.filter (([id, type]) => id === 'b' && type === 'framesetchange').length) < 15);
+  await page.evaluate (() => { window.b.play (); });
+  await page.waitForFunction (() => !window.b.paused);
+  await page.evaluate (() => { window.b.src = ''; });
+  await page.waitForFunction (() => window.b.state === 'empty' && window.b.paused);
   await page.evaluate (() => { window.b.src = 'nowhere.rcnc'; });
   await has ('b', 'error');
   assert.deepEqual (errors, []);
