@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
+import type { Orbit } from './rangecast.js';
+
 /** Address of a stream (ws:, wss:) or of a recording, or a recording. */
 export type Source = string | Blob;
 export interface OpenOptions {
@@ -15,15 +17,9 @@ export interface Message {
   kind: 'error' | 'note';
 }
 
-/** What is to be drawn from: of rangecast.wasm's camera. */
-export interface PlayerView {
-  azimuth: number;
-  elevation: number;
-  distance: number;
-  fieldOfView: number;
-  panX: number;
-  panY: number;
-  panZ: number;
+/** What is to be drawn from. */
+export interface PlayerView extends Orbit {
+  /** Number of times the default position was asked for. */
   homeRequests: number;
   aspect: number;
   fit: boolean;

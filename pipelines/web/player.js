@@ -27,7 +27,7 @@ export class Player extends EventTarget {
     this.time = 0; // ms
     this.seekingTo = null;
     this.takePoints = []; // for each savePoints () that waits
-    this.plays = this.stopped = false; // plays: what the last event said
+    this.plays = this.stopped = this.atEnd = false; // plays: what the last event said
     this.loading = false; // nothing was shown yet of what was opened last
     this.worker = new Worker (new URL ('./decoder.js', import.meta.url), { type: 'module' });
     this.worker.onmessage = ({ data }) => this[data.type] (data);
@@ -58,6 +58,7 @@ export class Player extends EventTarget {
   stop () {
     this.post ({ type: 'close' });
     this.stopped = true;
+    this.atEnd = false;
     this.setState ('empty');
   }
   toggle () { this.post ({ type: 'toggle' }); }
@@ -153,7 +154,7 @@ export class Player extends EventTarget {
   // What was asked for last is shown from now on.
   opened () {
     this.loading = true;
-    this.stopped = false;
+    this.stopped = this.atEnd = false;
     this.time = 0;
     this.duration = NaN;
     if (this.speech.isOn)

@@ -89,7 +89,7 @@ test ('two elements on a page play, seek and leave the document by themselves', 
   await page.evaluate (() => { window.b.play (); });
   await page.waitForFunction (() => !window.b.paused);
   await page.evaluate (() => { window.b.src = ''; });
-  await page.waitForFunction (() => window.b.state === 'empty' && window.b.paused);
+  await page.waitForFunction (() => window.b.state === 'empty' && window.b.paused && !window.b.ended);
   await page.evaluate (() => { window.b.src = 'nowhere.rcnc'; });
   await has ('b', 'error');
   assert.deepEqual (errors, []);
