@@ -63,8 +63,8 @@ test_viewers_go_on_when_the_parent_begins_again () {
   report "parent killed three times" "the viewer has whole frame sets again $(tr ' ' '/' <<<"${back% }") ms after the parent's program began"
 }
 
-# But for hosts that take long to begin.
-fail_if_parent_complained () { ! grep -v 'no packets on UDP port' parent.log || fail "the parent says: $(tail -n 20 parent.log)"; }
+# But for camera hosts that a busy machine held up.
+fail_if_parent_complained () { ! grep -vE 'no packets on UDP port|mux: pad sink_' parent.log || fail "the parent says: $(tail -n 20 parent.log)"; }
 
 test_nobody_notices_that_the_viewer_is_gone () {
   start_job $((ports + 60))
