@@ -359,16 +359,9 @@ static void
 set_time (GstBaseParse *base, const rangecast::AccessUnitPlace &place, GstBuffer *output)
 {
   GstNeighbourCodeParsePrivate *priv = GST_NEIGHBOUR_CODE_PARSE (base)->priv;
-  const rangecast::TakeList::Time time =
-      priv->seek.time_of (base, place, priv->stream.info.frame_duration ());
+  const auto time = priv->seek.time_of (base, place, priv->stream.info.frame_duration ());
   GST_BUFFER_PTS (output) = GST_BUFFER_DTS (output) = time.time_ns;
-  if (time.begins_take) {
-    GST_DEBUG_OBJECT (base,
-        "a take begins at byte %" G_GUINT64_FORMAT ": %" GST_TIME_FORMAT
-        " in the file is %" GST_TIME_FORMAT,
-        place.offset, GST_TIME_ARGS (place.header.pts_ns), GST_TIME_ARGS (time.time_ns));
-    priv->stream.discont = true;
-  }
+  priv->stream.discont |= time.goes_back;
 }
 
 /* @param rig_size  bytes of the rig views that it begins with */

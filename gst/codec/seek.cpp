@@ -2,13 +2,12 @@
 #include "seek.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <vector>
 
 using rangecast::AccessUnitPlace;
-using rangecast::kNoTime;
 using rangecast::StreamFile;
-using rangecast::Take;
-using rangecast::TakeList;
+using rangecast::StreamTimes;
 
 namespace {
 
@@ -30,38 +29,17 @@ read_file (GstPad *pad, guint64 offset, gsize size, std::vector<guint8> &to)
   gst_buffer_unref (buffer);
 }
 
-/* A part of the file, whose offsets begin at 0; by default up to its end. */
 StreamFile
-file_part (GstBaseParse *base, guint64 begin, guint64 end = G_MAXUINT64)
+file_of (GstBaseParse *base)
 {
   GstPad *pad = GST_BASE_PARSE_SINK_PAD (base);
   gint64 size = 0;
   if (!gst_pad_peer_query_duration (pad, GST_FORMAT_BYTES, &size))
     size = 0;
-  end = std::min (end, guint64 (std::max<gint64> (size, 0)));
-  const guint64 length = end - std::min (begin, end);
-  const auto read = [=] (guint64 offset, gsize bytes, std::vector<guint8> &to) {
-    const guint64 rest = length - std::min (offset, length);
-    read_file (pad, begin + offset, gsize (std::min<guint64> (bytes, rest)), to);
+  const auto read = [pad] (guint64 offset, gsize bytes, std::vector<guint8> &to) {
+    read_file (pad, offset, bytes, to);
   };
-  return {read, length};
-}
-
-/* To the end of the last access unit; none if its time is damaged. */
-GstClockTime
-duration_of (const TakeList &list, const AccessUnitPlace &last, GstClockTime frame_duration)
-{
-  if (last.header.pts_ns < list.takes ()[list.index_at (last.offset)].pts_ns)
-    return GST_CLOCK_TIME_NONE;
-  return list.time_of (last.offset, last.header.pts_ns) + frame_duration;
-}
-
-/* The time in the file of a time in a take. */
-guint64
-pts_at (const Take &take, GstClockTime time)
-{
-  const guint64 latest = kNoTime - 1, after = time - std::min (time, take.time_ns);
-  return after < latest - std::min (take.pts_ns, latest) ? take.pts_ns + after : latest;
+  return {read, guint64 (std::max<gint64> (size, 0))};
 }
 
 /* The access unit that the seek's flags select. */
@@ -81,79 +59,59 @@ void
 NeighbourCodeSeek::reset ()
 {
   std::lock_guard guard (lock_);
-  takes_ = {};
-  last_unit_.reset ();
+  times_ = {};
 }
 
-TakeList::Time
+StreamTimes::Time
 NeighbourCodeSeek::time_of (
     GstBaseParse *base, const AccessUnitPlace &unit, GstClockTime frame_duration)
 {
   if (!GST_CLOCK_TIME_IS_VALID (frame_duration))
     frame_duration = 0;
-  const bool is_first = takes_.empty (); /* which changes in this thread only */
-  if (is_first && is_pulling (base)) {
-    StreamFile file = file_part (base, 0);
-    TakeList takes = file.takes (unit.offset, frame_duration);
-    takes.interrupt ();
-    const auto last = file.last ();
-    std::lock_guard guard (lock_);
-    takes_ = std::move (takes);
-    if (last && last->header.pts_ns != kNoTime)
-      last_unit_ = last;
+  if (!times_.first_ns () && is_pulling (base)) { /* which changes in this thread only */
+    const auto last = file_of (base).last ();
+    const guint64 first = unit.header.pts_ns;
+    if (last && last->header.pts_ns != rangecast::kNoTime && last->header.pts_ns >= first)
+      if (const guint64 duration = last->header.pts_ns - first + frame_duration;
+          duration <= G_MAXINT64) /* else the base class estimates it */
+        gst_base_parse_set_duration (base, GST_FORMAT_TIME, gint64 (duration), 0);
   }
-  TakeList::Time time;
-  GstClockTime duration = GST_CLOCK_TIME_NONE; /* the base class estimates it */
-  {
-    std::lock_guard guard (lock_);
-    const gsize known = takes_.takes ().size ();
-    time = takes_.add (unit, frame_duration);
-    if (last_unit_ && (is_first || takes_.takes ().size () != known))
-      duration = duration_of (takes_, *last_unit_, frame_duration);
-  }
-  if (duration <= G_MAXINT64)
-    gst_base_parse_set_duration (base, GST_FORMAT_TIME, gint64 (duration), 0);
-  return time;
+  std::lock_guard guard (lock_);
+  return times_.next (unit, frame_duration);
 }
 
 void
 NeighbourCodeSeek::begin_stream ()
 {
   std::lock_guard guard (lock_);
-  takes_.begin_stream ();
+  times_.begin_stream ();
 }
 
 void
 NeighbourCodeSeek::interrupt ()
 {
   std::lock_guard guard (lock_);
-  takes_.interrupt ();
+  times_.seek ();
 }
 
-/* Finds the key access unit for a seek, in the take of that time, and adds it to the index of the
- * base class, which has only what was played. @return its time; none if the file has no times */
+/* Finds the key access unit for a seek, and adds it to the index of the base class, which has only
+ * what was played. @return its time; none if the file has no times */
 GstClockTime
 NeighbourCodeSeek::find_place (GstBaseParse *base, GstClockTime time, GstSeekFlags flags)
 {
-  TakeList list;
+  std::optional<guint64> first;
   {
     std::lock_guard guard (lock_);
-    list = takes_;
+    first = times_.first_ns ();
   }
-  if (list.empty ())
+  if (!first)
     return GST_CLOCK_TIME_NONE;
-  const std::vector<Take> &takes = list.takes ();
-  const auto next = std::ranges::upper_bound (takes, time, {}, &Take::time_ns);
-  const auto take = next == takes.begin () ? next : next - 1;
-  const guint64 end = take + 1 == takes.end () ? G_MAXUINT64 : take[1].offset;
-  const guint64 pts = pts_at (*take, time);
-  const StreamFile::Target target = file_part (base, take->offset, end).locate (pts);
-  const auto chosen = choose (target, pts, flags);
+  const guint64 pts = *first + std::min (time, rangecast::kNoTime - 1 - *first);
+  const auto chosen = choose (file_of (base).locate (pts), pts, flags);
   if (!chosen)
     return GST_CLOCK_TIME_NONE;
-  const guint64 offset = take->offset + chosen->offset;
-  const GstClockTime found = list.time_of (offset, chosen->header.pts_ns);
-  gst_base_parse_add_index_entry (base, offset, found, TRUE, TRUE);
+  const GstClockTime found = chosen->header.pts_ns - std::min (chosen->header.pts_ns, *first);
+  gst_base_parse_add_index_entry (base, chosen->offset, found, TRUE, TRUE);
   return found;
 }
 

@@ -4,18 +4,17 @@
 #include <gst/base/base.h>
 
 #include <mutex>
-#include <optional>
 #include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
 
-/** Seeking by time in a file, and the times of its stream, of one or several takes. Any thread: the
- *  lock is never held while pulling, pushing, querying or posting. */
+/** Seeking by time in a file, and the times of its stream. Any thread: the lock is never held while
+ *  pulling, pushing, querying or posting. */
 class NeighbourCodeSeek {
 public:
   void reset ();
   /** The time of the next access unit, which has one in the stream. The first one of a file also
    *  sets the parser's duration.
    *  @param frame_duration  ns, or none */
-  rangecast::TakeList::Time time_of (
+  rangecast::StreamTimes::Time time_of (
       GstBaseParse *base, const rangecast::AccessUnitPlace &unit, GstClockTime frame_duration);
   /** Upstream pushes another stream: its times begin a frame after the last ones. */
   void begin_stream ();
@@ -28,7 +27,6 @@ public:
 private:
   GstClockTime find_place (GstBaseParse *base, GstClockTime time, GstSeekFlags flags);
 
-  std::mutex lock_; /* guards all below */
-  rangecast::TakeList takes_;
-  std::optional<rangecast::AccessUnitPlace> last_unit_; /* of a file */
+  std::mutex lock_; /* guards what follows */
+  rangecast::StreamTimes times_;
 };

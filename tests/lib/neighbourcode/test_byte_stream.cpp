@@ -238,55 +238,30 @@ join (const std::vector<File> &files)
   return joined;
 }
 
-/* The offsets of the takes, as numbers of access units; their times follow each other. */
-static std::vector<std::size_t>
-takes_of (File &file)
-{
-  std::vector<std::size_t> begins;
-  const TakeList list = file.open ().takes (0, kFrame_ns);
-  for (const Take &take : list.takes ()) {
-    const auto unit = std::ranges::find (file.offsets, take.offset);
-    begins.push_back (std::size_t (unit - file.offsets.begin ()));
-    EXPECT_EQ (take.time_ns, begins.back () * kFrame_ns);
-  }
-  return begins;
-}
-
 /* The times of all access units, one after another. */
 static std::vector<std::uint64_t>
 times_of (File &file)
 {
-  TakeList list;
+  StreamTimes stream;
   std::vector<std::uint64_t> times;
   for (const std::uint64_t offset : file.offsets) {
     AccessUnitPlace unit{offset, {}, file.bytes[offset + kAccessUnitHeaderSize] % 16 == 2};
     EXPECT_TRUE (begins_access_unit (std::span (file.bytes).subspan (offset), unit.header));
-    times.push_back (list.add (unit, kFrame_ns).time_ns);
+    times.push_back (stream.next (unit, kFrame_ns).time_ns);
   }
   return times;
 }
 
-TEST (Takes, EveryTakeOfAFileIsFound)
+TEST (StreamTimes, JoinedFilesFollowEachOther)
 {
   File file = join ({File (30), File (1), File (1, 0), File (40, 0), File (50, 8'000'000'000)});
-  EXPECT_EQ (takes_of (file), (std::vector<std::size_t>{0, 30, 31, 32}));
   const auto times = times_of (file);
   for (std::size_t i = 0; i < 72; i++)
     EXPECT_EQ (times[i], i * kFrame_ns);
-  EXPECT_EQ (times[72], 32 * kFrame_ns + 8'000'000'000); /* later: the same take */
+  EXPECT_EQ (times[72], 32 * kFrame_ns + 8'000'000'000); /* later: as in one file */
 }
 
-TEST (Takes, LongTakesOfALongFileAreFoundBySampling)
-{
-  for (const int first : {1300, 5000, 15000, 18700}) {
-    File file = join ({File (first), File (20000 - first), File (3000)});
-    ASSERT_GT (file.bytes.size (), std::size_t{16} << 20);
-    EXPECT_EQ (takes_of (file), (std::vector<std::size_t>{0, std::size_t (first), 20000}));
-    EXPECT_LT (file.bytes_read, file.bytes.size () / 3);
-  }
-}
-
-TEST (Takes, DamagedTimeWithoutRigChangesNoOther)
+TEST (StreamTimes, DamagedTimeWithoutRigChangesNoOther)
 {
   const File first (8), second (6, 0);
   File sound = join ({first, second});
@@ -298,127 +273,53 @@ TEST (Takes, DamagedTimeWithoutRigChangesNoOther)
       damaged.bytes[damaged.offsets[unit] + 12 + std::size_t (bit / 8)] ^=
           std::uint8_t (1 << bit % 8);
       const auto now = times_of (damaged);
-      const bool meet = unit == 7; /* the next take follows its time */
+      const bool meet = unit == 7; /* the next file follows its time */
       for (std::size_t i = meet ? unit + 3 : 0; i < 14; i++)
         if (i != unit) {
           EXPECT_EQ (now[i] - (meet ? now[i - 1] : 0), meet ? kFrame_ns : times[i])
               << "bit " << bit << " of " << unit << " changes " << i;
         }
-      if (!meet) {
-        EXPECT_EQ (damaged.open ().takes (0, kFrame_ns).takes ().size (), 2u) << bit << " " << unit;
-      }
     }
 }
 
-TEST (Takes, ReadingOnElsewhereBeginsNone)
+TEST (StreamTimes, WhatWasSoughtCountsFromTheFirst)
 {
-  File file = join ({File (40), File (40)});
-  TakeList list = file.open ().takes (0, kFrame_ns);
-  for (const std::size_t unit : {70, 10, 45, 39, 40, 0}) {
-    AccessUnitPlace place{file.offsets[unit], {}, false};
-    ASSERT_TRUE (begins_access_unit (std::span (file.bytes).subspan (place.offset), place.header));
-    list.interrupt ();
-    const auto time = list.add (place, kFrame_ns);
-    EXPECT_EQ (time.time_ns, unit * kFrame_ns);
-    EXPECT_FALSE (time.begins_take);
+  StreamTimes stream;
+  const auto time_of = [&stream] (std::uint64_t pts, bool rig) {
+    const auto time = stream.next ({0, {600, pts, 0, true}, rig}, kFrame_ns);
+    EXPECT_FALSE (time.goes_back);
+    return time.time_ns;
+  };
+  EXPECT_EQ (time_of (5 * kFrame_ns, true), 0u);
+  for (const std::uint64_t frame : {70, 9, 10, 5}) {
+    stream.seek ();
+    EXPECT_EQ (time_of (frame * kFrame_ns, true), (frame - 5) * kFrame_ns);
+    EXPECT_EQ (time_of ((frame + 1) * kFrame_ns, false), (frame - 4) * kFrame_ns);
   }
-  EXPECT_EQ (list.takes ().size (), 2u);
 }
 
-TEST (Takes, TakeThatSamplingMissedMovesLaterOnes)
+TEST (StreamTimes, ShortFilesFollowEachOtherInAnyOrder)
 {
-  File file = join ({File (400), File (10), File (400)});
-  TakeList list;
-  for (const std::size_t unit : {0, 410}) { /* as if only these two were known */
-    AccessUnitPlace place{file.offsets[unit], {}, true};
-    begins_access_unit (std::span (file.bytes).subspan (place.offset), place.header);
-    list.add (place, kFrame_ns);
-  }
-  ASSERT_EQ (list.takes ().size (), 2u);
-  list.interrupt ();
-  for (std::size_t unit = 0; unit < 810; unit++) {
-    AccessUnitPlace place{file.offsets[unit], {}, unit == 400};
-    begins_access_unit (std::span (file.bytes).subspan (place.offset), place.header);
-    const auto time = list.add (place, kFrame_ns);
-    EXPECT_EQ (time.begins_take, unit == 400 || unit == 410);
-    if (unit < 410) {
-      EXPECT_EQ (time.time_ns, unit * kFrame_ns);
-    }
-  }
-  EXPECT_EQ (list.takes ().size (), 3u);
-}
-
-TEST (Takes, ShortTakesAreFoundInAnyOrder)
-{
-  for (int order = 0; order < 256; order++) { /* of four takes of 1 to 4 access units */
+  for (int order = 0; order < 256; order++) { /* four of 1 to 4 access units */
     std::vector<File> files;
-    std::vector<std::size_t> begins;
-    std::size_t frames = 0;
-    for (int take = 0; take < 4; take++) {
-      const int length = 1 + (order >> 2 * take) % 4;
-      begins.push_back (frames);
-      files.emplace_back (length, 0);
-      frames += std::size_t (length);
-    }
+    for (int i = 0; i < 4; i++)
+      files.emplace_back (1 + (order >> 2 * i) % 4, 0);
     File file = join (files);
-    EXPECT_EQ (takes_of (file), begins) << order;
     const auto times = times_of (file);
-    for (std::size_t i = 0; i < frames; i++)
+    for (std::size_t i = 0; i < times.size (); i++)
       EXPECT_EQ (times[i], i * kFrame_ns) << order;
   }
 }
 
-TEST (Takes, TakeAfterTwoAccessUnitsIsFoundThoughTimesVary)
+TEST (StreamTimes, NextStreamBeginsAFrameAfterTheLast)
 {
-  for (const std::uint64_t later_ns : {0, 1, 400'000, 40'000'000}) {
-    TakeList list;
-    std::uint64_t offset = 0;
-    for (const std::uint64_t pts : {std::uint64_t{0}, kFrame_ns, std::uint64_t{0},
-             kFrame_ns + later_ns, 2 * kFrame_ns + later_ns})
-      list.add ({offset++, {600, pts, 0, true}, pts == 0}, kFrame_ns);
-    ASSERT_EQ (list.takes ().size (), 2u) << later_ns;
-    EXPECT_EQ (list.takes ()[1].time_ns, 2 * kFrame_ns);
-  }
-}
-
-TEST (Takes, ListHoldsNoMoreThan4096)
-{
-  TakeList list;
-  constexpr std::uint64_t units = 3 * kMaxTakes;
-  for (std::uint64_t i = 0; i < units; i++) {
-    const auto time = list.add ({i, {600, 1000 * (units - i), 0, true}, true}, kFrame_ns);
-    ASSERT_EQ (time.time_ns, i * kFrame_ns);
-    ASSERT_LE (list.takes ().size (), kMaxTakes);
-  }
-  EXPECT_TRUE (std::ranges::is_sorted (list.takes (), {}, &Take::offset));
-  EXPECT_EQ (list.time_of (100, 1000 * (units - 100)), 100 * kFrame_ns);
-  list.interrupt (); /* more takes than were known, found at the beginning */
-  for (const std::uint64_t pts : {3, 2, 1})
-    list.add ({0, {600, pts, 0, true}, true}, kFrame_ns);
-  EXPECT_EQ (list.takes ().size (), kMaxTakes);
-}
-
-TEST (Takes, NextStreamBeginsAFrameAfterTheLast)
-{
-  TakeList list;
+  StreamTimes stream;
   std::uint64_t frame = 0;
-  for (const std::uint64_t stream : {0, 1, 2}) {
-    list.begin_stream ();
+  for (const std::uint64_t first : {0, 1, 2}) {
+    stream.begin_stream ();
     for (std::uint64_t i = 0; i < 5; i++) {
-      const auto time = list.add ({i, {600, stream + i * kFrame_ns, 0, true}, i == 0}, kFrame_ns);
+      const auto time = stream.next ({i, {600, first + i * kFrame_ns, 0, true}, i == 0}, kFrame_ns);
       EXPECT_EQ (time.time_ns, frame++ * kFrame_ns);
     }
-    EXPECT_EQ (list.takes ().size (), 1u);
   }
-}
-
-TEST (Takes, SamplingAnyShortFileEnds)
-{
-  File file = join ({File (30), File (1), File (2), File (40)});
-  for (std::size_t size = 0; size < file.bytes.size (); size += size < 100 ? 1 : 997) {
-    File part (0);
-    part.bytes.assign (file.bytes.begin (), file.bytes.begin () + std::ptrdiff_t (size));
-    (void)part.open ().takes (0, kFrame_ns, 0);
-  }
-  EXPECT_EQ (file.open ().takes (0, kFrame_ns, 0).takes ().front ().offset, 0u);
 }

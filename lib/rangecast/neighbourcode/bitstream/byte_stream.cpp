@@ -19,9 +19,6 @@ constexpr std::uint64_t kKeyWindow_ns = 2'000'000'000;
 constexpr auto kFirstByte =
     std::uint8_t (kBitstreamVersion << 4 | static_cast<int> (UnitType::kAccessUnit));
 
-/* Longer files than kWalkFile are sampled for takes at so many places. */
-constexpr std::uint64_t kTakeSamples = 64;
-
 enum class End { kSound, kDamaged, kOpen };
 
 /* How far the sizes of units lead through an access unit whose declared end is `declared`. Another
@@ -135,87 +132,41 @@ next_part (Bytes bytes, bool at_end)
   return part;
 }
 
-std::size_t
-TakeList::index_at (std::uint64_t offset) const
+void
+StreamTimes::seek ()
 {
-  const auto after = std::ranges::upper_bound (takes_, offset, {}, &Take::offset);
-  return std::size_t (std::max<std::ptrdiff_t> (after - takes_.begin (), 1) - 1);
+  origin_ns_ = first_ns_.value_or (0);
+  origin_at_ns_ = 0;
+  follows_ = false;
 }
 
-std::uint64_t
-TakeList::time_of (std::uint64_t offset, std::uint64_t pts_ns) const
-{
-  const Take &take = takes_[index_at (offset)];
-  return take.time_ns + (pts_ns - std::min (pts_ns, take.pts_ns));
-}
-
-/* Also compared with the one before the last, because the time of the last may be damaged. */
-bool
-TakeList::goes_back (const AccessUnitPlace &unit) const
+/* Times are compared with the one before the last, too, because that of the last may be damaged. */
+StreamTimes::Time
+StreamTimes::next (const AccessUnitPlace &unit, std::uint64_t frame_ns)
 {
   const std::uint64_t pts = unit.header.pts_ns;
-  return unit.has_rig && pts <= last_ && pts <= before_;
-}
-
-void
-TakeList::insert (const AccessUnitPlace &unit, std::uint64_t frame_ns)
-{
-  const Take &old = takes_[current_];
-  const Take take = {unit.offset, unit.header.pts_ns, last_time_ns_ + frame_ns};
-  const std::uint64_t shift_ns = take.time_ns - (old.time_ns + (take.pts_ns - old.pts_ns));
-  if (takes_.size () < kMaxTakes) {
-    takes_.insert (takes_.begin () + std::ptrdiff_t (++current_), take);
-  } else {
-    current_ = std::max<std::size_t> (current_, 1);
-    takes_[current_] = take;
+  const bool goes_back = follows_ && unit.has_rig && pts <= last_ && pts <= before_;
+  const bool begins = goes_back || !first_ns_;
+  if (begins) {
+    origin_ns_ = pts;
+    origin_at_ns_ = last_at_ns_ ? *last_at_ns_ + frame_ns : 0;
   }
-  for (std::size_t later = current_ + 1; later < takes_.size (); later++)
-    takes_[later].time_ns += shift_ns; /* modulo 2^64: may be negative */
-}
-
-void
-TakeList::begin_stream ()
-{
-  resumes_ |= !takes_.empty ();
-  takes_.clear ();
-  interrupt ();
-}
-
-TakeList::Time
-TakeList::add (const AccessUnitPlace &unit, std::uint64_t frame_ns)
-{
-  const std::uint64_t pts = unit.header.pts_ns;
-  if (takes_.empty ())
-    takes_.push_back ({unit.offset, pts, resumes_ ? last_time_ns_ + frame_ns : 0});
-  bool begins_take = false;
-  const std::size_t known = index_at (unit.offset);
-  if (known != current_) {
-    const bool is_first = takes_[known].offset == unit.offset;
-    begins_take = is_first && current_ != kNone;
-    current_ = known;
-    before_ = is_first ? UINT64_MAX : 0; /* all times are earlier, or none */
-  } else {
-    begins_take = goes_back (unit);
-    if (begins_take)
-      insert (unit, frame_ns);
-    before_ = last_;
-  }
+  if (!first_ns_)
+    first_ns_ = pts;
+  before_ = begins ? UINT64_MAX : follows_ ? last_ : 0;
   last_ = pts;
-  last_time_ns_ = time_of (unit.offset, pts);
-  return {last_time_ns_, begins_take};
+  follows_ = true;
+  last_at_ns_ = origin_at_ns_ + (pts - std::min (pts, origin_ns_));
+  return {*last_at_ns_, goes_back};
 }
 
 std::optional<AccessUnitPlace>
 StreamFile::at (std::uint64_t offset)
 {
   AccessUnitPlace place{offset, {}, false};
-  read_ (offset, kAccessUnitHeaderSize + kUnitHeaderSize, block_);
+  read_ (offset, kAccessUnitHeaderSize, block_);
   if (!begins_access_unit (block_, place.header))
     return {};
-  UnitHeader unit;
-  (void)read_unit_header (
-      Bytes (block_).subspan (kAccessUnitHeaderSize), unit); /* kTruncated, but the type is read */
-  place.has_rig = unit.type == static_cast<std::uint8_t> (UnitType::kRigView);
   return place;
 }
 
@@ -311,75 +262,6 @@ StreamFile::locate (std::uint64_t pts_ns)
     if (target.before || from == 0 || window_ns > all / 4)
       return target;
   }
-}
-
-/* Of two access units, of which the time of `to` is earlier: an access unit from `from` on that is
- * not earlier than it, shortly before the first one that is. */
-AccessUnitPlace
-StreamFile::last_not_before (const AccessUnitPlace &from, const AccessUnitPlace &to)
-{
-  AccessUnitPlace low = from;
-  std::uint64_t high = to.offset;
-  while (high - low.offset > kWalkBytes) {
-    const std::uint64_t middle = low.offset + (high - low.offset) / 2;
-    const auto place = next (middle, high);
-    if (place && place->header.pts_ns != kNoTime && place->header.pts_ns >= from.header.pts_ns)
-      low = *place;
-    else
-      high = middle;
-  }
-  return low;
-}
-
-/* Adds access units from `place` to the first one at `to` or later. */
-void
-StreamFile::walk_takes (
-    AccessUnitPlace place, std::uint64_t to, std::uint64_t frame_ns, TakeList &list)
-{
-  while (true) {
-    if (place.header.pts_ns != kNoTime)
-      list.add (place, frame_ns);
-    const auto following_place = following (place);
-    if (place.offset >= to || !following_place)
-      return;
-    place = *following_place;
-  }
-}
-
-/* Adds `from` and, if the time goes back up to `to`, where it does. */
-void
-StreamFile::search_takes (
-    const AccessUnitPlace &from, const AccessUnitPlace &to, std::uint64_t frame_ns, TakeList &list)
-{
-  list.add (from, frame_ns);
-  if (to.offset <= from.offset || to.header.pts_ns > from.header.pts_ns)
-    return;
-  const AccessUnitPlace low = last_not_before (from, to);
-  if (low.offset > from.offset)
-    list.add (low, frame_ns);
-  if (const auto first = following (low))
-    walk_takes (*first, std::min (low.offset + kWalkBytes, to.offset), frame_ns, list);
-  list.interrupt ();
-}
-
-TakeList
-StreamFile::takes (std::uint64_t begin, std::uint64_t frame_ns, std::uint64_t walk_size)
-{
-  TakeList list;
-  auto from = next (begin, size_);
-  if (from && size_ <= walk_size) {
-    walk_takes (*from, size_, frame_ns, list);
-    return list;
-  }
-  const std::uint64_t step = std::max<std::uint64_t> (size_ / kTakeSamples, 1);
-  while (from) {
-    const auto to = next (from->offset + step, size_);
-    const auto end = to ? to : last ();
-    if (end && from->header.pts_ns != kNoTime)
-      search_takes (*from, *end, frame_ns, list);
-    from = to;
-  }
-  return list;
 }
 
 } // namespace rangecast

@@ -14,10 +14,6 @@ namespace rangecast {
 
 /** Presentation time of an access unit that has none. */
 inline constexpr std::uint64_t kNoTime = UINT64_MAX;
-/** Takes that a list holds. */
-inline constexpr std::size_t kMaxTakes = 4096;
-/** Files up to this size, bytes, are searched for takes access unit by access unit. */
-inline constexpr std::uint64_t kWalkFile = 8 << 20;
 
 /** Whether `bytes` begins with a sound access-unit unit. */
 bool begins_access_unit (std::span<const std::uint8_t> bytes, AccessUnitHeader &header);
@@ -45,52 +41,38 @@ StreamPart next_part (std::span<const std::uint8_t> bytes, bool at_end);
 struct AccessUnitPlace {
   std::uint64_t offset = 0; ///< bytes, of its access-unit unit
   AccessUnitHeader header;
-  bool has_rig = false; ///< rig views precede its slices
+  bool has_rig = false; ///< rig views precede its slices; not read from files
 };
 
-/** One of the recordings that a byte stream holds, one after another. */
-struct Take {
-  std::uint64_t offset = 0;  ///< bytes, of its first access unit
-  std::uint64_t pts_ns = 0;  ///< of that one, in the file
-  std::uint64_t time_ns = 0; ///< of that one, on the time line of the whole stream
-};
-
-/** The time line of a byte stream, on which each take follows the one before it. A take begins at a
- *  rig whose time is not later than the two before it. Of more than kMaxTakes takes, a new one
- *  replaces the one before: that one's times are then unknown, but not those of the first takes. */
-class TakeList {
+/** The times at which a byte stream plays: from 0, and without a gap where its times go back at a
+ * rig, as in recordings joined by `cat`. */
+class StreamTimes {
 public:
   struct Time {
     std::uint64_t time_ns;
-    bool begins_take; ///< and is not the stream's first one
+    bool goes_back; ///< the access unit's time, which the stream's does not
   };
-  /** Adds the next access unit, which has a time. The first one has time 0.
-   *  @param frame_ns  from the last access unit of a take to the next take */
-  Time add (const AccessUnitPlace &unit, std::uint64_t frame_ns);
-  /** The next access unit does not follow the one before, as after a seek. */
-  void interrupt () { current_ = kNone; }
-  /** Another byte stream begins, a frame after the last access unit. Offsets begin anew. */
-  void begin_stream ();
-
-  [[nodiscard]] bool empty () const { return takes_.empty (); }
-  [[nodiscard]] const std::vector<Take> &takes () const { return takes_; }
-  /** Index of the take of the access unit at an offset; the list is not empty. */
-  [[nodiscard]] std::size_t index_at (std::uint64_t offset) const;
-  /** Time of an access unit; not before its take begins. The list is not empty. */
-  [[nodiscard]] std::uint64_t time_of (std::uint64_t offset, std::uint64_t pts_ns) const;
+  /** The time of the next access unit, which has one in the stream.
+   *  @param frame_ns  from the last access unit before times go back to the next one */
+  Time next (const AccessUnitPlace &unit, std::uint64_t frame_ns);
+  /** The next access unit was sought: its time counts from the stream's first one. */
+  void seek ();
+  /** Another byte stream begins, a frame after the last access unit. */
+  void begin_stream ()
+  {
+    first_ns_.reset ();
+    follows_ = false;
+  }
+  /** Presentation time of the first access unit of the stream. */
+  [[nodiscard]] std::optional<std::uint64_t> first_ns () const { return first_ns_; }
 
 private:
-  static constexpr std::size_t kNone = SIZE_MAX;
-
-  [[nodiscard]] bool goes_back (const AccessUnitPlace &unit) const;
-  void insert (const AccessUnitPlace &unit, std::uint64_t frame_ns);
-
-  std::vector<Take> takes_;        /* by offset */
-  std::size_t current_ = kNone;    /* take of the last access unit */
-  std::uint64_t last_ = 0;         /* presentation times of the last access unit */
-  std::uint64_t before_ = 0;       /* and of the one before it */
-  std::uint64_t last_time_ns_ = 0; /* of the last access unit */
-  bool resumes_ = false;           /* another byte stream came before */
+  std::optional<std::uint64_t> first_ns_;
+  std::uint64_t origin_ns_ = 0;             /* a presentation time */
+  std::uint64_t origin_at_ns_ = 0;          /* and when that plays */
+  std::uint64_t last_ = 0, before_ = 0;     /* presentation times of the last two access units */
+  bool follows_ = false;                    /* the next access unit follows these */
+  std::optional<std::uint64_t> last_at_ns_; /* when the last one plays */
 };
 
 /** Finds access units by time in a file without reading all of it. */
@@ -105,12 +87,6 @@ public:
   /** The last access unit. */
   std::optional<AccessUnitPlace> last ();
 
-  /** The takes from an offset on: all of a file of up to 8 MiB; in a longer one, by bisection,
-   * those that are at least a 32nd of it and a few of the shorter ones. Empty if there are no
-   * times.
-   *  @param walk_size  instead of the 8 MiB */
-  TakeList takes (std::uint64_t begin, std::uint64_t frame_ns, std::uint64_t walk_size = kWalkFile);
-
   struct Target {
     std::optional<AccessUnitPlace> before; ///< the last key one not later than the time
     std::optional<AccessUnitPlace> after;  ///< the first key one not earlier than the time
@@ -124,10 +100,6 @@ private:
   std::optional<AccessUnitPlace> following (const AccessUnitPlace &place);
   std::uint64_t bisect (std::uint64_t pts_ns);
   Target walk (std::uint64_t from, std::uint64_t pts_ns);
-  AccessUnitPlace last_not_before (const AccessUnitPlace &from, const AccessUnitPlace &to);
-  void search_takes (const AccessUnitPlace &from, const AccessUnitPlace &to, std::uint64_t frame_ns,
-      TakeList &list);
-  void walk_takes (AccessUnitPlace place, std::uint64_t to, std::uint64_t frame_ns, TakeList &list);
 
   Read read_;
   std::uint64_t size_;
