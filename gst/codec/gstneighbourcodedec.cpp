@@ -11,9 +11,6 @@
  * data are treated as lost, and the decoder requests a key frame set from upstream
  * (GstForceKeyUnit; RTP: PLI) unless #GstNeighbourCodeDec:request-key-units is false.
  *
- * With alignment=slice a frame set ends with a buffer that has the MARKER flag, before one of
- * another capture time, or at the end of the stream.
- *
  * ## Example launch line
  * |[
  * gst-launch-1.0 avatartestsrc num-buffers=30 ! neighbourcodeenc ! neighbourcodedec ! plyenc ! \
@@ -77,9 +74,9 @@ struct GstNeighbourCodeDecPrivate {
 
   StatsReporter reporter; /* any thread; has locks of its own */
 
-  /* written by the streaming thread, also read by src_event() */
-  std::atomic<bool> by_slices{false};   /* alignment of the input */
-  std::atomic<bool> is_temporal{false}; /* later frame sets refer to the latest */
+  /* Later frame sets refer to the latest. Written by the streaming thread, also read by src_event()
+   */
+  std::atomic<bool> is_temporal{false};
 
   /* streaming thread only */
   rangecast::AccessUnitDecoder decoder;
@@ -87,9 +84,6 @@ struct GstNeighbourCodeDecPrivate {
   Concealment concealment;
   GstClockTime last_request = GST_CLOCK_TIME_NONE; /* PTS of the frame set that caused it */
   bool warned_damage = false;                      /* of this stream */
-  std::vector<guint8> slices;                      /* alignment=slice: of the frame set so far */
-  GstBuffer *first = nullptr; /* its first slice, which gives times and flags */
-  bool complete = false;      /* its last slice has come */
 };
 
 DECLARE_ELEMENT (GstNeighbourCodeDec, gst_neighbour_code_dec, NEIGHBOUR_CODE_DEC, GstBaseTransform)
@@ -112,17 +106,8 @@ gst_neighbour_code_dec_transform_caps (
 }
 
 static void
-reset_slices (GstNeighbourCodeDecPrivate *priv)
-{
-  priv->slices.clear ();
-  gst_clear_buffer (&priv->first);
-  priv->complete = false;
-}
-
-static void
 reset_stream (GstNeighbourCodeDecPrivate *priv)
 {
-  reset_slices (priv);
   priv->decoder.reset_references ();
   priv->is_temporal = false;
   priv->last_request = GST_CLOCK_TIME_NONE;
@@ -143,8 +128,6 @@ gst_neighbour_code_dec_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *o
     return FALSE;
   GST_INFO_OBJECT (self, "%" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
   reset_stream (priv);
-  const GstStructure *structure = gst_caps_get_structure (in, 0);
-  priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
   drop_pool (priv->pool);
   status = gstrange::make_pool (out, priv->pool);
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
@@ -160,13 +143,11 @@ take_caps (GstBaseTransform *base, GstEvent *event)
   return FALSE;
 }
 
-/* QoS is hidden from the base class where it would drop single slices (alignment=slice), or frame
- * sets that later ones refer to. */
+/* QoS is hidden from the base class where it would drop frame sets that later ones refer to. */
 static gboolean
 gst_neighbour_code_dec_src_event (GstBaseTransform *base, GstEvent *event)
 {
-  GstNeighbourCodeDecPrivate *priv = GST_NEIGHBOUR_CODE_DEC (base)->priv;
-  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS && (priv->by_slices || priv->is_temporal))
+  if (GST_EVENT_TYPE (event) == GST_EVENT_QOS && GST_NEIGHBOUR_CODE_DEC (base)->priv->is_temporal)
     return gst_pad_push_event (GST_BASE_TRANSFORM_SINK_PAD (base), event);
   return GST_BASE_TRANSFORM_CLASS (gst_neighbour_code_dec_parent_class)->src_event (base, event);
 }
@@ -261,11 +242,15 @@ copy_metadata (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer *output)
   GST_BUFFER_FLAG_UNSET (output, GST_BUFFER_FLAG_DELTA_UNIT | GST_BUFFER_FLAG_MARKER);
 }
 
-/* Times and flags are those of `input`; the units are its own, or also those of later slices. */
 static GstFlowReturn
-decode_frame_set (GstNeighbourCodeDec *self, GstBuffer *input, Bytes units, GstBuffer **output)
+decode_frame_set (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **output)
 {
   GstNeighbourCodeDecPrivate *priv = self->priv;
+  const CodedUnitsMap map (input);
+  if (!map) {
+    GST_ELEMENT_ERROR (self, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
+    return GST_FLOW_ERROR;
+  }
   const Settings settings = settings_of (priv);
   GstBuffer *older = priv->concealment.begin (input);
   if (settings.conceal == CONCEAL_INVALID)
@@ -275,7 +260,7 @@ decode_frame_set (GstNeighbourCodeDec *self, GstBuffer *input, Bytes units, GstB
       flow != GST_FLOW_OK)
     return flow;
   DecoderResult result;
-  const Status status = decode_into (priv, units, buffer, older, settings.n_threads, result);
+  const Status status = decode_into (priv, map.bytes (), buffer, older, settings.n_threads, result);
   if (!status.ok ()) {
     gst_buffer_unref (buffer);
     return gst_range_flow_return (GST_ELEMENT (self), status);
@@ -283,7 +268,7 @@ decode_frame_set (GstNeighbourCodeDec *self, GstBuffer *input, Bytes units, GstB
   {
     std::lock_guard guard (priv->lock);
     priv->frames++;
-    priv->coded_bytes += units.size ();
+    priv->coded_bytes += map.bytes ().size ();
     priv->totals += result;
   }
   update_is_temporal (priv);
@@ -306,60 +291,6 @@ decode_frame_set (GstNeighbourCodeDec *self, GstBuffer *input, Bytes units, GstB
   return GST_FLOW_OK;
 }
 
-/* ---- input: access units, or slices of which frame sets are assembled ---- */
-
-static GstFlowReturn
-decode_slices (GstNeighbourCodeDec *self, GstBuffer **output)
-{
-  GstNeighbourCodeDecPrivate *priv = self->priv;
-  const GstFlowReturn flow = decode_frame_set (self, priv->first, priv->slices, output);
-  reset_slices (priv);
-  return flow;
-}
-
-static bool
-is_same_frame_set (GstBuffer *a, GstBuffer *b)
-{
-  const GstClockTime time_a = gst_range_buffer_get_capture_time (a);
-  const GstClockTime time_b = gst_range_buffer_get_capture_time (b);
-  if (GST_CLOCK_TIME_IS_VALID (time_a) && GST_CLOCK_TIME_IS_VALID (time_b))
-    return time_a == time_b;
-  return GST_BUFFER_PTS (a) == GST_BUFFER_PTS (b);
-}
-
-static void
-append_slice (GstNeighbourCodeDec *self, GstBuffer *input, Bytes units)
-{
-  GstNeighbourCodeDecPrivate *priv = self->priv;
-  if (!priv->first)
-    priv->first = gst_buffer_ref (input);
-  if (priv->slices.size () + units.size () <= rangecast::kMaxAccessUnitSize)
-    priv->slices.insert (priv->slices.end (), units.begin (), units.end ());
-  else
-    GST_DEBUG_OBJECT (self, "dropping a slice: the access unit is too long");
-  priv->complete = GST_BUFFER_FLAG_IS_SET (input, GST_BUFFER_FLAG_MARKER);
-}
-
-static GstFlowReturn
-handle_input (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **output)
-{
-  GstNeighbourCodeDecPrivate *priv = self->priv;
-  const CodedUnitsMap map (input);
-  if (!map) {
-    GST_ELEMENT_ERROR (self, RESOURCE, READ, (nullptr), ("cannot map an input buffer"));
-    return GST_FLOW_ERROR;
-  }
-  if (!priv->by_slices)
-    return decode_frame_set (self, input, map.bytes (), output);
-  GstFlowReturn flow = GST_FLOW_OK;
-  if (priv->first && !is_same_frame_set (priv->first, input))
-    flow = decode_slices (self, output);
-  append_slice (self, input, map.bytes ());
-  return flow;
-}
-
-/* The base class calls this until there is no output: one slice may end two frame sets, the one
- * before it and its own. */
 static GstFlowReturn
 gst_neighbour_code_dec_generate_output (GstBaseTransform *base, GstBuffer **output)
 {
@@ -369,15 +300,14 @@ gst_neighbour_code_dec_generate_output (GstBaseTransform *base, GstBuffer **outp
     GST_ELEMENT_ERROR (self, CORE, NEGOTIATION, (nullptr), ("no caps before the first buffer"));
     return GST_FLOW_NOT_NEGOTIATED;
   }
-  if (GstBuffer *input = g_steal_pointer (&base->queued_buf)) {
-    const bool is_skipped = base->segment.flags & GST_SEGMENT_FLAG_TRICKMODE_KEY_UNITS &&
-                            GST_BUFFER_FLAG_IS_SET (input, GST_BUFFER_FLAG_DELTA_UNIT);
-    const GstFlowReturn flow = is_skipped ? GST_FLOW_OK : handle_input (self, input, output);
-    gst_buffer_unref (input);
-    if (flow != GST_FLOW_OK || *output)
-      return flow;
-  }
-  return priv->complete ? decode_slices (self, output) : GST_FLOW_OK;
+  GstBuffer *input = g_steal_pointer (&base->queued_buf);
+  if (!input)
+    return GST_FLOW_OK;
+  const bool is_skipped = base->segment.flags & GST_SEGMENT_FLAG_TRICKMODE_KEY_UNITS &&
+                          GST_BUFFER_FLAG_IS_SET (input, GST_BUFFER_FLAG_DELTA_UNIT);
+  const GstFlowReturn flow = is_skipped ? GST_FLOW_OK : decode_frame_set (self, input, output);
+  gst_buffer_unref (input);
+  return flow;
 }
 
 /* Never called, but without it GstBaseTransform would operate in passthrough mode. */
@@ -393,33 +323,12 @@ gst_neighbour_code_dec_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta 
   return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
 }
 
-/* Pushes a frame set whose last slice did not come. */
-static void
-drain (GstNeighbourCodeDec *self)
-{
-  GstBuffer *output = nullptr;
-  if (self->priv->first && self->priv->pool && decode_slices (self, &output) == GST_FLOW_OK)
-    gst_pad_push (GST_BASE_TRANSFORM_SRC_PAD (self), output);
-}
-
 static gboolean
 gst_neighbour_code_dec_sink_event (GstBaseTransform *base, GstEvent *event)
 {
   auto self = GST_NEIGHBOUR_CODE_DEC (base);
-  switch (GST_EVENT_TYPE (event)) {
-    case GST_EVENT_FLUSH_STOP:
-      reset_stream (self->priv);
-      break;
-    case GST_EVENT_EOS:
-    case GST_EVENT_CAPS:
-    case GST_EVENT_SEGMENT:
-    case GST_EVENT_GAP:
-    case GST_EVENT_STREAM_START:
-      drain (self);
-      break;
-    default:
-      break;
-  }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    reset_stream (self->priv);
   if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
     self->priv->reporter.finish ();
   if (GST_EVENT_TYPE (event) == GST_EVENT_STREAM_START)

@@ -11,9 +11,8 @@
  * and on GstForceKeyUnit from upstream or downstream (RTP: PLI, FIR); others have the DELTA_UNIT
  * flag. Damage from losses ends after refresh-period at the latest.
  *
- * A buffer is a frame set, or a slice if downstream requires alignment=slice; the last slice of a
- * frame set has the MARKER flag. Frame sets describe themselves, and key frame sets hold the rig:
- * from one of these on, buffers that are written one after another are a recording.
+ * Frame sets describe themselves, and key frame sets hold the rig: from one of these on, buffers
+ * that are written one after another are a recording.
  *
  * ## Example launch lines
  * |[
@@ -74,11 +73,6 @@ struct GstNeighbourCodeEncPrivate {
   bool is_key = true;                          /* the frame set in encoder */
   GstClockTime last_key = GST_CLOCK_TIME_NONE; /* running time */
   AccessUnitWriter writer;
-  bool by_slices = false;          /* alignment of the output */
-  GstBuffer *input = nullptr;      /* the frame set in encoder, until all of it is pushed */
-  std::size_t part = 0;            /* by_slices: the next of encoder's parts */
-  rangecast::UnitReader units{{}}; /* by_slices: rest of the previous part */
-  std::span<const guint8> slice;   /* by_slices: the next slice; empty before the first */
 };
 
 DECLARE_ELEMENT (GstNeighbourCodeEnc, gst_neighbour_code_enc, NEIGHBOUR_CODE_ENC, GstBaseTransform)
@@ -100,15 +94,11 @@ static gboolean
 gst_neighbour_code_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
 {
   GstNeighbourCodeEncPrivate *priv = GST_NEIGHBOUR_CODE_ENC (base)->priv;
-  const GstStructure *structure = gst_caps_get_structure (out, 0);
   const Status status = gstrange::parse_caps (in, priv->info);
   priv->is_configured = false;
   priv->reporter.set_views (priv->info.rig);
   priv->encoder.request_key (); /* decoders reset their references at new caps */
-  const gchar *alignment = gst_structure_get_string (structure, "alignment");
-  priv->by_slices = g_strcmp0 (alignment, "slice") == 0;
   priv->writer.set_rig (priv->info);
-  gst_clear_buffer (&priv->input);
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
   return gst_range_flow_return (GST_ELEMENT (base), status) == GST_FLOW_OK;
 }
@@ -216,20 +206,18 @@ answer_key_requests (GstNeighbourCodeEnc *self, GstBuffer *input)
     gst_pad_push_event (GST_BASE_TRANSFORM_SRC_PAD (self), answer);
 }
 
-/* Encodes the frame set in priv->input, or clears that if the rate leaves it out. */
+/* @param[out] skipped  the rate leaves the frame set out */
 static GstFlowReturn
-encode_input (GstNeighbourCodeEnc *self)
+encode_input (GstNeighbourCodeEnc *self, GstBuffer *input, bool &skipped)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
-  GstBuffer *input = priv->input;
   sync_controlled_values (GST_BASE_TRANSFORM (self), input);
   NeighbourCodeEncSettings settings = settings_of (priv);
   settings.coding.frame_interval_ns =
       priv->info.fps_n > 0 ? priv->info.frame_duration () : GST_SECOND / 30;
-  const bool keeps = priv->rate.begin (settings.rate, input, settings.coding.frame_interval_ns);
-  if (!keeps) {
+  skipped = !priv->rate.begin (settings.rate, input, settings.coding.frame_interval_ns);
+  if (skipped) {
     skip_frame_set (self, input);
-    gst_clear_buffer (&priv->input);
     return GST_FLOW_OK;
   }
   request_key_if_due (self, input, settings);
@@ -254,99 +242,39 @@ encode_input (GstNeighbourCodeEnc *self)
   return GST_FLOW_OK;
 }
 
-/* ---- output: an access unit, or slice by slice ---- */
-
-/* A buffer of these slices with the times and flags of the input, which begins the access unit or
- * continues it; nullptr after an error. */
+/* The encoded frame set with the times and flags of the input; nullptr after an error. */
 static GstBuffer *
-make_output (GstNeighbourCodeEnc *self, std::span<const std::span<const guint8>> parts, bool begins)
+make_output (GstNeighbourCodeEnc *self, GstBuffer *input)
 {
   GstNeighbourCodeEncPrivate *priv = self->priv;
-  gsize size = 0;
-  for (const auto part : parts)
-    size += part.size ();
-  const Status status = begins
-                            ? priv->writer.begin (priv->is_key, size, priv->encoder.size () - size)
-                            : priv->writer.begin_rest (size);
+  const Status status = priv->writer.begin (priv->is_key, priv->encoder.size ());
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return nullptr;
-  for (const auto part : parts)
+  for (const auto part : priv->encoder.parts ())
     priv->writer.add (part);
   GstBuffer *buffer = priv->writer.finish (
-      byte_stream_time (GST_BASE_TRANSFORM (self)->segment, GST_BUFFER_PTS (priv->input)));
-  GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (
-      GST_BASE_TRANSFORM (self), priv->input, buffer);
-  const GstClockTime capture = gst_range_buffer_get_capture_time (priv->input);
+      byte_stream_time (GST_BASE_TRANSFORM (self)->segment, GST_BUFFER_PTS (input)));
+  GST_BASE_TRANSFORM_GET_CLASS (self)->copy_metadata (GST_BASE_TRANSFORM (self), input, buffer);
+  const GstClockTime capture = gst_range_buffer_get_capture_time (input);
   if (GST_CLOCK_TIME_IS_VALID (capture))
     gst_range_buffer_set_capture_time (buffer, capture);
   set_key (buffer, priv->is_key);
   return buffer;
 }
 
-/* The encoder's next slice; empty after the last one. */
-static std::span<const guint8>
-next_slice (GstNeighbourCodeEncPrivate *priv)
-{
-  rangecast::UnitHeader header;
-  while (true) {
-    if (const auto unit = priv->units.next (header))
-      return *unit;
-    if (priv->part == priv->encoder.parts ().size ())
-      return {};
-    priv->units = rangecast::UnitReader (priv->encoder.parts ()[priv->part++]);
-  }
-}
-
-static GstBuffer *
-make_slice (GstNeighbourCodeEnc *self)
-{
-  GstNeighbourCodeEncPrivate *priv = self->priv;
-  const bool is_first = priv->slice.empty ();
-  if (is_first)
-    priv->slice = next_slice (priv);
-  GstBuffer *buffer = make_output (self, std::span (&priv->slice, 1), is_first);
-  if (!buffer)
-    return nullptr;
-  if (!is_first)
-    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_DISCONT | GST_BUFFER_FLAG_RESYNC);
-  priv->slice = next_slice (priv);
-  if (priv->slice.empty ()) {
-    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_MARKER);
-    gst_clear_buffer (&priv->input);
-  } else {
-    GST_BUFFER_FLAG_UNSET (buffer, GST_BUFFER_FLAG_MARKER);
-  }
-  return buffer;
-}
-
-/* The base class calls this until there is no output. A new input may come before all slices of the
- * last one are out, if pushing one of them failed. */
 static GstFlowReturn
 gst_neighbour_code_enc_generate_output (GstBaseTransform *base, GstBuffer **output)
 {
   auto self = GST_NEIGHBOUR_CODE_ENC (base);
-  GstNeighbourCodeEncPrivate *priv = self->priv;
-  if (base->queued_buf) {
-    gst_clear_buffer (&priv->input);
-    priv->input = g_steal_pointer (&base->queued_buf);
-    const GstFlowReturn flow = encode_input (self);
-    if (flow != GST_FLOW_OK) {
-      gst_clear_buffer (&priv->input);
-      return flow;
-    }
-    priv->part = 0;
-    priv->units = rangecast::UnitReader ({});
-    priv->slice = {};
-  }
-  if (!priv->input)
+  GstBuffer *input = g_steal_pointer (&base->queued_buf);
+  if (!input)
     return GST_FLOW_OK;
-  if (priv->by_slices) {
-    *output = make_slice (self);
-  } else {
-    *output = make_output (self, priv->encoder.parts (), true);
-    gst_clear_buffer (&priv->input);
-  }
-  return *output ? GST_FLOW_OK : GST_FLOW_ERROR;
+  bool skipped = false;
+  GstFlowReturn flow = encode_input (self, input, skipped);
+  if (flow == GST_FLOW_OK && !skipped && !(*output = make_output (self, input)))
+    flow = GST_FLOW_ERROR;
+  gst_buffer_unref (input);
+  return flow;
 }
 
 /* Never called, but without it GstBaseTransform would operate in passthrough mode. */
@@ -427,7 +355,6 @@ gst_neighbour_code_enc_stop (GstBaseTransform *base)
   priv->reporter.stop ();
   g_autoptr (GRecMutexLocker) lock = lock_stream (base);
   priv->is_configured = false;
-  gst_clear_buffer (&priv->input);
   priv->writer.drop ();
   return TRUE;
 }

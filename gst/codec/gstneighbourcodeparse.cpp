@@ -77,11 +77,6 @@ struct GstNeighbourCodeParsePrivate {
 DECLARE_ELEMENT (
     GstNeighbourCodeParse, gst_neighbour_code_parse, NEIGHBOUR_CODE_PARSE, GstBaseParse)
 
-#define STREAM_CAPS GST_NEIGHBOUR_CODE_STREAM_CAPS
-#define ACCESS_UNIT_CAPS                                                                           \
-  GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                                    \
-  ", version = (int) 4, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS
-
 G_DEFINE_TYPE (GstNeighbourCodeParse, gst_neighbour_code_parse, GST_TYPE_BASE_PARSE)
 
 /* ---- typefinder ---- */
@@ -99,7 +94,7 @@ find_type (GstTypeFind *find, gpointer)
 static gboolean
 register_with_typefinder (GstPlugin *plugin)
 {
-  GstCaps *caps = gst_caps_from_string (STREAM_CAPS);
+  GstCaps *caps = gst_caps_from_string (GST_NEIGHBOUR_CODE_STREAM_CAPS);
   const gboolean typefinder = gst_type_find_register (plugin, "video/x-neighbour-code",
       GST_RANK_PRIMARY, find_type, "rcnc", caps, nullptr, nullptr);
   gst_caps_unref (caps);
@@ -156,7 +151,7 @@ set_source_caps (GstBaseParse *base)
   stream.src_caps_set = false;
   if (!require_downstream (GST_ELEMENT (base), GST_BASE_PARSE_SRC_PAD (base), false))
     return false;
-  GstCaps *caps = gstrange::make_neighbour_code_caps (stream.info, "access-unit");
+  GstCaps *caps = gstrange::make_neighbour_code_caps (stream.info);
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
   stream.src_caps_set = gst_pad_set_caps (GST_BASE_PARSE_SRC_PAD (base), caps);
   gst_caps_unref (caps);
@@ -489,7 +484,7 @@ gst_neighbour_code_parse_class_init (GstNeighbourCodeParseClass *klass)
   auto parse_class = GST_BASE_PARSE_CLASS (klass);
 
   G_OBJECT_CLASS (klass)->finalize = delete_private<GstNeighbourCodeParse>;
-  add_always_pads (element_class, STREAM_CAPS, ACCESS_UNIT_CAPS);
+  add_always_pads (element_class, GST_NEIGHBOUR_CODE_STREAM_CAPS, GST_NEIGHBOUR_CODE_CAPS);
   gst_element_class_set_static_metadata (element_class, "Neighbour code parser",
       "Codec/Parser/Converter/Video", "Divides neighbour code byte streams into access units",
       "gst-rangecast");

@@ -17,39 +17,23 @@ AccessUnitWriter::set_rig (const gstrange::RangeInfo &info)
 }
 
 Status
-AccessUnitWriter::map_memory (gsize size)
+AccessUnitWriter::begin (bool key, gsize size)
 {
-  GstMemory *memory = memories_.acquire (size);
-  if (memory && gst_memory_map (memory, &map_, GST_MAP_WRITE))
-    return {};
-  g_clear_pointer (&memory, gst_memory_unref);
-  return {StatusCode::kNoSpace, "out of memory for a coded frame set"};
-}
-
-Status
-AccessUnitWriter::begin (bool key, gsize size, gsize more)
-{
-  if (size + more > max_size ())
-    return {StatusCode::kBadSize, "A coded frame set of " + std::to_string (size + more) +
+  if (size > max_size ())
+    return {StatusCode::kBadSize, "A coded frame set of " + std::to_string (size) +
                                       " bytes is longer than 32 MiB with its rig; set larger "
                                       "thresholds or a smaller frame size"};
   const gsize rig_size = key || repeats_rig_ ? rig_.size () : 0;
-  if (Status s = map_memory (kAccessUnitHeaderSize + rig_size + size); !s.ok ())
-    return s;
-  begins_ = true;
+  GstMemory *memory = memories_.acquire (kAccessUnitHeaderSize + rig_size + size);
+  if (!memory || !gst_memory_map (memory, &map_, GST_MAP_WRITE)) {
+    g_clear_pointer (&memory, gst_memory_unref);
+    return {StatusCode::kNoSpace, "out of memory for a coded frame set"};
+  }
   repeats_rig_ = false;
-  header_ = {.size = guint32 (rig_size + more), .key = key};
+  header_ = {.size = guint32 (rig_size), .key = key};
   std::copy_n (rig_.begin (), rig_size, map_.data + kAccessUnitHeaderSize);
   end_ = kAccessUnitHeaderSize + rig_size;
   return {};
-}
-
-Status
-AccessUnitWriter::begin_rest (gsize size)
-{
-  begins_ = false;
-  end_ = 0;
-  return map_memory (size);
 }
 
 guint8 *
@@ -69,8 +53,7 @@ GstBuffer *
 AccessUnitWriter::finish (GstClockTime time)
 {
   header_.pts_ns = time;
-  if (begins_)
-    rangecast::write_access_unit_header (header_, map_.data);
+  rangecast::write_access_unit_header (header_, map_.data);
   GstMemory *memory = map_.memory;
   gst_memory_unmap (memory, &map_);
   gst_memory_resize (memory, 0, end_);

@@ -11,9 +11,7 @@
 #include "recycledmemories.hpp"
 
 /** Raw frame sets, or coded ones as access units. */
-#define FRAME_SET_CAPS                                                                             \
-  GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                \
-                 ", version = (int) 4, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS
+#define FRAME_SET_CAPS GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_CAPS
 
 /** Makes access units that describe themselves: an access-unit unit, the rig in key ones and where
  *  it is new, then the slices, in one memory that is recycled. Streaming thread. */
@@ -25,13 +23,10 @@ public:
   /** Maximum bytes of an access unit's slices. */
   [[nodiscard]] gsize max_size () const { return rangecast::kMaxAccessUnitSize - rig_.size (); }
 
-  /** Begins a buffer that begins an access unit.
+  /** Begins an access unit.
    *  @param size  maximum bytes of its slices
-   *  @param more  bytes of those that follow in other buffers
    *  @return kBadSize if that is more than max_size(), kNoSpace if memory is short */
-  rangecast::Status begin (bool key, gsize size, gsize more = 0);
-  /** Begins a buffer that continues an access unit. @return kNoSpace if memory is short */
-  rangecast::Status begin_rest (gsize size);
+  rangecast::Status begin (bool key, gsize size);
   guint8 *add (std::span<const guint8> slices); ///< @return where they are, until finish()
   /** @param time  in the byte stream: see byte_stream_time()
    *  @return (transfer full): without times and flags */
@@ -41,15 +36,12 @@ public:
   void drop () { memories_.drop (); }
 
 private:
-  rangecast::Status map_memory (gsize size);
-
   std::vector<guint8> rig_;  /* units */
   bool repeats_rig_ = false; /* in the next access unit, whether it is a key one or not */
   RecycledMemories memories_;
   GstMapInfo map_{};                   /* of the memory that is written */
   gsize end_ = 0;                      /* bytes that are written or reserved in it */
-  bool begins_ = false;                /* with an access-unit unit */
-  rangecast::AccessUnitHeader header_; /* that unit */
+  rangecast::AccessUnitHeader header_; /* the access-unit unit */
 };
 
 /** The time in a byte stream of a buffer's PTS: its running time, so that times go on in a new

@@ -258,7 +258,7 @@ push_caps (GstRangeDemux *self, DemuxPad &entry, const View &view)
 {
   const RangeInfo &all = self->priv->info;
   const RangeInfo info = gstrange::make_info ({{view}}, all.fps_n, all.fps_d);
-  GstCaps *caps = self->priv->coded ? gstrange::make_neighbour_code_caps (info, "access-unit")
+  GstCaps *caps = self->priv->coded ? gstrange::make_neighbour_code_caps (info)
                                     : gstrange::make_range_caps (info);
   GST_INFO_OBJECT (entry.pad, "%" GST_PTR_FORMAT, caps);
   entry.writer.set_rig (info);

@@ -240,8 +240,7 @@ choose_streams (const MuxStreams &streams, bool strict, gstrange::RangeInfo &inf
     return {};
   const MuxStream &first = *chosen.front ();
   info = gstrange::make_info (std::move (united), first.info.fps_n, first.info.fps_d);
-  caps = first.coded ? gstrange::make_neighbour_code_caps (info, "access-unit")
-                     : gstrange::make_range_caps (info);
+  caps = first.coded ? gstrange::make_neighbour_code_caps (info) : gstrange::make_range_caps (info);
   return {};
 }
 

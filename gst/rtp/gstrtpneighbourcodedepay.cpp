@@ -105,7 +105,7 @@ set_source_caps (GstRTPBaseDepayload *base, const rangecast::StreamInfo &stream)
 {
   GstRtpNeighbourCodeDepayPrivate *priv = GST_RTP_NEIGHBOUR_CODE_DEPAY (base)->priv;
   const auto info = gstrange::make_info (stream.rig, stream.fps_n, stream.fps_d);
-  GstCaps *caps = gstrange::make_neighbour_code_caps (info, "access-unit");
+  GstCaps *caps = gstrange::make_neighbour_code_caps (info);
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
   GstPad *src = GST_RTP_BASE_DEPAYLOAD_SRCPAD (base);
   priv->have_caps = require_downstream (GST_ELEMENT (base), src);
@@ -453,8 +453,7 @@ gst_rtp_neighbour_code_depay_class_init (GstRtpNeighbourCodeDepayClass *klass)
   add_always_pads (element_class,
       "application/x-rtp, media = (string) video, "
       "clock-rate = (int) 90000, encoding-name = (string) X-NEIGHBOUR-CODE",
-      GST_NEIGHBOUR_CODE_MEDIA_TYPE
-      ", version = (int) 4, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS);
+      GST_NEIGHBOUR_CODE_CAPS);
   gst_element_class_set_static_metadata (element_class, "RTP neighbour code depayloader",
       "Codec/Depayloader/Network/RTP", "Extracts neighbour-coded frame sets from RTP packets",
       "gst-rangecast");

@@ -3,9 +3,8 @@
  * SECTION:element-rtpneighbourcodepay
  * @title: rtpneighbourcodepay
  *
- * Packs coded frame sets into RTP packets of whole units, which decode independently. With
- * alignment=slice a packet is sent as soon as its slice arrives. The format is specified in
- * docs/formats/rtp-payload.md.
+ * Packs coded frame sets into RTP packets of whole units, which decode independently. The format is
+ * specified in docs/formats/rtp-payload.md.
  *
  * ## Example launch line
  * |[
@@ -60,9 +59,6 @@ struct GstRtpNeighbourCodePayPrivate {
   std::vector<guint8> rig_units;
   bool rig_changed = false;                       /* and has not been sent since */
   GstClockTime last_config = GST_CLOCK_TIME_NONE; /* running time */
-  bool by_slices = false;                         /* alignment of the input */
-  bool within_frame_set = false;                  /* more slices of it may follow */
-  GstClockTime pts = GST_CLOCK_TIME_NONE;         /* of the last slice */
 };
 
 DECLARE_ELEMENT (
@@ -111,9 +107,6 @@ gst_rtp_neighbour_code_pay_set_caps (GstRTPBasePayload *base, GstCaps *caps)
   rangecast::write_rig_units ({info.rig, info.fps_n, info.fps_d}, priv->rig_units);
   priv->rig_changed |= !before.empty () && before != priv->rig_units;
   priv->last_config = GST_CLOCK_TIME_NONE;
-  const GstStructure *structure = gst_caps_get_structure (caps, 0);
-  priv->by_slices = g_strcmp0 (gst_structure_get_string (structure, "alignment"), "slice") == 0;
-  priv->within_frame_set = false;
   GST_INFO_OBJECT (base, "%" GST_PTR_FORMAT, caps);
   return set_output_caps (base, info);
 }
@@ -196,17 +189,6 @@ header_size (GstRtpNeighbourCodePay *self)
   return gst_rtp_buffer_calc_header_len (0) + (extensions > 0 ? 4 + 12 * extensions : 0);
 }
 
-/* Whether a buffer begins a frame set. The end of one without MARKER is known only afterwards; its
- * packets have no marker, and receivers recognise the end by the next timestamp. */
-static bool
-begins_frame_set (GstRtpNeighbourCodePayPrivate *priv, GstBuffer *buffer, bool is_last)
-{
-  const bool begins = !priv->within_frame_set || GST_BUFFER_PTS (buffer) != priv->pts;
-  priv->within_frame_set = !is_last;
-  priv->pts = GST_BUFFER_PTS (buffer);
-  return begins;
-}
-
 static bool
 config_is_due (GstRtpNeighbourCodePay *self, GstClockTime running)
 {
@@ -252,8 +234,8 @@ refuse_long_unit (GstRTPBasePayload *base, const UnitHeader &unit, guint mtu, gs
   return GST_FLOW_ERROR;
 }
 
-/* Makes packets of the rig, if it is due, and of the slices of a frame set, or some of them. The
- * rig units of the frame set itself come too often, or not when they are due. */
+/* Makes packets of the rig, if it is due, and of the slices of a frame set. The rig units of the
+ * frame set itself come too often, or not when they are due. */
 static std::optional<UnitHeader>
 pack_all (GstRtpNeighbourCodePay *self, Packer &packer, GstBuffer *buffer, bool with_rig)
 {
@@ -277,11 +259,8 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
       GST_BUFFER_PTS (buffer), GST_BUFFER_DTS (buffer)};
   const GstClockTime running =
       gst_segment_to_running_time (&base->segment, GST_FORMAT_TIME, GST_BUFFER_PTS (buffer));
-  const bool is_last =
-      !self->priv->by_slices || GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_MARKER);
-  const bool begins = begins_frame_set (self->priv, buffer, is_last);
-  self->priv->frame_sets += begins;
-  const auto too_long = pack_all (self, packer, buffer, begins && config_is_due (self, running));
+  self->priv->frame_sets++;
+  const auto too_long = pack_all (self, packer, buffer, config_is_due (self, running));
   self->priv->reporter.passed (GST_ELEMENT (self), buffer);
   gst_buffer_unref (buffer);
   if (packer.unreadable) {
@@ -297,8 +276,7 @@ gst_rtp_neighbour_code_pay_handle_buffer (GstRTPBasePayload *base, GstBuffer *bu
     gst_buffer_list_unref (packer.packets);
     return GST_FLOW_OK;
   }
-  if (is_last)
-    set_marker (packer.packets);
+  set_marker (packer.packets);
   GST_LOG_OBJECT (self, "%u packets of %" GST_TIME_FORMAT, gst_buffer_list_length (packer.packets),
       GST_TIME_ARGS (packer.pts));
   self->priv->packets += gst_buffer_list_length (packer.packets);

@@ -62,10 +62,8 @@ struct GstRangeWebSinkPrivate {
 
 DECLARE_ELEMENT (GstRangeWebSink, gst_range_web_sink, RANGE_WEB_SINK, GstBaseSink)
 
-static GstStaticPadTemplate sink_template =
-    GST_STATIC_PAD_TEMPLATE ("sink", GST_PAD_SINK, GST_PAD_ALWAYS,
-        GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-            ", version = (int) 4, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS));
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_CAPS));
 
 static GstStaticPadTemplate audio_template = GST_STATIC_PAD_TEMPLATE ("audio", GST_PAD_SINK,
     GST_PAD_REQUEST, GST_STATIC_CAPS ("audio/x-opus, channel-mapping-family = (int) 0"));

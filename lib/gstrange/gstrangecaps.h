@@ -28,13 +28,12 @@ G_BEGIN_DECLS
 /**
  * GST_NEIGHBOUR_CODE_CAPS:
  *
- * Coded frame sets in buffers of access units or slices. Fixed caps also have rig = (buffer). Key
- * access units hold the rig, too: buffers from one on, written one after another, are a recording.
+ * Coded frame sets in buffers of access units. Fixed caps also have rig = (buffer). Key access
+ * units hold the rig, too: buffers from one on, written one after another, are a recording.
  */
 #define GST_NEIGHBOUR_CODE_CAPS                                                                    \
   GST_NEIGHBOUR_CODE_MEDIA_TYPE                                                                    \
-  ", version = (int) 4, "                                                                          \
-  "alignment = (string) { access-unit, slice }, " GST_RANGE_SIZE_CAPS
+  ", version = (int) 4, alignment = (string) access-unit, " GST_RANGE_SIZE_CAPS
 
 /**
  * GST_NEIGHBOUR_CODE_STREAM_CAPS:

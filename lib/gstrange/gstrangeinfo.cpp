@@ -137,10 +137,10 @@ make_range_caps (const RangeInfo &info)
 }
 
 GstCaps *
-make_neighbour_code_caps (const RangeInfo &info, const char *alignment)
+make_neighbour_code_caps (const RangeInfo &info)
 {
   return with_common_fields (gst_caps_new_simple (GST_NEIGHBOUR_CODE_MEDIA_TYPE, "version",
-                                 G_TYPE_INT, 4, "alignment", G_TYPE_STRING, alignment, nullptr),
+                                 G_TYPE_INT, 4, "alignment", G_TYPE_STRING, "access-unit", nullptr),
       info);
 }
 
@@ -149,8 +149,8 @@ recode_caps (const GstCaps *caps, bool coded, GstCaps *filter)
 {
   static GstStaticCaps media[] = {
       GST_STATIC_CAPS (GST_RANGE_MEDIA_TYPE ", format = (string) Z16_RGBx"),
-      GST_STATIC_CAPS (GST_NEIGHBOUR_CODE_MEDIA_TYPE
-          ", version = (int) 4, alignment = (string) { access-unit, slice }")};
+      GST_STATIC_CAPS (
+          GST_NEIGHBOUR_CODE_MEDIA_TYPE ", version = (int) 4, alignment = (string) access-unit")};
   GstCaps *form = gst_static_caps_get (&media[coded]);
   GstCaps *other = gst_caps_new_empty ();
   for (guint i = 0; i < gst_caps_get_size (caps); i++) {

@@ -44,9 +44,9 @@ rangecast::Status parse_view (const GstCaps *caps, rangecast::View &view);
 /** Copies caps and replaces their rig. Returns: (transfer full) */
 GstCaps *with_rig (const GstCaps *caps, const rangecast::Rig &rig);
 
-/** video/x-neighbour-code with alignment "access-unit" or "slice". Returns: (transfer full)
+/** video/x-neighbour-code of access units. Returns: (transfer full)
  */
-GstCaps *make_neighbour_code_caps (const RangeInfo &info, const char *alignment);
+GstCaps *make_neighbour_code_caps (const RangeInfo &info);
 
 /** transform_caps() of encoder and decoder: the same fields as video/x-range or, if `coded`, as
  *  video/x-neighbour-code. Returns: (transfer full) */

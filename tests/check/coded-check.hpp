@@ -17,9 +17,9 @@ range_caps (const Rig &rig)
 }
 
 inline GstCaps *
-coded_caps (const Rig &rig, const char *alignment = "access-unit")
+coded_caps (const Rig &rig)
 {
-  return gstrange::make_neighbour_code_caps (gstrange::make_info (rig, 30, 1), alignment);
+  return gstrange::make_neighbour_code_caps (gstrange::make_info (rig, 30, 1));
 }
 
 inline std::vector<guint8>

@@ -36,7 +36,7 @@ caps_of_fields (Bytes bytes, bool coded)
   const gsize used = std::min (bytes.size (), sizeof numbers);
   std::memcpy (numbers.data (), bytes.data (), used);
   GstCaps *caps = coded ? gst_caps_new_simple (GST_NEIGHBOUR_CODE_MEDIA_TYPE, "version", G_TYPE_INT,
-                              1, "alignment", G_TYPE_STRING, "slice", nullptr)
+                              1, "alignment", G_TYPE_STRING, "access-unit", nullptr)
                         : gst_caps_new_simple (
                               GST_RANGE_MEDIA_TYPE, "format", G_TYPE_STRING, "Z16_RGBx", nullptr);
   gst_caps_set_simple (caps, "width", G_TYPE_INT, numbers[0], "height", G_TYPE_INT, numbers[1],
@@ -64,7 +64,7 @@ check (const GstCaps *caps)
             gst_range_caps_get_camera (caps, guint (view.id), &camera) &&
             camera.width == view.width);
   (void)info.frame_duration ();
-  GstCaps *made = gstrange::make_neighbour_code_caps (info, "access-unit");
+  GstCaps *made = gstrange::make_neighbour_code_caps (info);
   expect (gstrange::parse_caps (made, again).ok () && again.width == info.width &&
           rangecast::encode_rig (again.rig) == rangecast::encode_rig (info.rig));
   gst_caps_unref (made);

@@ -64,8 +64,7 @@ parser_of_access_units ()
   view.width = 80;
   view.height = 60;
   view.intrinsics = {60, 60, 39.5, 29.5};
-  return make_harness (
-      gstrange::make_neighbour_code_caps (gstrange::make_info ({{view}}, 30, 1), "access-unit"));
+  return make_harness (gstrange::make_neighbour_code_caps (gstrange::make_info ({{view}}, 30, 1)));
 }
 
 static void

@@ -17,7 +17,7 @@ decoder_harness (const Rig &rig, const char *launch = "neighbourcodedec")
 {
   GstHarness *h = gst_harness_new_parse (launch);
   gst_harness_set_src_caps (
-      h, gstrange::make_neighbour_code_caps (gstrange::make_info (rig, 30, 1), "access-unit"));
+      h, gstrange::make_neighbour_code_caps (gstrange::make_info (rig, 30, 1)));
   return h;
 }
 
@@ -124,7 +124,7 @@ GST_START_TEST (test_works_again_after_null)
   gst_element_set_state (h->element, GST_STATE_NULL);
   gst_harness_play (h);
   gst_harness_set_src_caps (
-      h, gstrange::make_neighbour_code_caps (gstrange::make_info (rig, 30, 1), "access-unit"));
+      h, gstrange::make_neighbour_code_caps (gstrange::make_info (rig, 30, 1)));
   GstBuffer *output = gst_harness_push_and_pull (h, coded);
   fail_unless_equals_uint64 (stats_field (h, "neighbourcodedec", "frames"), 1);
   gst_buffer_unref (output);
@@ -190,133 +190,6 @@ GST_START_TEST (test_discont_of_a_lost_packet_does_not_stop_concealment_but_a_ju
     gst_buffer_unref (output);
   }
   gst_buffer_unref (whole);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-/* ---- alignment=slice ---- */
-
-static GstHarness *
-slice_decoder (const Rig &rig, const char *properties = "")
-{
-  GstHarness *h = harness_of (std::string ("neighbourcodedec ") + properties);
-  gst_harness_set_src_caps (h, coded_caps (rig, "slice"));
-  return h;
-}
-
-static void
-push_slices (GstHarness *h, const std::vector<std::vector<guint8>> &units, GstClockTime time,
-    bool with_marker)
-{
-  for (std::size_t i = 0; i < units.size (); i++) {
-    GstBuffer *slice = buffer_of ({units[i]}, time);
-    if (with_marker && i + 1 == units.size ())
-      GST_BUFFER_FLAG_SET (slice, GST_BUFFER_FLAG_MARKER);
-    fail_unless_equals_int (gst_harness_push (h, slice), GST_FLOW_OK);
-  }
-}
-
-static void
-expect_frame_set (GstHarness *h, GstBuffer *expected, GstClockTime time)
-{
-  GstBuffer *output = gst_harness_try_pull (h);
-  fail_unless (output != nullptr);
-  fail_unless_equals_uint64 (GST_BUFFER_PTS (output), time);
-  fail_unless_equals_uint64 (gst_range_buffer_get_capture_time (output), time);
-  fail_if (GST_BUFFER_FLAG_IS_SET (output, GST_BUFFER_FLAG_MARKER));
-  fail_unless_equals_int (points (output), points (expected));
-  for (const int row : {0, 100, 239})
-    fail_unless_cmp (depths_of_row (output, row), ==, depths_of_row (expected, row));
-  gst_buffer_unref (output);
-}
-
-GST_START_TEST (test_frame_set_of_slices_ends_with_its_marker)
-{
-  const Rig rig = ring_rig (2);
-  GstBuffer *input = make_frame_set (rig);
-  const auto units = encoded_units (rig, gst_buffer_ref (input));
-  GstHarness *h = slice_decoder (rig);
-  for (GstClockTime time = 0; time < 3; time++) {
-    push_slices (h, units, time, true);
-    expect_frame_set (h, input, time);
-  }
-  gst_buffer_unref (input);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_frame_set_of_slices_without_marker_ends_at_the_next_capture_time)
-{
-  const Rig rig = ring_rig (2);
-  GstBuffer *input = make_frame_set (rig);
-  const auto units = encoded_units (rig, gst_buffer_ref (input));
-  GstHarness *h = slice_decoder (rig);
-  push_slices (h, units, 0, false);
-  fail_unless_equals_int (gst_harness_buffers_received (h), 0);
-  push_slices (h, {units[0]}, 1, true); /* ends two */
-  expect_frame_set (h, input, 0);
-  GstBuffer *second = gst_harness_try_pull (h);
-  fail_unless_equals_int (gst_buffer_n_range_metas (second), 1);
-  gst_buffer_unref (second);
-  gst_buffer_unref (input);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_last_slices_come_out_before_eos_gap_and_new_caps)
-{
-  const Rig rig = ring_rig (1);
-  GstBuffer *input = make_frame_set (rig);
-  const auto units = encoded_units (rig, gst_buffer_ref (input));
-  GstHarness *h = slice_decoder (rig);
-  push_slices (h, units, 0, false);
-  fail_unless (gst_harness_push_event (h, gst_event_new_gap (1, 1)));
-  expect_frame_set (h, input, 0);
-  push_slices (h, units, 2, false);
-  gst_harness_set_src_caps (h, coded_caps (ring_rig (2), "slice"));
-  expect_frame_set (h, input, 2);
-  gst_harness_set_src_caps (h, coded_caps (rig));
-  GstBuffer *output = gst_harness_push_and_pull (h, buffer_of (units, 3));
-  fail_unless_equals_int (points (output), points (input));
-  gst_buffer_unref (output);
-  gst_harness_set_src_caps (h, coded_caps (rig, "slice"));
-  push_slices (h, units, 4, false);
-  fail_unless (gst_harness_push_event (h, gst_event_new_eos ()));
-  expect_frame_set (h, input, 4);
-  gst_buffer_unref (input);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_flush_and_null_drop_slices_that_wait)
-{
-  const Rig rig = ring_rig (1);
-  const auto units = encoded_units (rig, make_frame_set (rig));
-  GstHarness *h = slice_decoder (rig);
-  push_slices (h, units, 0, false);
-  flush (h);
-  push_slices (h, units, 1, false);
-  for (const GstState state : {GST_STATE_READY, GST_STATE_NULL, GST_STATE_NULL})
-    ck_assert_int_eq (gst_element_set_state (h->element, state), GST_STATE_CHANGE_SUCCESS);
-  gst_harness_play (h);
-  gst_harness_set_src_caps (h, coded_caps (rig, "slice"));
-  push_slices (h, units, 2, true);
-  fail_unless_equals_int (gst_harness_buffers_received (h), 1);
-  fail_unless_equals_uint64 (stats_field (h, "neighbourcodedec", "frames"), 1);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_endless_frame_set_of_slices_stays_below_32_MiB)
-{
-  const Rig rig = ring_rig (1);
-  GstHarness *h = slice_decoder (rig);
-  const std::vector<guint8> chunk (1 << 20, kBitstreamVersion << 4 | 9);
-  for (int i = 0; i < 40; i++)
-    push_slices (h, {chunk}, 0, false);
-  push_slices (h, {chunk}, 0, true);
-  gst_buffer_unref (gst_harness_pull (h));
-  ck_assert_uint_le (stats_field (h, "neighbourcodedec", "coded-bytes"), 32 << 20);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -502,11 +375,6 @@ neighbourcodedec_suite ()
   tcase_add_test (tc, test_first_damage_of_a_stream_is_a_warning_and_losses_are_not);
   tcase_add_test (
       tc, test_discont_of_a_lost_packet_does_not_stop_concealment_but_a_jump_in_time_does);
-  tcase_add_test (tc, test_frame_set_of_slices_ends_with_its_marker);
-  tcase_add_test (tc, test_frame_set_of_slices_without_marker_ends_at_the_next_capture_time);
-  tcase_add_test (tc, test_last_slices_come_out_before_eos_gap_and_new_caps);
-  tcase_add_test (tc, test_flush_and_null_drop_slices_that_wait);
-  tcase_add_test (tc, test_endless_frame_set_of_slices_stays_below_32_MiB);
   tcase_add_test (tc, test_rig_beyond_the_limit_is_an_error_that_names_it);
   tcase_add_test (tc, test_memory_for_each_view_decodes_as_one_memory);
   tcase_add_test (tc, test_view_of_which_nothing_comes_stays_for_a_second_and_goes);

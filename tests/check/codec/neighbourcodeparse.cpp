@@ -126,8 +126,8 @@ static GstHarness *
 parser_of_access_units (const Recording &recording)
 {
   GstHarness *h = harness_of ("neighbourcodeparse");
-  gst_harness_set_src_caps (h, gstrange::make_neighbour_code_caps (
-                                   gstrange::make_info (recording.rig, 25, 1), "access-unit"));
+  gst_harness_set_src_caps (
+      h, gstrange::make_neighbour_code_caps (gstrange::make_info (recording.rig, 25, 1)));
   return h;
 }
 

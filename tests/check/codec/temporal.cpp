@@ -226,8 +226,8 @@ GST_END_TEST;
 GST_START_TEST (test_rtp_and_the_parser_keep_the_delta_flag)
 {
   const Rig rig = ring_rig (2);
-  for (const char *between : {"rtpneighbourcodepay ! rtpneighbourcodedepay", "neighbourcodeparse",
-           "capsfilter caps=video/x-neighbour-code,alignment=slice ! neighbourcodeparse"}) {
+  for (const char *between :
+      {"rtpneighbourcodepay ! rtpneighbourcodedepay", "neighbourcodeparse"}) {
     GstHarness *h = gst_harness_new_parse (
         (std::string ("neighbourcodeenc temporal=true profile=entropy ! ") + between).c_str ());
     gst_harness_set_src_caps (h, range_caps (rig));
@@ -247,7 +247,6 @@ GST_END_TEST;
 /* ---- a person who moves, pixel by pixel ---- */
 
 static constexpr int kWidth = 320, kHeight = 240;
-static const std::string kBySlices = "! capsfilter caps=video/x-neighbour-code,alignment=slice ";
 
 /* What a chain of elements makes of some buffers. */
 struct Made {
@@ -361,21 +360,6 @@ GST_START_TEST (test_person_who_moves_stays_within_the_thresholds_and_takes_fewe
         most.depth <= 18 && most.colour <= 10, "%s: %d and %d", profile, most.depth, most.colour);
     const double part = double (coded.bytes ()) / double (intra.bytes ());
     fail_unless (part < 0.75, "%s: %g", profile, part);
-  }
-}
-GST_END_TEST;
-
-GST_START_TEST (test_slices_one_by_one_are_the_frame_sets_of_access_units)
-{
-  const Scene scene (2, kWidth, kHeight, 6);
-  for (const char *profile : kProfiles) {
-    const Made whole = encoded (scene, encoder_of (profile));
-    const Made slices = encoded (scene, encoder_of (profile, kBySlices));
-    ck_assert_uint_gt (slices.buffers.size (), 10 * whole.buffers.size ());
-    fail_unless (decoded (slices) == decoded (whole), "%s", profile);
-    for (GstBuffer *slice : slices.buffers) /* of a frame set, not of the slice */
-      ck_assert_int_eq (
-          GST_BUFFER_FLAG_IS_SET (slice, GST_BUFFER_FLAG_DELTA_UNIT), (GST_BUFFER_PTS (slice) > 0));
   }
 }
 GST_END_TEST;
@@ -510,7 +494,6 @@ temporal_suite (void)
   tcase_add_test (tc, test_frame_sets_that_others_refer_to_are_decoded_also_when_late);
   tcase_add_test (tc, test_rtp_and_the_parser_keep_the_delta_flag);
   tcase_add_test (tc, test_person_who_moves_stays_within_the_thresholds_and_takes_fewer_bytes);
-  tcase_add_test (tc, test_slices_one_by_one_are_the_frame_sets_of_access_units);
   tcase_add_test (tc, test_views_and_threads_do_not_matter);
   tcase_add_test (tc, test_encoder_refers_over_255_numbers_and_across_2_to_the_32_but_no_further);
   tcase_add_test (tc, test_encoder_of_each_view_and_rangemux_give_what_one_encoder_of_all_gives);

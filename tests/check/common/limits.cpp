@@ -303,17 +303,16 @@ GST_START_TEST (test_access_unit_of_more_than_32_MiB_with_its_rig_is_an_error)
   AccessUnitWriter writer;
   writer.set_rig (gstrange::make_info (ring_rig (2), 25, 1));
   const gsize longest = writer.max_size ();
-  for (const gsize more : {0, 1})
-    for (const gsize in_others : {gsize{0}, longest / 2}) {
-      const Status status = writer.begin (true, longest + more - in_others, in_others);
-      fail_unless_equals_int (status.ok (), more == 0);
-      if (status.ok ()) {
-        GstBuffer *buffer = writer.finish (0);
-        AccessUnitHeader header;
-        fail_unless_ok (read_access_unit_header (bytes_of (buffer), header));
-        gst_buffer_unref (buffer);
-      }
+  for (const gsize more : {0, 1}) {
+    const Status status = writer.begin (true, longest + more);
+    fail_unless_equals_int (status.ok (), more == 0);
+    if (status.ok ()) {
+      GstBuffer *buffer = writer.finish (0);
+      AccessUnitHeader header;
+      fail_unless_ok (read_access_unit_header (bytes_of (buffer), header));
+      gst_buffer_unref (buffer);
     }
+  }
 }
 GST_END_TEST;
 

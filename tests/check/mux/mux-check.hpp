@@ -33,9 +33,8 @@ struct Mux {
       gst_harness_use_testclock (out);
     for (int i = 0; i < views; i++) {
       const auto info = gstrange::make_info (one (i), 25, 1);
-      gst_harness_set_src_caps (
-          in[i], coded ? gstrange::make_neighbour_code_caps (info, "access-unit")
-                       : gstrange::make_range_caps (info));
+      gst_harness_set_src_caps (in[i],
+          coded ? gstrange::make_neighbour_code_caps (info) : gstrange::make_range_caps (info));
     }
     gst_harness_play (out);
   }

@@ -200,9 +200,8 @@ offset_second_view (Mux &mux, bool coded)
 {
   const auto info = gstrange::make_info (mux.one (0), 25, 1);
   gst_child_proxy_set (GST_CHILD_PROXY (mux.out->element), "sink_1::view-id-offset", 4, nullptr);
-  gst_harness_set_src_caps (
-      mux.in[1], coded ? gstrange::make_neighbour_code_caps (info, "access-unit")
-                       : gstrange::make_range_caps (info));
+  gst_harness_set_src_caps (mux.in[1],
+      coded ? gstrange::make_neighbour_code_caps (info) : gstrange::make_range_caps (info));
 }
 
 GST_START_TEST (test_view_ids_that_the_offset_makes_too_large_are_left_out)

@@ -222,8 +222,8 @@ GST_START_TEST (test_a_host_of_the_other_format_does_not_stop_the_others)
 {
   LiveMux mux (3);
   mux.always (3);
-  gst_harness_set_src_caps (mux.in[0],
-      gstrange::make_neighbour_code_caps (gstrange::make_info (mux.one (0), 25, 1), "access-unit"));
+  gst_harness_set_src_caps (
+      mux.in[0], gstrange::make_neighbour_code_caps (gstrange::make_info (mux.one (0), 25, 1)));
   fail_unless_equals_int (mux.ever (kSecond), 0b110);
   fail_unless (contains (mux.warnings (), "all raw or all coded"));
 }

@@ -28,7 +28,7 @@ struct Sent {
         encoder, gstrange::make_range_caps (gstrange::make_info (rig, 25, 1)));
     GstHarness *h = gst_harness_new_parse (launch);
     gst_harness_set_src_caps (
-        h, gstrange::make_neighbour_code_caps (gstrange::make_info (rig, 25, 1), "access-unit"));
+        h, gstrange::make_neighbour_code_caps (gstrange::make_info (rig, 25, 1)));
     for (int i = 0; i < frames; i++) {
       GstBuffer *coded =
           gst_harness_push_and_pull (encoder, make_frame_set (rig, i * GST_SECOND / 25));

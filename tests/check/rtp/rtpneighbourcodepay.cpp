@@ -7,10 +7,10 @@ using namespace rangecast;
 using namespace rangecast::testing;
 
 static GstHarness *
-payloader (const Rig &rig, const char *properties = "", const char *alignment = "access-unit")
+payloader (const Rig &rig, const char *properties = "")
 {
   GstHarness *h = harness_of (std::string ("rtpneighbourcodepay ") + properties);
-  gst_harness_set_src_caps (h, coded_caps (rig, alignment));
+  gst_harness_set_src_caps (h, coded_caps (rig));
   return h;
 }
 
@@ -244,27 +244,14 @@ GST_START_TEST (test_damaged_and_empty_access_units_are_no_error)
 }
 GST_END_TEST;
 
-static void
-push_slices (GstHarness *h, const std::vector<std::vector<guint8>> &units, GstClockTime time,
-    bool with_marker)
-{
-  for (std::size_t i = 0; i < units.size (); i++) {
-    GstBuffer *slice = buffer_of ({units[i]}, time);
-    if (with_marker && i + 1 == units.size ())
-      GST_BUFFER_FLAG_SET (slice, GST_BUFFER_FLAG_MARKER);
-    fail_unless_equals_int (gst_harness_push (h, slice), GST_FLOW_OK);
-  }
-}
-
-GST_START_TEST (test_slices_leave_as_they_come_and_the_last_has_the_marker)
+GST_START_TEST (test_last_packet_of_a_frame_set_has_the_marker)
 {
   const Rig rig = ring_rig (2);
   const auto units = encoded_units (rig, make_frame_set (rig), "");
-  GstHarness *h = payloader (rig, "config-interval=-1", "slice");
+  GstHarness *h = payloader (rig, "config-interval=-1");
   for (int frame = 0; frame < 2; frame++) {
-    push_slices (h, units, frame * GST_SECOND / 30, true);
+    gst_harness_push (h, buffer_of (units, frame * GST_SECOND / 30));
     const auto packets = pull_packets (h);
-    ck_assert_uint_ge (packets.size (), units.size ());
     fail_unless_equals_int (count (packets, UnitType::kSlice), int (units.size ()));
     fail_unless_equals_int (count (packets, UnitType::kRigView), 2);
     for (std::size_t i = 0; i < packets.size (); i++) {
@@ -290,7 +277,7 @@ rtpneighbourcodepay_suite ()
   tcase_add_test (tc, test_without_config_interval_only_a_changed_rig_is_sent_and_once);
   tcase_add_test (tc, test_units_that_belong_to_files_are_not_sent);
   tcase_add_test (tc, test_damaged_and_empty_access_units_are_no_error);
-  tcase_add_test (tc, test_slices_leave_as_they_come_and_the_last_has_the_marker);
+  tcase_add_test (tc, test_last_packet_of_a_frame_set_has_the_marker);
   return suite;
 }
 
