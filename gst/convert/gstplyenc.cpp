@@ -4,7 +4,8 @@
  * @title: plyenc
  *
  * Encodes each frame set as a point cloud: one binary PLY file per buffer, in world coordinates and
- * metres, for multifilesink.
+ * metres, for multifilesink. If downstream requires model/gltf-binary, it is a mesh in a binary
+ * glTF 2.0 file.
  *
  * ## Example launch line
  * |[
@@ -21,8 +22,11 @@
 #include <gstrange/gstrangeframe.hpp>
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangestatus.hpp>
+#include <memory>
 #include <mutex>
+#include <rangecast/geometry/glb.hpp>
 #include <rangecast/geometry/point_cloud.hpp>
+#include <vector>
 
 GST_DEBUG_CATEGORY_STATIC (gst_ply_enc_debug);
 #define GST_CAT_DEFAULT gst_ply_enc_debug
@@ -35,7 +39,8 @@ struct GstPlyEncPrivate {
 
   /* streaming thread */
   gstrange::RangeInfo info;
-  guint64 frames = 0; /* since start or flush */
+  bool is_glb = false; /* the output */
+  guint64 frames = 0;  /* since start or flush */
 };
 
 DECLARE_ELEMENT (GstPlyEnc, gst_ply_enc, PLY_ENC, GstBaseTransform)
@@ -43,7 +48,7 @@ DECLARE_ELEMENT (GstPlyEnc, gst_ply_enc, PLY_ENC, GstBaseTransform)
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
     "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
 static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
-    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS ("application/x-ply"));
+    "src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS ("application/x-ply; model/gltf-binary"));
 
 G_DEFINE_TYPE (GstPlyEnc, gst_ply_enc, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (plyenc, "plyenc", GST_RANK_NONE, gst_ply_enc_get_type ())
@@ -66,6 +71,8 @@ gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
 {
   auto self = GST_PLY_ENC (base);
   GST_INFO_OBJECT (self, "caps %" GST_PTR_FORMAT " -> %" GST_PTR_FORMAT, in, out);
+  self->priv->is_glb =
+      gst_structure_has_name (gst_caps_get_structure (out, 0), "model/gltf-binary");
   const rangecast::Status status = gstrange::parse_caps (in, self->priv->info);
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
@@ -77,6 +84,15 @@ write_file (GstPlyEnc *self, GstBuffer *input, GstBuffer *&output)
   const gstrange::RangeFrameMap frame (input, GST_MAP_READ);
   if (!frame.status ().ok ())
     return frame.status ();
+  if (self->priv->is_glb) {
+    auto file = std::make_unique<std::vector<guint8>> ();
+    const auto status = rangecast::write_glb (frame.views (), self->priv->info.rig, *file);
+    std::vector<guint8> &bytes = *file;
+    output = gst_buffer_new_wrapped_full (GstMemoryFlags (0), bytes.data (), bytes.size (), 0,
+        bytes.size (), file.release (),
+        [] (gpointer vector) { delete static_cast<std::vector<guint8> *> (vector); });
+    return status;
+  }
   const rangecast::PointCloudWriter writer (settings_of (self->priv));
   std::size_t points = 0;
   for (const auto &view : frame.views ())

@@ -86,36 +86,33 @@ def keep_existing(file):
 
 def add_play(parser):
     parser.add_argument("file", type=options.recording, metavar="FILE", help="audio recorded with it, x.opus next to x.rcnc, is played, too")
-    options.add(parser, "--video", help="write a video instead of opening a window")
     options.add(parser, "--orbit", default="30")
     options.add(parser, "--speaker", "--output-size")
     parser.set_defaults(build=build_play)
 
 
 def build_play(args):
-    audio = audio_file_of(args.file)
-    fail_unless(args.video or args.print or has_display(), "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --video")
-    launch = Launch("filesrc", f"location={args.file}", "!", "neighbourcodeparse", "!", "neighbourcodedec", "!", "rangealign")
-    launch.add("!", "striprender", "fit=true", "background-shade=0.5", f"auto-orbit={args.orbit}", "!", size_caps(args.output_size, media="video/x-raw" if args.video else "video/x-raw(ANY)"))
-    with_audio = audio != args.file and Path(audio).is_file() and args.speaker != ["none"]
-    if args.video:
-        launch.add(*"! videoconvert ! vp8enc deadline=1 cpu-used=8 ! queue ! webmmux name=video".split())
-        launch.add("!", "filesink", f"location={args.video}")
-        launch.option("--drop-empty", args.video)
-    else:
-        launch.add("!", "glimagesink")
-    if with_audio:
-        launch.add("filesrc", f"location={audio}", "!", "oggdemux", "!", "opusparse")
-        if args.video:
-            launch.add(*"! queue max-size-time=0 max-size-buffers=0 ! video.".split())
-        else:
-            launch.add(*transport.HEAR, "!", *args.speaker)
+    fail_unless(args.print or has_display(), "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; rangecast convert makes a film")
+    launch, audio = draw_recording(args, args.file, "video/x-raw(ANY)")
+    launch.add("!", "glimagesink")
+    if audio and args.speaker != ["none"]:
+        launch.add(*audio, *transport.HEAR, "!", *args.speaker)
     return launch
+
+
+def draw_recording(args, file, media):
+    """What draws it, and what reads the audio next to it, if there is any."""
+    launch = Launch("filesrc", f"location={file}", "!", "neighbourcodeparse", "!", "neighbourcodedec", "!", "rangealign")
+    launch.add("!", "striprender", "fit=true", "background-shade=0.5", f"auto-orbit={args.orbit}", "!", size_caps(args.output_size, media=media))
+    audio = audio_file_of(file)
+    with_audio = audio != file and Path(audio).is_file()
+    return launch, ["filesrc", f"location={audio}", "!", "oggdemux", "!", "opusparse"] * with_audio
 
 
 # ---- convert ----
 
-CONVERT_HELP = """rangecast convert RECORDING OUT.ply             point cloud of its first frame set; OUT-%05d.ply: of all
+CONVERT_HELP = """rangecast convert RECORDING OUT.webm            a film, with its audio; OUT.mp4, too
+rangecast convert RECORDING OUT.ply             point cloud of its first frame set, OUT.glb: a glTF mesh; OUT-%05d.ply, OUT-%05d.glb: of all
 rangecast convert LEFT RIGHT OUT.png           a stereo pair, seen from the side; OUT.ply: its points
 rangecast convert LEFT RIGHT OUT-DIR --learn N  the person in two recorded videos, cut out: a PNG for each frame
 rangecast convert --rgbd COLOUR DEPTH OUT      images of an RGB-D camera; depth has 16-bit grey (PNG, PGM, TIFF); sequences as %05d.png or '*.png'
@@ -131,7 +128,7 @@ def add_convert(parser):
     pair.add_argument("--focal-length", type=float, metavar="PX", help="focal length of rectified images, or of the depth images (not the colour ones), in pixels")
     pair.add_argument("--baseline", type=options.metres, metavar="M", help="distance of the cameras, metres")
     pair.add_argument("--depth-scale", type=options.metres, metavar="M", default="0.001", help="metres per unit of a depth image (default 0.001)")
-    options.add(parser, "--depth")
+    options.add(parser, "--depth", "--orbit")
     options.add(parser, "--output-size", default="960x720")
     video = parser.add_argument_group("recorded videos")
     options.add(video, "--learn", type=options.number(1, 100000))
@@ -151,20 +148,34 @@ def build_convert(args):
         fail_unless((args.rgbd and is_pattern(file)) or Path(file).is_file(), f"no file '{file}'")
         fail_unless(os.path.realpath(file) != os.path.realpath(out), f"'{out}' is what is converted: choose another name to write")
     images = args.rgbd or len(inputs) > 1
-    fail_unless(args.learn or out.lower().endswith((".ply", ".png")[: 1 + images]),
-                f"'{out}': needs a name that ends in .ply" + " or .png" * images)  # fmt: skip
+    types = (".ply", ".png") if images else (".ply", ".glb", *FILMS)
+    fail_unless(args.learn or Path(out).suffix.lower() in types, f"'{out}': needs a name that ends in {' or '.join(types)}")
     launch = convert_rgbd(args, inputs, out) if args.rgbd else convert_pair(args, *inputs, out) if images else convert_recording(args, *inputs, out)
     if not args.learn and not options.numbered(out):
         launch.option("--drop-empty", out)
     return launch
 
 
+FILMS = {
+    ".webm": "vp8enc target-bitrate=4000000 deadline=1 cpu-used=4 ! queue ! webmmux",
+    ".mp4": "openh264enc bitrate=4000000 ! h264parse ! queue ! mp4mux",
+}
+
+
 def convert_recording(args, file, out):
     unused = [args.rig, args.near, args.far, args.focal_length, args.baseline, args.learn, args.fps, args.size, args.depth, args.person]
     fail_unless(not any(unused), "a recording has its geometry: leave the options of cameras and videos out")
+    suffix = Path(out).suffix.lower()
+    if suffix in FILMS:
+        launch, audio = draw_recording(args, options.recording(file), "video/x-raw")
+        launch.add(*f"! videoconvert ! {FILMS[suffix]} name=film ! filesink".split(), f"location={out}")
+        if audio:
+            launch.add(*audio, *"! queue max-size-time=0 max-size-buffers=0 ! film.".split())
+        return launch
     launch = Launch("filesrc", f"location={file}", *"! neighbourcodeparse ! neighbourcodedec ! rangealign ! cylinderfilter".split())
     # eos-after counts the frame set that it does not pass on.
-    launch.add(*("! plyenc ! multifilesink" if options.numbered(out) else "! identity eos-after=2 ! plyenc ! filesink").split(), f"location={out}")
+    launch.add(*("! plyenc" if options.numbered(out) else "! identity eos-after=2 ! plyenc").split())
+    launch.add(*["!", "model/gltf-binary"] * (suffix == ".glb"), "!", "multifilesink" if options.numbered(out) else "filesink", f"location={out}")
     return launch
 
 

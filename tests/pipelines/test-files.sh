@@ -26,10 +26,16 @@ test_recording_becomes_points_film_and_numbers () {
   [ "$(ply_vertices cloud-00005.ply)" -gt 3000 ] || fail "few points: $(ply_vertices cloud-00005.ply)"
   rangecast convert recording.rcnc --output-size 160x120 one.ply # the first; options may stand anywhere
   cmp one.ply cloud-00000.ply
+  rangecast convert recording.rcnc one.glb
+  gst-launch-1.0 -q avatartestsrc location=one.glb num-buffers=1 ! fakesink # reads it with tinygltf
   expect_error "recording.rcnc' is what is converted" rangecast convert recording.rcnc ./recording.rcnc
-  expect_error "needs a name that ends in .ply" rangecast convert recording.rcnc one.png
-  rangecast play recording.rcnc --video film.webm --output-size 320x240
-  expect_file film.webm 1000
+  expect_error "needs a name that ends in .ply or .glb or .webm or .mp4" rangecast convert recording.rcnc one.png
+  local film
+  for film in film.webm film.mp4; do
+    rangecast convert recording.rcnc $film --output-size 320x240 --orbit 90
+    expect_file $film 1000
+    [ "$(gst-launch-1.0 -v filesrc location=$film ! decodebin ! fakesink silent=false | grep -c 'chain ')" = 8 ] || fail "$film has not 8 frames"
+  done
   "${RANGECAST_BUILD:-$source_dir/build}/pipelines/count-points" recording.rcnc >points.txt
   [ "$(grep -c '^frame set' points.txt)" = 8 ] || fail "$(cat points.txt)"
   [ "$(grep -cE '^  view [0-3]: [0-9]{4,} points, centre' points.txt)" = 32 ] || fail "$(cat points.txt)"

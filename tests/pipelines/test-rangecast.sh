@@ -45,13 +45,13 @@ test_addresses_are_checked () {
 test_files_are_checked () {
   refuses "no folder 'nowhere'" record nowhere/x.rcnc
   refuses "'.' is a folder" record .
-  refuses "no file 'none.rcnc'" play none.rcnc --video x.webm
+  refuses "no file 'none.rcnc'" convert none.rcnc x.webm
   refuses "File name too long" play "$(printf %0300d 0)"
   refuses "no file 'none.yaml'" camera --view 0 --rig none.yaml --to 127.0.0.1:5000
   echo 123 >key
   refuses "'key' does not hold 60 hexadecimal digits" view --listen 5000 --key key
   echo "no recording" >text.rcnc
-  refuses "'text.rcnc' is not a recording" play text.rcnc --video film.webm
+  refuses "'text.rcnc' is not a recording" convert text.rcnc film.webm
   refuses "'text.rcnc' is not a recording" serve --file text.rcnc
   [ ! -e film.webm ] || fail "an empty film is left"
 }
@@ -186,7 +186,7 @@ test_addresses_are_names_or_of_either_ip_version () {
 test_recordings_are_kept () {
   rangecast record good.rcnc --frames 3 --size 160x120 --views 1
   cp good.rcnc before.rcnc
-  refuses "'good.mp4': use a name that ends in .webm" play good.rcnc --video good.mp4
+  refuses "'good.mkv': needs a name that ends in" convert good.rcnc good.mkv
   rangecast record good.rcnc --listen 20300 >record.log 2>&1 &
   until_true takes_interrupt $!
   refuses "'good.rcnc' is being recorded by another program" record good.rcnc --listen 20301

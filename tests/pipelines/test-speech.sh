@@ -92,7 +92,7 @@ test_recording_has_speech_in_step_with_the_picture () {
   stop_all "$recorder" "$camera" "$parent"
   play_claps talk >claps.txt
   expect_in_step claps.txt 2
-  rangecast play talk.rcnc --video talk.webm --output-size 160x120 --orbit 0
+  rangecast convert talk.rcnc talk.webm --output-size 160x120
   rm -f film.log
   with_claps CLAP_LOG="$PWD/film.log" rangecast-run filesrc location=talk.webm ! matroskademux name=d \
     d. ! queue ! vp8dec ! fakesink name=snapshot d. ! queue ! opusdec ! audioconvert ! audioresample ! fakesink name=speaker
@@ -185,7 +185,7 @@ test_recordings_are_kept () {
   echo speech >talk.opus
   cp talk.rcnc talk.rcnc~
   cp talk.opus talk.opus~
-  rangecast play talk.rcnc~ --video x.webm --print >launch.txt
+  rangecast convert talk.rcnc~ x.webm --print >launch.txt
   ! grep -q 'location=talk.opus ' launch.txt || fail "$(cat launch.txt)"
 }
 

@@ -123,6 +123,62 @@ GST_START_TEST (test_empty_frame_set_is_a_file_without_points)
 }
 GST_END_TEST;
 
+/* Of a frame set of one view in which these pixels of the first two rows are valid. */
+static std::string
+glb_of (const std::vector<int> &columns)
+{
+  const Rig rig = ring_rig (1);
+  GstBuffer *input = make_frame_set (rig);
+  {
+    gstrange::RangeFrameMap frame (input, GST_MAP_READWRITE);
+    const auto &depth = frame.views ()[0].depth;
+    for (int y = 0; y < 240; y++)
+      std::fill_n (depth.row (y), 320, 0);
+    for (const int x : columns)
+      depth.at (x, 0) = depth.at (x, 1) = 8000;
+  }
+  GstHarness *h = gst_harness_new ("plyenc");
+  gst_harness_set_sink_caps_str (h, "model/gltf-binary");
+  gst_harness_set_src_caps (h, gstrange::make_range_caps (gstrange::make_info (rig, 30, 1)));
+  GstBuffer *output = gst_harness_push_and_pull (h, input);
+  std::string file (gst_buffer_get_size (output), 0);
+  gst_buffer_extract (output, 0, file.data (), file.size ());
+  gst_buffer_unref (output);
+  gst_harness_teardown (h);
+  return file;
+}
+
+GST_START_TEST (test_gltf_is_a_mesh_a_cloud_or_an_empty_scene)
+{
+  const struct {
+    std::vector<int> columns;
+    const char *has;
+    std::size_t binary; /* bytes of the vertices and indices */
+  } cases[] = {{{}, "\"scenes\":[{}]", 0}, {{3, 9}, "\"mode\":0}", 4 * 20},
+      {{3, 4, 9}, "\"mode\":4,\"indices\":2", 6 * 20 + 2 * 3 * 4}};
+  for (const auto &[columns, has, binary] : cases) {
+    const std::string file = glb_of (columns);
+    guint32 head[5];
+    std::memcpy (head, file.data (), sizeof head);
+    fail_unless (file.starts_with ("glTF"));
+    fail_unless_equals_int (head[2], file.size ());
+    fail_unless_equals_int (head[3] % 4, 0);
+    fail_unless_equals_int (file.size (), 20 + head[3] + (binary ? 8 + binary : 0));
+    fail_unless_contains (file.substr (20, head[3]), has);
+    if (binary == 0)
+      continue;
+    /* The first vertex: where the camera saw it, in linear light. */
+    float xyz[3];
+    guint16 rgba[4];
+    std::memcpy (xyz, file.data () + 28 + head[3], sizeof xyz);
+    std::memcpy (rgba, file.data () + 40 + head[3], sizeof rgba);
+    fail_unless_cmp (std::abs (xyz[0] - (3 - 159.5) / 320 * 0.8), <, 1e-6);
+    fail_unless_equals_int (rgba[0], 60); /* level 3: 3 / 255 / 12.92 */
+    fail_unless_equals_int (rgba[3], 65535);
+  }
+}
+GST_END_TEST;
+
 GST_START_TEST (test_view_that_the_rig_lacks_is_one_error)
 {
   GstHarness *h = ply_harness (ring_rig (1));
@@ -396,6 +452,7 @@ plyenc_suite ()
   tcase_add_test (tc, test_point_is_where_the_camera_saw_it);
   tcase_add_test (tc, test_only_valid_pixels_of_the_roi_are_points);
   tcase_add_test (tc, test_empty_frame_set_is_a_file_without_points);
+  tcase_add_test (tc, test_gltf_is_a_mesh_a_cloud_or_an_empty_scene);
   tcase_add_test (tc, test_view_that_the_rig_lacks_is_one_error);
   tcase_add_test (tc, test_works_again_after_null);
   tcase_add_test (tc, test_second_cloud_for_one_file_is_one_error);
