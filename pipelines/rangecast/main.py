@@ -13,6 +13,7 @@ from .demo import add_demo
 from .files import CONVERT_HELP, add_convert, add_play, add_record
 from .hosts import add_camera, add_parent, add_view
 from .launch import Fail, set_up_environment
+from .publish import add_publish
 from .rig import IMPORT_HELP, add_import
 from .serve import add_serve
 from .webcam import add_webcam
@@ -29,7 +30,8 @@ COMMANDS = {
     "import": (add_import, "a stereo pair's calibration in another format to a rig file\n\n" + IMPORT_HELP),
     "call": (add_call, "one end of a call with video and audio"),
     "serve": (add_serve, "show a stream in browsers"),
-    "convert": (add_convert, "recordings, stereo pairs and RGB-D images to PNG or PLY\n\n" + CONVERT_HELP),
+    "publish": (add_publish, "write a stream as segments and a playlist, which any web server or CDN carries to browsers"),
+    "convert": (add_convert, "recordings, stereo pairs and RGB-D images to films, PNG, PLY or glTF\n\n" + CONVERT_HELP),
     "check": (add_check, "what this machine lacks; or the geometry of a rig file"),
 }
 

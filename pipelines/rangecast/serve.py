@@ -57,8 +57,7 @@ def build_serve(args):
     elif args.source:
         launch.add(*args.source)
     else:
-        launch.add(*"avatartestsrc is-live=true views=4 range-person-only=true ! video/x-range,width=320,height=240,framerate=15/1".split())
-        launch.add(*"! neighbourcodeenc profile=entropy temporal=true".split())
+        launch.add(*transport.LIVE_FIGURE)
     fail_unless(args.print or has_element("rangewebsink"), "no element rangewebsink: run setup.sh")
     if not (args.token or args.token_file or args.anonymous or options.is_local(args.address)):
         args.token = secrets.token_urlsafe(16)

@@ -6,6 +6,7 @@
 import { Core, DONE } from './core.js';
 import { LiveSource } from './live-source.js';
 import { RecordingSource } from './recording-source.js';
+import { SegmentSource } from './segment-source.js';
 
 class Stage {
   constructor (module) {
@@ -92,7 +93,8 @@ class Stage {
   }
   // What is shown goes on until a recording has been found good.
   async open ({ recording, live, paused, time }) {
-    const source = live ? new LiveSource (this, live) : new RecordingSource (this, recording), before = this.wanted;
+    const isPlaylist = typeof recording === 'string' && new URL (recording).pathname.endsWith ('.m3u8'), before = this.wanted;
+    const source = live ? new LiveSource (this, live) : new (isPlaylist ? SegmentSource : RecordingSource) (this, recording);
     this.wanted = source;
     this.begin = { paused, time };
     const failure = recording ? await source.load () : '';

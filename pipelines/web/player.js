@@ -43,7 +43,7 @@ export class Player extends EventTarget {
     });
   }
 
-  // source: address of a stream (ws:, wss:) or of a recording, or a File; time: s
+  // source: address of a stream (ws:, wss:), of a playlist (.m3u8) or of a recording, or a File; time: s
   async open (source, { token, time = 0, paused = false } = {}) {
     try {
       source = typeof source === 'string' ? new URL (source, document.baseURI).href : source;

@@ -80,6 +80,11 @@ export class RecordingSource {
       this.stage.decoded (this.playing ? this.dueOf (this.time) : performance.timeOrigin + performance.now (), !this.playing);
       return true;
     }
+    return this.finish (outcome);
+  }
+
+  finish (outcome) {
+    const { core } = this.stage;
     this.atEnd = outcome === END;
     this.failed = !this.atEnd;
     if (core.message () !== '' || this.failed)

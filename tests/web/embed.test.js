@@ -239,3 +239,23 @@ test ('the npm package is built by vite into a page of one folder', async () => 
   assert.deepEqual (errors, []);
   await page.close ();
 });
+
+test ('three.js reads the mesh that plyenc writes', async () => {
+  const { GLTFLoader } = await import (path.join (work, 'node_modules/three/examples/jsm/loaders/GLTFLoader.js'));
+  const bytes = fs.readFileSync (path.join (work, 'scene.glb'));
+  const { scene } = await new GLTFLoader ().parseAsync (bytes.buffer.slice (bytes.byteOffset, bytes.byteOffset + bytes.length), '');
+  const mesh = scene.children[0], { position, color } = mesh.geometry.attributes;
+  assert.equal (mesh.material.type, 'MeshBasicMaterial');
+  assert.ok (position.count > 20000 && mesh.geometry.index.count > 3 * position.count, `${position.count} ${mesh.geometry.index.count}`);
+  assert.ok (Math.max (...mesh.geometry.index.array.slice (0, 60000)) < position.count);
+  mesh.geometry.computeBoundingBox ();
+  const { min, max } = mesh.geometry.boundingBox;
+  assert.ok (max.y - min.y > 0.2 && max.y - min.y < 1, `${min.y} to ${max.y}`); // a head, in metres
+  assert.ok (color.normalized && color.getX (position.count >> 1) > 0.01);
+  // Triangles face outwards, where the cameras are.
+  const triangle = [0, 1, 2].map ((corner) => mesh.geometry.index.getX (3000 + corner));
+  const [a, b, c] = triangle.map ((i) => [position.getX (i), position.getY (i), position.getZ (i)]);
+  const u = b.map ((v, i) => v - a[i]), v = c.map ((value, i) => value - a[i]);
+  const up = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+  assert.ok (up[0] * a[0] + up[2] * a[2] > 0, `${up} at ${a}`);
+});

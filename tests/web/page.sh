@@ -5,6 +5,7 @@
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 source "$here/need-browser.sh"
+PATH=$RANGECAST_BUILD/pipelines:$PATH
 
 # The known scene, and what striprender makes of it from two angles.
 source=$work/scene.rcnc
@@ -14,6 +15,7 @@ for recording in moving:15 slow:1; do # of slow something is left to play, howev
   gst-launch-1.0 -q avatartestsrc views=4 num-buffers=40 range-person-only=true \
     ! "video/x-range,width=160,height=120,framerate=${recording#*:}/1" ! neighbourcodeenc ! filesink "location=$work/${recording%:*}.rcnc"
 done
+gst-launch-1.0 -q filesrc "location=$source" ! neighbourcodeparse ! neighbourcodedec ! plyenc ! model/gltf-binary ! filesink "location=$work/scene.glb"
 for angle in -30 100; do
   gst-launch-1.0 -q filesrc "location=$source" ! neighbourcodeparse ! neighbourcodedec ! striprender mode=blend fit=true "azimuth=$angle" \
     ! "video/x-raw,format=RGBA,width=640,height=480" ! videoconvert ! pngenc snapshot=true \
@@ -21,4 +23,4 @@ for angle in -30 100; do
 done
 live=("$here/live.test.js" "$here/speech.test.js")
 compgen -G "$RANGECAST_BUILD/gst/web/*.so" >/dev/null || { echo "left out: live.test.js and speech.test.js, because rangewebsink is missing"; live=(); }
-exec node --test "$@" "$here/embed.test.js" "$here/page.test.js" "$here/server.test.js" "${live[@]}"
+exec node --test "$@" "$here/embed.test.js" "$here/page.test.js" "$here/segments.test.js" "$here/server.test.js" "${live[@]}"
