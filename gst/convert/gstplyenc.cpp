@@ -87,6 +87,8 @@ write_file (GstPlyEnc *self, GstBuffer *input, GstBuffer *&output)
   if (self->priv->is_glb) {
     auto file = std::make_unique<std::vector<guint8>> ();
     const auto status = rangecast::write_glb (frame.views (), self->priv->info.rig, *file);
+    if (!status.ok ())
+      return status;
     std::vector<guint8> &bytes = *file;
     output = gst_buffer_new_wrapped_full (GstMemoryFlags (0), bytes.data (), bytes.size (), 0,
         bytes.size (), file.release (),
@@ -134,7 +136,8 @@ gst_ply_enc_prepare_output_buffer (GstBaseTransform *base, GstBuffer *input, Gst
   if (priv->frames++ == 1 && is_one_file (base)) {
     GST_ELEMENT_ERROR (self, STREAM, WRONG_TYPE,
         ("a second point cloud would go into the file of the first; use multifilesink "
-         "location=cloud-%%05d.ply, or send one frame set"),
+         "location=cloud-%%05d.%s, or send one frame set",
+            priv->is_glb ? "glb" : "ply"),
         (nullptr));
     return GST_FLOW_ERROR;
   }

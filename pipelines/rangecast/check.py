@@ -100,7 +100,7 @@ def opengl():
 
 
 def display():
-    return has_display(), "a display", "set DISPLAY or WAYLAND_DISPLAY; without one, write videos (--video)"
+    return has_display(), "a display", "set DISPLAY or WAYLAND_DISPLAY; without one, write films (view --video, convert)"
 
 
 def socket_buffer():

@@ -165,9 +165,12 @@ FILMS = {
 def convert_recording(args, file, out):
     unused = [args.rig, args.near, args.far, args.focal_length, args.baseline, args.learn, args.fps, args.size, args.depth, args.person]
     fail_unless(not any(unused), "a recording has its geometry: leave the options of cameras and videos out")
+    options.recording(file)
     suffix = Path(out).suffix.lower()
+    fail_unless(suffix in FILMS or args.orbit == "0", "--orbit is for films")
     if suffix in FILMS:
-        launch, audio = draw_recording(args, options.recording(file), "video/x-raw")
+        fail_unless(not options.numbered(out), f"'{out}': a film is one file")
+        launch, audio = draw_recording(args, file, "video/x-raw")
         launch.add(*f"! videoconvert ! {FILMS[suffix]} name=film ! filesink".split(), f"location={out}")
         if audio:
             launch.add(*audio, *"! queue max-size-time=0 max-size-buffers=0 ! film.".split())

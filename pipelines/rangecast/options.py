@@ -175,7 +175,10 @@ def key_file(text):
 
 def numbered(text):
     """Whether multifilesink writes one file for each frame set, as for out-%05d.ply."""
-    return re.search(r"%\d*[diu]", text) is not None
+    parts = re.split(r"%\d*[diu]", text)
+    if len(parts) > 2 or (len(parts) == 2 and "%" in "".join(parts)):  # multifilesink would take it for other arguments of printf
+        raise Wrong(f"'{text}': numbered files have one number, such as %05d, and no other %")
+    return len(parts) == 2
 
 
 def count_views(rig):

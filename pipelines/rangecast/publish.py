@@ -2,14 +2,15 @@
 """publish: a stream as segments and a playlist, which any web server can carry."""
 
 import datetime
+import fcntl
 import os
 import re
 import struct
-import sys
 import time
 from pathlib import Path
 
 from . import options, transport
+from .files import keep_existing
 from .launch import Fail, Launch, fail_unless
 from .processes import Processes
 
@@ -39,9 +40,23 @@ def build_publish(args):
         launch.add(*(args.source or [*transport.LIVE_FIGURE, f"key-interval={1000 * args.segment}"]))
     if not args.print:
         fail_unless(Path(args.folder).is_dir(), f"no folder '{args.folder}'")
+        args.lock = lock(args.folder)
+        if args.record:
+            fail_unless(not Path(args.folder).samefile(Path(args.record).parent), "--record: use another folder than that of the segments")
+            keep_existing(args.record)
         args.pipe = os.pipe()
     launch.add("!", "fdsink", "sync=false", "async=false", f"fd={args.pipe[1] if args.pipe else 1}")
     return launch
+
+
+def lock(folder):
+    """Two programs must not write one folder."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise Fail(f"another program publishes in '{folder}'") from None
+    return descriptor
 
 
 class Publisher:
@@ -49,21 +64,21 @@ class Publisher:
 
     def __init__(self, folder, seconds, keep):
         self.folder, self.seconds, self.keep = Path(folder), seconds, keep
-        self.number = int(time.time())  # later than all of an earlier run
-        self.warned = False
-        self.listed, self.old, self.units = [], [], []  # listed: (name, seconds, when it began)
+        self.listed, self.old, self.units = [], [], []  # listed: (name, seconds, when it began); old: those that go
         if (self.folder / PLAYLIST).exists():
             self.old = re.findall(r"^(\d+\.rcnc)$", (self.folder / PLAYLIST).read_text(errors="replace"), re.M)
+        self.number = max(int(time.time()), *(int(name[:-5]) + 1 for name in self.old), 0)  # later than all of an earlier run
 
     def add(self, unit, seconds, is_key):
-        if is_key and (not self.units or seconds - self.begin >= self.seconds or seconds < self.begin):
-            self.end_segment(seconds)
+        goes_back = self.units and seconds < self.last
+        if is_key and (not self.units or seconds - self.begin >= self.seconds or goes_back):
+            self.end_segment(self.last if goes_back else seconds)
             self.begin, self.began = seconds, datetime.datetime.now(datetime.timezone.utc)
         if self.units or is_key:
             self.units.append(unit)
-        if self.units and seconds - self.begin > 10 * self.seconds and not self.warned:
-            self.warned = True
-            print("WARNING: segments begin with key frame sets, and there are few: set key-interval=1000 on neighbourcodeenc", file=sys.stderr)
+        self.last = seconds
+        if self.units and not is_key and seconds - self.begin > max(10, 3 * self.seconds):
+            raise Fail(f"segments begin with key frame sets, and for {seconds - self.begin:.0f} s there was none: set key-interval=1000 on neighbourcodeenc")
 
     def end_segment(self, seconds):
         if not self.units:
@@ -71,6 +86,8 @@ class Publisher:
         name = f"{self.number}.rcnc"
         self.write(name, b"".join(self.units))
         self.units, self.number = [], self.number + 1
+        if not self.listed:
+            print(f"publishing {self.folder / PLAYLIST}", flush=True)
         self.listed.append((name, max(seconds - self.begin, 0.001), self.began))
         self.old += [self.listed.pop(0)[0] for _ in self.listed[self.keep :]]
         self.list_segments()
@@ -78,7 +95,7 @@ class Publisher:
             (self.folder / self.old.pop(0)).unlink(missing_ok=True)
 
     def list_segments(self, ending=""):
-        longest = max(round(seconds) for _, seconds, _ in self.listed)
+        longest = max(int(seconds + 0.5) for _, seconds, _ in self.listed)
         lines = ["#EXTM3U", "#EXT-X-VERSION:3", f"#EXT-X-TARGETDURATION:{max(longest, 1)}", f"#EXT-X-MEDIA-SEQUENCE:{self.number - len(self.listed)}"]
         for name, seconds, began in self.listed:
             lines += [f"#EXT-X-PROGRAM-DATE-TIME:{began.isoformat(timespec='milliseconds')}", f"#EXTINF:{seconds:.3f},", name]
@@ -86,11 +103,18 @@ class Publisher:
 
     def write(self, name, data):
         part = self.folder / (name + ".part")
-        part.write_bytes(data)
+        try:
+            part.write_bytes(data)
+        except OSError as error:
+            part.unlink(missing_ok=True)
+            raise Fail(f"'{self.folder / name}': {error.strerror}") from None
         part.replace(self.folder / name)  # who reads gets all of it or none
 
-    def finish(self, seconds):
-        self.end_segment(seconds)
+    def finish(self):
+        for name in self.old:
+            (self.folder / name).unlink(missing_ok=True)
+        if self.units:
+            self.end_segment(self.last)
         if self.listed:
             self.list_segments("#EXT-X-ENDLIST\n")
 
@@ -98,14 +122,18 @@ class Publisher:
 def read_units(stream):
     """Access units of a byte stream: bytes, seconds, whether it is a key one."""
     while head := stream.read(HEADER.size):
-        if len(head) < HEADER.size or (fields := HEADER.unpack(head))[3] != b"\0RCU":
+        if len(head) < HEADER.size:
+            return
+        _, flags, _, magic, size, pts, _ = HEADER.unpack(head)
+        if magic != b"\0RCU":
             raise Fail("what is to be published is not a stream of coded frame sets")
-        _, flags, _, _, size, pts, _ = fields
-        yield head + stream.read(size), time.monotonic() if pts == 2**64 - 1 else pts / 1e9, bool(flags & KEY)
+        unit = head + stream.read(size)
+        if len(unit) == HEADER.size + size:  # else the pipeline has failed
+            yield unit, time.monotonic() if pts == 2**64 - 1 else pts / 1e9, bool(flags & KEY)
 
 
 def run_publish(args, launch):
-    publisher, seconds = Publisher(args.folder, args.segment, args.keep), 0
+    publisher = Publisher(args.folder, args.segment, args.keep)
     read, write = args.pipe
     with Processes() as processes, open(read, "rb") as stream, open(args.record or os.devnull, "wb") as recording:
         child = processes.start("stream", launch, pass_fds=[write])
@@ -115,5 +143,5 @@ def run_publish(args, launch):
                 publisher.add(unit, seconds, is_key)
                 recording.write(unit)
         finally:
-            publisher.finish(seconds)
+            publisher.finish()
         return child.wait()

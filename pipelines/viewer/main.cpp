@@ -94,7 +94,8 @@ check_display ()
     return true;
   g_printerr (
       "rangecast-viewer: no display: neither DISPLAY nor WAYLAND_DISPLAY is set; without one, "
-      "rangecast play and rangecast view write videos (--video)\n");
+      "rangecast convert makes a film of a recording, and rangecast view --video one of a "
+      "stream\n");
   return false;
 }
 

@@ -116,7 +116,7 @@ class Stage {
     if (this.wanted !== this.source)
       Object.assign (this.begin, begin);
     else
-      this.source?.[name]?.(...args);
+      return this.source?.[name]?.(...args);
   }
   close () {
     this.wanted = null;
@@ -147,8 +147,8 @@ onmessage = ({ data }) => {
     toggle: () => stage.source?.toggle?.(),
     play: () => stage.control ('play', { paused: false }),
     pause: () => stage.control ('pause', { paused: true }),
-    seek: () => {
-      stage.control ('seek', { time: data.time }, data.time);
+    seek: async () => {
+      await stage.control ('seek', { time: data.time }, data.time);
       stage.post ({ type: 'sought' });
     },
     close: () => stage.close (),

@@ -92,7 +92,7 @@ export class RecordingSource {
     return this.stop ();
   }
 
-  // Where times go back, another take begins: it follows the one before. A single one that does so is damaged.
+  // Where times go back, another recording begins, joined to the one before. A single one that does so is damaged.
   timeOf (pts) {
     const last = this.last, frame = this.frameDuration () || 40;
     if (pts < last.pts)

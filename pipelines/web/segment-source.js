@@ -7,7 +7,7 @@ import { RecordingSource } from './recording-source.js';
 const AHEAD = 3; // segments that are fetched before they are played
 const MAX_BEHIND = 4; // segments; who plays the live end then jumps to it
 const MAX_SEGMENT = 256 << 20; // bytes
-const RETRY = 1000; // ms
+const RETRY = 1000, PATIENCE = 10000; // ms: until the playlist is asked for again; that an answer may take
 
 // @return { target: ms, ended, segments: [{ number, address, length: ms }] }
 export const parsePlaylist = (text, address) => {
@@ -23,6 +23,7 @@ export const parsePlaylist = (text, address) => {
       if (!(length >= 0))
         throw new Error (`${address} has a segment without #EXTINF`);
       segments.push ({ number: first + segments.length, address: new URL (line, address).href, length });
+      length = NaN;
     }
   if (segments.length === 0)
     throw new Error (`${address} has no segments`);
@@ -30,7 +31,7 @@ export const parsePlaylist = (text, address) => {
 };
 
 const load = async (address, options) => {
-  const answer = await fetch (address, options).catch ((error) => {
+  const answer = await fetch (address, { ...options, signal: AbortSignal.timeout (PATIENCE) }).catch ((error) => {
     throw new Error (new URL (address).origin === globalThis.location?.origin ? `${address}: ${error.message}`
       : `${address} does not answer, or not to pages of other servers: it has to send Access-Control-Allow-Origin`);
   });
@@ -44,7 +45,7 @@ const load = async (address, options) => {
 export class SegmentSource extends RecordingSource {
   async load () {
     this.segments = [];
-    this.stalled = this.closed = false;
+    this.stalled = this.closed = this.entered = false; // entered: the core has the segment this.number
     this.live = true; // plays what is newest
     this.end = 0;
     try {
@@ -57,13 +58,15 @@ export class SegmentSource extends RecordingSource {
     return '';
   }
 
-  // Reads the playlist again. Segments that it no longer has are forgotten, but for the one that plays.
+  // Reads the playlist again. Segments that it no longer has are forgotten, but for those that were fetched.
   async update () {
-    const text = await (await load (this.recording, { cache: 'no-cache' })).text ();
-    const { target, ended, segments } = parsePlaylist (text, this.recording), known = this.segments.at (-1)?.number ?? -1;
-    if (segments.at (-1).number < known) // another stream
+    const answer = await load (this.recording, { cache: 'no-cache' });
+    const { target, ended, segments } = parsePlaylist (await answer.text (), answer.url);
+    if (segments.at (-1).number < this.segments[0]?.number) { // another stream; a list that is merely old has nothing new
       this.segments = [];
-    this.segments = this.segments.filter (({ number }) => number >= Math.min (segments[0].number, this.number ?? Infinity));
+      this.number = segments[0].number;
+    }
+    this.segments = this.segments.filter (({ number, loading }) => number >= segments[0].number || (number >= this.number && loading));
     for (const segment of segments)
       if (segment.number > (this.segments.at (-1)?.number ?? -1)) {
         this.segments.push ({ ...segment, start: this.end });
@@ -76,8 +79,13 @@ export class SegmentSource extends RecordingSource {
   // The one that plays or is to be played; where that is gone, the next.
   segment () { return this.segments.find (({ number }) => number >= this.number); }
   fetched (segment) {
-    return segment.loading ??= load (segment.address).then (async (answer) => segment.bytes = new Uint8Array (await answer.arrayBuffer ()))
-      .catch ((error) => { segment.failure = error.message; });
+    return segment.loading ??= load (segment.address).then (async (answer) => {
+      segment.bytes = new Uint8Array (await answer.arrayBuffer ());
+      segment.failure = undefined;
+    }).catch ((error) => {
+      segment.failure = error.message;
+      segment.loading = undefined; // the next one who needs it tries again
+    });
   }
 
   start (paused = false, time = 0) {
@@ -100,21 +108,25 @@ export class SegmentSource extends RecordingSource {
   async poll () {
     while (!this.closed && !this.ended) {
       await new Promise ((resolve) => setTimeout (resolve, Math.min (this.target / 2, RETRY)));
+      if (this.closed)
+        return;
       try {
         await this.update ();
+        if (this.closed)
+          return;
         if (this.away)
           this.stage.say ('');
         this.away = false;
       } catch (error) {
+        if (this.closed)
+          return;
         this.away = true;
         this.stage.say (`${error.message}. Trying again.`, 'note');
       }
-      if (this.live && this.segments.at (-1).number - this.number > MAX_BEHIND) {
+      if (this.live && this.wantsPlay && this.segments.at (-1).number - this.number > MAX_BEHIND) {
         this.number = this.segments.at (-1).number;
         this.enter ();
-      } else if (this.failed)
-        this.leave ();
-      else if (this.stalled)
+      } else if (this.stalled)
         this.enter ();
       this.fetchAhead ();
     }
@@ -131,7 +143,7 @@ export class SegmentSource extends RecordingSource {
   async enter (time = -1) {
     const segment = this.segment (), visit = this.visit = {};
     clearTimeout (this.timer);
-    this.playing = false;
+    this.playing = this.entered = false;
     this.stalled = !segment;
     if (!segment) {
       this.atEnd = this.ended;
@@ -147,18 +159,24 @@ export class SegmentSource extends RecordingSource {
     }
     this.current = segment;
     this.size = segment.bytes.length;
-    this.stage.core.read = (offset, size) => segment.bytes.subarray (offset, offset + size);
-    this.open ();
+    const { bytes } = segment;
+    this.stage.core.read = (offset, size) => bytes.subarray (offset, offset + size);
+    this.stage.core.call ('rc_open', this.size);
+    this.first = null;
+    this.entered = true;
     while (this.visit === visit && this.next () && this.time < time)
       ;
     if (this.visit === visit && this.wantsPlay)
       super.play ();
     this.fetchAhead ();
   }
-  open () {
-    this.stage.core.call ('rc_open', this.size);
-    this.failed = false;
-    this.first = null;
+  // After a failure of the core, too.
+  stop () {
+    if (this.failed) {
+      this.failed = false;
+      return this.leave ();
+    }
+    return super.stop ();
   }
   leave () {
     this.number++;
@@ -185,20 +203,20 @@ export class SegmentSource extends RecordingSource {
     this.wantsPlay = true;
     if (this.atEnd)
       this.seek (0);
-    else if (!this.playing)
+    else if (this.entered)
       super.play ();
   }
   pause () {
     this.wantsPlay = this.live = false;
     return this.stop ();
   }
-  toggle () { return this.wantsPlay ? this.pause () : this.play (); }
+  toggle () { return this.wantsPlay && !this.atEnd ? this.pause () : this.play (); }
   // To the nearest time that the playlist has; to its end is to the live one.
   seek (time) {
     const last = this.segments.at (-1), found = this.segments.findLast (({ start }) => start <= time) ?? this.segments[0];
     this.live = found === last && !this.ended;
     this.number = found.number;
     this.atEnd = false;
-    this.enter (time);
+    return this.enter (time);
   }
 }

@@ -41,6 +41,28 @@ test_recording_becomes_points_film_and_numbers () {
   [ "$(grep -cE '^  view [0-3]: [0-9]{4,} points, centre' points.txt)" = 32 ] || fail "$(cat points.txt)"
 }
 
+test_published_segments_are_recordings_that_follow_each_other () {
+  local coded='avatartestsrc views=1 num-buffers=40 ! video/x-range,width=64,height=48,framerate=10/1 ! neighbourcodeenc temporal=true'
+  mkdir out full
+  rangecast publish out --source "$coded key-interval=1000" --record all.rcnc
+  [ "$(grep -c '^[0-9]*\.rcnc$' out/live.m3u8)" = 4 ] && [ "$(tail -n 1 out/live.m3u8)" = '#EXT-X-ENDLIST' ] || fail "$(cat out/live.m3u8)"
+  # shellcheck disable=SC2046
+  (cd out && cat $(grep -v '^#' live.m3u8)) | cmp - all.rcnc
+  local segment
+  for segment in out/*.rcnc; do
+    [ "$("${RANGECAST_BUILD:-$source_dir/build}/tests/pipelines/stream-report" --list "$segment" | wc -l)" = 10 ] || fail "$segment has not 10 frame sets"
+  done
+  rangecast publish out --source "$coded key-interval=1000"
+  [ "$(find out -type f | wc -l)" = 5 ] || fail "not 4 segments and a playlist: $(ls out)"
+  expect_error "no folder 'nowhere'" rangecast publish nowhere
+  expect_error "another folder than that of the segments" rangecast publish full --record full/1.rcnc
+  expect_error "one number, such as %05d, and no other %" rangecast convert all.rcnc 'x-%05d-%s.glb'
+  expect_error "not a stream of coded frame sets" rangecast publish full --source 'videotestsrc num-buffers=9'
+  [ -z "$(ls full)" ] || fail "left: $(ls full)"
+  expect_error "for 10 s there was none: set key-interval" rangecast publish full --source "${coded/=40/=200} refresh-period=0"
+  flock full sh -c '! rangecast publish full' 2>&1 | grep "another program publishes in 'full'"
+}
+
 test_rgbd_pictures_become_points_and_a_picture () {
   need_data open3d_rgbd/depth
   local pictures=("$data/open3d_rgbd/color/00000.jpg" "$data/open3d_rgbd/depth/00000.png")

@@ -80,9 +80,14 @@ test ('a playlist plays live, and back as far as it goes', async (t) => {
   const before = await frameSets (opened);
   await framesShown (opened, before + 15); // goes on from there
   assert.ok (await time (opened) < await duration (opened) - 1);
+  const [from, since] = [await time (opened), Date.now ()];
+  for (let i = 0; i < 6; i++) // while segments are fetched, too
+    await opened.evaluate ((play) => document.querySelector ('rangecast-view')[play ? 'play' : 'pause'] (), i % 2 === 1);
+  await framesShown (opened, await frameSets (opened) + 15);
+  assert.ok (await time (opened) - from <= (Date.now () - since) / 1000 + 0.1); // nothing was left out
   await seek (opened, await duration (opened));
   await until (async () => await time (opened) > await duration (opened) - 3);
-  assert.deepEqual ([...new Set (await opened.evaluate (() => window.events))], ['seeked']);
+  assert.deepEqual ([...new Set (await opened.evaluate (() => window.events))], ['seeked', 'pause']);
   await opened.close ();
 });
 
