@@ -3,9 +3,8 @@
  * SECTION:element-neighbourcodedec
  * @title: neighbourcodedec
  *
- * Decodes neighbour-coded range images. Lost or damaged slices leave invalid pixels (or repeat the
- * last ones, see #GstNeighbourCodeDec:conceal) and are never an error. The first damaged slices of
- * a stream are a warning message; lost ones are not.
+ * Decodes neighbour-coded range images. Lost or damaged slices leave invalid pixels and are
+ * never an error. The first damaged slices of a stream are a warning message; lost ones are not.
  *
  * Frame sets may refer to earlier ones (neighbourcodeenc temporal=true). Pixels that refer to lost
  * data are treated as lost, and the decoder requests a key frame set from upstream
@@ -41,15 +40,12 @@
 #include "common/capsadvice.hpp"
 #include "common/codedunits.hpp"
 #include "common/elementproperties.hpp"
-#include "concealment.hpp"
 
 using rangecast::DecoderResult;
 using rangecast::Status;
 
 GST_DEBUG_CATEGORY_STATIC (gst_neighbour_code_dec_debug);
 #define GST_CAT_DEFAULT gst_neighbour_code_dec_debug
-
-enum GstNeighbourCodeConceal { CONCEAL_INVALID, CONCEAL_LAST };
 
 namespace {
 
@@ -59,7 +55,6 @@ using Bytes = std::span<const guint8>;
 constexpr GstClockTime kRequestInterval = 250 * GST_MSECOND;
 
 struct Settings {
-  GstNeighbourCodeConceal conceal = CONCEAL_INVALID;
   bool request_key_units = true;
   int n_threads = 0;
 };
@@ -81,7 +76,6 @@ struct GstNeighbourCodeDecPrivate {
   /* streaming thread only */
   rangecast::AccessUnitDecoder decoder;
   GstBufferPool *pool = nullptr;
-  Concealment concealment;
   GstClockTime last_request = GST_CLOCK_TIME_NONE; /* PTS of the frame set that caused it */
   bool warned_damage = false;                      /* of this stream */
 };
@@ -91,10 +85,6 @@ DECLARE_ELEMENT (GstNeighbourCodeDec, gst_neighbour_code_dec, NEIGHBOUR_CODE_DEC
 G_DEFINE_TYPE (GstNeighbourCodeDec, gst_neighbour_code_dec, GST_TYPE_BASE_TRANSFORM)
 GST_ELEMENT_REGISTER_DEFINE (
     neighbourcodedec, "neighbourcodedec", GST_RANK_PRIMARY, gst_neighbour_code_dec_get_type ())
-
-static const GEnumValue kConcealments[] = {
-    {CONCEAL_INVALID, "Leave pixels of lost or damaged slices invalid", "invalid"},
-    {CONCEAL_LAST, "Repeat the pixels of the last frame set", "last"}, {}};
 
 /* ---- caps ---- */
 
@@ -111,7 +101,6 @@ reset_stream (GstNeighbourCodeDecPrivate *priv)
   priv->decoder.reset_references ();
   priv->is_temporal = false;
   priv->last_request = GST_CLOCK_TIME_NONE;
-  priv->concealment.reset ();
 }
 
 static gboolean
@@ -154,28 +143,19 @@ gst_neighbour_code_dec_src_event (GstBaseTransform *base, GstEvent *event)
 
 /* ---- a frame set ---- */
 
-/* Adds the views of `units` to `output` and decodes them. Views of the rig that did not come are
- * left out, or repeated from `older`, which may be nullptr. */
+/* Adds the views of `units` to `output` and decodes them. */
 static Status
-decode_into (GstNeighbourCodeDecPrivate *priv, Bytes units, GstBuffer *output, GstBuffer *older,
-    int n_threads, DecoderResult &result)
+decode_into (GstNeighbourCodeDecPrivate *priv, Bytes units, GstBuffer *output, int n_threads,
+    DecoderResult &result)
 {
-  priv->decoder.plan (units, result, older);
-  std::optional<gstrange::RangeFrameMap> last;
-  std::span<const rangecast::RangeImage> older_views;
-  if (older)
-    older_views = last.emplace (older, GST_MAP_READ).views ();
-  if (Status s = priv->concealment.add_views (priv->decoder, older_views, output); !s.ok ())
-    return s;
+  priv->decoder.plan (units, result, false);
+  for (const auto &view : priv->decoder.views ())
+    if (Status s = gstrange::add_view (output, view.view_id, view.roi, view.capture_time_ns);
+        !s.ok ())
+      return s;
   gstrange::RangeFrameMap frame (output, GST_MAP_WRITE);
-  if (!frame.status ().ok ())
-    return frame.status ();
-  const auto images = frame.views ();
-  const std::size_t planned = priv->decoder.views ().size ();
-  for (const rangecast::RangeImage &image : images.subspan (planned))
-    rangecast::fill_from (
-        *std::ranges::find (older_views, image.view_id, &rangecast::RangeImage::view_id), image);
-  return priv->decoder.decode (images.first (planned), n_threads, result, older_views);
+  return frame.status ().ok () ? priv->decoder.decode (frame.views (), n_threads, result)
+                               : frame.status ();
 }
 
 /* Damage persists where frame sets refer to earlier ones, so a key frame set is requested. */
@@ -252,15 +232,12 @@ decode_frame_set (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **outpu
     return GST_FLOW_ERROR;
   }
   const Settings settings = settings_of (priv);
-  GstBuffer *older = priv->concealment.begin (input);
-  if (settings.conceal == CONCEAL_INVALID)
-    older = nullptr;
   GstBuffer *buffer = nullptr;
   if (const GstFlowReturn flow = gstrange::acquire (GST_ELEMENT (self), priv->pool, &buffer);
       flow != GST_FLOW_OK)
     return flow;
   DecoderResult result;
-  const Status status = decode_into (priv, map.bytes (), buffer, older, settings.n_threads, result);
+  const Status status = decode_into (priv, map.bytes (), buffer, settings.n_threads, result);
   if (!status.ok ()) {
     gst_buffer_unref (buffer);
     return gst_range_flow_return (GST_ELEMENT (self), status);
@@ -282,10 +259,6 @@ decode_frame_set (GstNeighbourCodeDec *self, GstBuffer *input, GstBuffer **outpu
   GST_LOG_OBJECT (self, "decoded %" G_GUINT64_FORMAT " slices of %zu views to %" GST_PTR_FORMAT,
       guint64{result.slices}, priv->decoder.views ().size (), buffer);
   copy_metadata (self, input, buffer);
-  if (settings.conceal == CONCEAL_LAST)
-    priv->concealment.keep (buffer);
-  else
-    priv->concealment.reset ();
   priv->reporter.passed (GST_ELEMENT (self), buffer);
   *output = buffer;
   return GST_FLOW_OK;
@@ -308,19 +281,6 @@ gst_neighbour_code_dec_generate_output (GstBaseTransform *base, GstBuffer **outp
   const GstFlowReturn flow = is_skipped ? GST_FLOW_OK : decode_frame_set (self, input, output);
   gst_buffer_unref (input);
   return flow;
-}
-
-/* Never called, but without it GstBaseTransform would operate in passthrough mode. */
-static GstFlowReturn
-gst_neighbour_code_dec_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
-{
-  return GST_FLOW_ERROR;
-}
-
-static gboolean
-gst_neighbour_code_dec_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstBuffer *)
-{
-  return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
 }
 
 static gboolean
@@ -379,9 +339,6 @@ decoder_properties ()
 {
   using P = PropertyTable<Settings>;
   static P table = {
-      P::enumeration<&Settings::conceal> ("conceal", "Concealment",
-          "How to fill pixels whose slices are lost or damaged", "GstNeighbourCodeConceal",
-          kConcealments, kMutablePlaying),
       P::boolean<&Settings::request_key_units> ("request-key-units", "Request key units",
           "Request a key frame set from upstream (GstForceKeyUnit) when data was lost that later "
           "frame sets refer to",
@@ -435,8 +392,8 @@ gst_neighbour_code_dec_class_init (GstNeighbourCodeDecClass *klass)
   transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_set_caps);
   transform_class->sink_event = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_sink_event);
   transform_class->generate_output = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_generate_output);
-  transform_class->transform = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_transform);
-  transform_class->transform_meta = GST_DEBUG_FUNCPTR (gst_neighbour_code_dec_transform_meta);
+  transform_class->transform = GST_DEBUG_FUNCPTR (transform_nothing);
+  transform_class->transform_meta = GST_DEBUG_FUNCPTR (keep_capture_time);
 
   GST_DEBUG_CATEGORY_INIT (
       gst_neighbour_code_dec_debug, "neighbourcodedec", 0, "Neighbour code decoder");

@@ -277,19 +277,6 @@ gst_neighbour_code_enc_generate_output (GstBaseTransform *base, GstBuffer **outp
   return flow;
 }
 
-/* Never called, but without it GstBaseTransform would operate in passthrough mode. */
-static GstFlowReturn
-gst_neighbour_code_enc_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
-{
-  return GST_FLOW_ERROR;
-}
-
-static gboolean
-gst_neighbour_code_enc_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstBuffer *)
-{
-  return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
-}
-
 /* ---- events ---- */
 
 static gboolean
@@ -406,8 +393,8 @@ gst_neighbour_code_enc_class_init (GstNeighbourCodeEncClass *klass)
   transform_class->transform_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform_caps);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_set_caps);
   transform_class->generate_output = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_generate_output);
-  transform_class->transform = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform);
-  transform_class->transform_meta = GST_DEBUG_FUNCPTR (gst_neighbour_code_enc_transform_meta);
+  transform_class->transform = GST_DEBUG_FUNCPTR (transform_nothing);
+  transform_class->transform_meta = GST_DEBUG_FUNCPTR (keep_capture_time);
 
   GST_DEBUG_CATEGORY_INIT (
       gst_neighbour_code_enc_debug, "neighbourcodeenc", 0, "Neighbour code encoder");

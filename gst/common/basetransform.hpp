@@ -25,3 +25,19 @@ lock_stream (GstBaseTransform *base)
 {
   return g_rec_mutex_locker_new (GST_PAD_GET_STREAM_LOCK (GST_BASE_TRANSFORM_SINK_PAD (base)));
 }
+
+/** transform_meta() of elements whose output has the capture time, but no other meta of the input.
+ */
+inline gboolean
+keep_capture_time (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstBuffer *)
+{
+  return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
+}
+
+/** transform() of elements with generate_output(): never called, but without it GstBaseTransform
+ *  would operate in passthrough mode. */
+inline GstFlowReturn
+transform_nothing (GstBaseTransform *, GstBuffer *, GstBuffer *)
+{
+  return GST_FLOW_ERROR;
+}

@@ -158,13 +158,6 @@ gst_ply_enc_transform (GstBaseTransform *, GstBuffer *, GstBuffer *)
   return GST_FLOW_OK; /* prepare_output_buffer() has done it */
 }
 
-/* Only the capture time applies to a file. */
-static gboolean
-gst_ply_enc_transform_meta (GstBaseTransform *, GstBuffer *, GstMeta *meta, GstBuffer *)
-{
-  return meta->info->api == GST_REFERENCE_TIMESTAMP_META_API_TYPE;
-}
-
 /* ---- lifecycle ---- */
 
 static gboolean
@@ -236,5 +229,5 @@ gst_ply_enc_class_init (GstPlyEncClass *klass)
   transform_class->set_caps = GST_DEBUG_FUNCPTR (gst_ply_enc_set_caps);
   transform_class->prepare_output_buffer = GST_DEBUG_FUNCPTR (gst_ply_enc_prepare_output_buffer);
   transform_class->transform = GST_DEBUG_FUNCPTR (gst_ply_enc_transform);
-  transform_class->transform_meta = GST_DEBUG_FUNCPTR (gst_ply_enc_transform_meta);
+  transform_class->transform_meta = GST_DEBUG_FUNCPTR (keep_capture_time);
 }

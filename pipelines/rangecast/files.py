@@ -13,7 +13,6 @@ from .images import TYPES, is_pattern, list_images, make_folder, play_images, re
 from .launch import Fail, Launch, fail_unless, has_display
 
 
-
 def audio_file_of(recording):
     """x.opus next to x.rcnc, and x.opus~ next to x.rcnc~."""
     path = Path(recording.removesuffix("~"))

@@ -18,10 +18,8 @@ HEAR = "! queue max-size-time=2000000000 max-size-buffers=0 ! opusdec plc=true t
 
 
 # Where nothing else is said.
-LIVE_FIGURE = (
-    "avatartestsrc is-live=true views=4 range-person-only=true ! video/x-range,width=320,height=240,framerate=15/1"
-    " ! neighbourcodeenc profile=entropy temporal=true"
-).split()
+LIVE_FIGURE = "avatartestsrc is-live=true views=4 range-person-only=true ! video/x-range,width=320,height=240,framerate=15/1".split()
+LIVE_FIGURE += "! neighbourcodeenc profile=entropy temporal=true".split()
 
 
 def is_multicast(addresses):

@@ -158,10 +158,9 @@ export class SegmentSource extends RecordingSource {
       return this.leave ();
     }
     this.current = segment;
-    this.size = segment.bytes.length;
     const { bytes } = segment;
     this.stage.core.read = (offset, size) => bytes.subarray (offset, offset + size);
-    this.stage.core.call ('rc_open', this.size);
+    this.stage.core.call ('rc_open', bytes.length);
     this.first = null;
     this.entered = true;
     while (this.visit === visit && this.next () && this.time < time)

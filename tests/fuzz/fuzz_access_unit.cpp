@@ -14,7 +14,7 @@ using namespace rangecast;
 
 using Bytes = std::span<const std::uint8_t>;
 
-enum Option { kConceal = 1, kWholeRois = 2, kOnce = 4 };
+enum Option { kWholeRois = 2, kOnce = 4 };
 /* Frame numbers of its slices are left, one more than before, the same, or others. */
 enum How { kNumbers = 3, kOneMore = 1, kSame = 2, kOther = 3, kForget = 4 };
 
@@ -101,20 +101,17 @@ struct Player {
 
   void decode (Bytes access_unit, int options)
   {
-    const bool conceal = options & kConceal;
     result = {};
-    decoder.plan (access_unit, result, conceal || options & kWholeRois);
+    decoder.plan (access_unit, result, options & kWholeRois);
     std::swap (pictures, last);
     pictures.make (decoder.views ());
-    const std::span<const RangeImage> older = last.images;
-    std::vector<RangeImage> shown (older.begin (), conceal ? older.end () : older.begin ());
     limit_cpu (cpu);
-    expect (decoder.decode (pictures.images, threads, result, shown).ok ());
+    expect (decoder.decode (pictures.images, threads, result).ok ());
     limit_cpu (CpuLevel::kAvx2);
-    check (conceal);
+    check ();
   }
 
-  void check (bool conceal) const
+  void check () const
   {
     std::uint64_t coded = 0, slices = 0, foretold = 0;
     for (std::size_t i = 0; i < decoder.views ().size (); i++) {
@@ -125,10 +122,10 @@ struct Player {
       foretold += decoder.missing_pixels (i);
     }
     expect (result.missing_pixels <= coded && result.points <= coded && result.slices <= slices);
-    expect (conceal ? result.points <= pictures.valid () : result.points == pictures.valid ());
+    expect (result.points == pictures.valid ());
     expect (result.points == 0 || result.slices > 0);
     expect (foretold > 0 || result.missing_pixels == 0);
-    expect (result.points + result.missing_pixels <= coded || conceal);
+    expect (result.points + result.missing_pixels <= coded);
   }
 };
 

@@ -18,7 +18,7 @@ static constexpr std::uint8_t kRightSize = 1, kLongest = 255; /* Ask::length */
 
 /* The first bytes; others take the nearest that makes sense. */
 struct Ask {
-  std::uint8_t profile; /* bits 0-1; 4: no key; 8: reference; 16: older image; 32: once */
+  std::uint8_t profile; /* bits 0-1; 4: no key; 8: reference; 32: once */
   std::uint8_t earlier; /* bits 0-1: none, same ROI, other ROI, does not serve; from 2: how known */
   std::uint8_t depth;   /* bits - 6 */
   std::uint8_t colour;  /* bits - 4 */
@@ -171,7 +171,7 @@ struct Picture {
   bool good = false;
 
   void decode (Decoder &decoder, std::span<const std::uint8_t> unit, const SliceHeader &header,
-      const ReferencePlane *before, const ConstRangeImage *older)
+      const ReferencePlane *before)
   {
     const int width = header.roi.width, height = header.roi.height;
     depth.assign (std::size_t (width) * std::size_t (height), kUntouched);
@@ -182,8 +182,8 @@ struct Picture {
       kept.begin (header);
     decoder.prepare (header);
     good = decoder
-               .decode (unit, header, {before, header.reference ? &kept : nullptr, older}, image,
-                   decoded, decoder.memory)
+               .decode (unit, header, {before, header.reference ? &kept : nullptr}, image, decoded,
+                   decoder.memory)
                .ok ();
   }
 };
@@ -202,7 +202,7 @@ kept_at (const SliceHeader &header, const Picture &picture, int x, int y)
 
 /* Nothing outside the slice may have changed, and what is inside is what was counted. */
 static void
-check_picture (const SliceHeader &header, Picture &picture, bool with_older)
+check_picture (const SliceHeader &header, Picture &picture)
 {
   const auto width = static_cast<std::size_t> (header.roi.width);
   std::uint64_t valid = 0, kept = 0;
@@ -226,8 +226,7 @@ check_picture (const SliceHeader &header, Picture &picture, bool with_older)
   expect (decoded.points + decoded.unknown <= pixels && !(header.key && decoded.unknown));
   if (!picture.good)
     return;
-  expect (valid >= decoded.points && valid <= decoded.points + decoded.unknown);
-  expect (with_older || valid == decoded.points);
+  expect (valid == decoded.points);
   expect (!header.reference || kept == decoded.points);
 }
 
@@ -251,11 +250,6 @@ extern "C" int
 LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
 {
   static Decoder &decoder = *make_decoder (), &other = *make_decoder ();
-  static const std::vector<std::uint16_t> older_depth (kWidth * kHeight / 4, 0x4321);
-  static const std::vector<Rgbx> older_colour (older_depth.size ());
-  static const ConstRangeImage older = {0, {kWidth / 4, kHeight / 4, kWidth / 2, kHeight / 2},
-      {older_depth.data (), kWidth / 2, kHeight / 2, kWidth},
-      {older_colour.data (), kWidth / 2, kHeight / 2, kWidth * 2}, 0};
   Ask ask;
   if (size < sizeof ask || size > kMaxUnitSize - kSliceHeaderSize)
     return 0;
@@ -265,17 +259,16 @@ LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
   SliceHeader header;
   expect (decoder.read_header (unit, header).ok ());
   ReferencePlane before;
-  const bool has_before = !header.key && ask.earlier & 3, has_older = ask.profile & 16;
+  const bool has_before = !header.key && ask.earlier & 3;
   if (has_before)
     fill_earlier (ask, header, before);
   Picture picture, again;
-  picture.decode (
-      decoder, unit, header, has_before ? &before : nullptr, has_older ? &older : nullptr);
-  check_picture (header, picture, has_older);
+  picture.decode (decoder, unit, header, has_before ? &before : nullptr);
+  check_picture (header, picture);
   if (ask.profile & 32) /* the other decoder's history becomes another one */
     return 0;
   limit_cpu (CpuLevel::kScalar);
-  again.decode (other, unit, header, has_before ? &before : nullptr, has_older ? &older : nullptr);
+  again.decode (other, unit, header, has_before ? &before : nullptr);
   limit_cpu (kCpuLevels[std::size (kCpuLevels) - 1]);
   check_same (header, picture, again);
   return 0;

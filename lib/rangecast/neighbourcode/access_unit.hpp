@@ -107,7 +107,7 @@ public:
    *  bad and ignored. `bytes` must stay valid until decode() returns.
    *  @param whole_rois  false: a ROI of which nearly nothing arrived shrinks to the bounding box of
    *  its slices, as all other pixels would be invalid, so that a few bytes do not claim a large
-   *  image; pass true with older images to decode() */
+   *  image */
   void plan (std::span<const std::uint8_t> bytes, DecoderResult &result, bool whole_rois = true);
   [[nodiscard]] std::span<const PlannedView> views () const { return {planned_.data (), count_}; }
   /** Pixels of a view's coded ROI that no slice holds. */
@@ -116,16 +116,13 @@ public:
     return planned_[view].coded_pixels - planned_[view].held_pixels;
   }
 
-  /** Fills all pixels of `images`. Pixels without an intact slice are taken from `older`, or are
-   *  invalid.
+  /** Fills all pixels of `images`. Pixels without an intact slice are invalid.
    *  @param images  one for each of views(), in that order, with its ROI
    *  @param threads  slices decoded in parallel; 0 = number of cores. The result does not depend on
    * it
    *  @param[in,out] result  is added to
-   *  @param older  earlier images of any views, perhaps with other ROIs
    *  @return kBadSize, with nothing decoded, if the images are not those of views() */
-  Status decode (std::span<const RangeImage> images, int threads, DecoderResult &result,
-      std::span<const RangeImage> older = {});
+  Status decode (std::span<const RangeImage> images, int threads, DecoderResult &result);
 
 private:
   struct PlannedSlice {
@@ -144,9 +141,9 @@ private:
   void plan_view (std::span<const PlannedSlice> slices, DecoderResult &result);
   void drop_overlapping (PlannedView &planned, DecoderResult &result);
   void crop_to_slices (PlannedView &planned);
-  void begin_view (std::size_t index, const RangeImage &image, const ConstRangeImage &older);
+  void begin_view (std::size_t index, const RangeImage &image);
   void add_jobs (std::size_t view);
-  void run (Job &job, const RangeImage &image, const ConstRangeImage &older, SliceMemory &memory);
+  void run (Job &job, const RangeImage &image, SliceMemory &memory);
   [[nodiscard]] DecoderResult sum_up (std::size_t index) const;
 
   SliceDecoder decoder_;
@@ -158,11 +155,5 @@ private:
   std::vector<Job> jobs_;
   WorkerMemory<SliceMemory> memory_;
 };
-
-/** Fills part of an image (rows and columns of its ROI) from an older one of the same view; pixels
- *  outside the older ROI become invalid. */
-void fill_from (const ConstRangeImage &older, const RangeImage &image, const Roi &part);
-/** The same for the whole image. */
-void fill_from (const ConstRangeImage &older, const RangeImage &image);
 
 } // namespace rangecast

@@ -12,6 +12,14 @@ namespace {
  * make too many jobs, and threads end at about the same time. */
 constexpr std::uint64_t kJobsOfView = 32;
 
+/* @param part  rows and columns of the ROI */
+void
+make_invalid (const RangeImage &image, const Roi &part)
+{
+  for (int y = part.y; y < part.y + part.height; y++)
+    std::fill_n (image.depth.row (y) + part.x, part.width, kInvalidDepth);
+}
+
 } // namespace
 
 Status
@@ -33,15 +41,14 @@ AccessUnitDecoder::reset_references ()
 
 /* Prepares a view before any of its slices is decoded. */
 void
-AccessUnitDecoder::begin_view (
-    std::size_t index, const RangeImage &image, const ConstRangeImage &older)
+AccessUnitDecoder::begin_view (std::size_t index, const RangeImage &image)
 {
   const PlannedView &planned = planned_[index];
   decoder_.prepare (planned.reference);
   if (planned.reference.reference)
     references_[planned.view_id].begin (planned.reference);
   if (planned.held_pixels != area_of (planned.roi)) /* not every pixel is coded */
-    fill_from (older, image);
+    make_invalid (image, {0, 0, image.roi.width, image.roi.height});
 }
 
 void
@@ -62,8 +69,7 @@ AccessUnitDecoder::add_jobs (std::size_t view)
 }
 
 void
-AccessUnitDecoder::run (
-    Job &job, const RangeImage &image, const ConstRangeImage &older, SliceMemory &memory)
+AccessUnitDecoder::run (Job &job, const RangeImage &image, SliceMemory &memory)
 {
   for (const PlannedSlice &slice : std::span (slices_).subspan (job.first, job.count)) {
     const SliceHeader &header = slice.header;
@@ -71,8 +77,7 @@ AccessUnitDecoder::run (
     ReferencePlane *now = header.reference ? pair.now_kept () : nullptr;
     const ReferencePlane &before = pair.before (header.frame_number);
     DecodedPixels decoded;
-    if (decoder_.decode (slice.unit, header, {&before, now, &older}, image, decoded, memory)
-            .ok ()) {
+    if (decoder_.decode (slice.unit, header, {&before, now}, image, decoded, memory).ok ()) {
       job.result.slices++;
       job.result.points += decoded.points;
       job.result.unknown_pixels += decoded.unknown;
@@ -81,7 +86,7 @@ AccessUnitDecoder::run (
     job.result.bad_slices++;
     if (now)
       now->clear (header);
-    fill_from (older, image, place_of (header));
+    make_invalid (image, place_of (header));
   }
 }
 
@@ -103,18 +108,13 @@ AccessUnitDecoder::sum_up (std::size_t index) const
 }
 
 Status
-AccessUnitDecoder::decode (std::span<const RangeImage> images, int threads, DecoderResult &result,
-    std::span<const RangeImage> older)
+AccessUnitDecoder::decode (std::span<const RangeImage> images, int threads, DecoderResult &result)
 {
   if (!std::ranges::equal (images, views (), [] (const RangeImage &image, const PlannedView &view) {
         return image.view_id == view.view_id && image.roi == view.roi;
       }))
     return {StatusCode::kBadSize, "decoder: the images are not those of the planned views"};
-  const auto older_of = [&] (std::size_t i) {
-    const auto found = std::ranges::find (older, planned_[i].view_id, &RangeImage::view_id);
-    return found == older.end () ? ConstRangeImage () : ConstRangeImage (*found);
-  };
-  in_parallel (count_, threads, [&] (std::size_t i) { begin_view (i, images[i], older_of (i)); });
+  in_parallel (count_, threads, [&] (std::size_t i) { begin_view (i, images[i]); });
   jobs_.clear ();
   for (std::size_t i = 0; i < count_; i++)
     add_jobs (i);
@@ -122,39 +122,11 @@ AccessUnitDecoder::decode (std::span<const RangeImage> images, int threads, Deco
   memory_.reserve (workers);
   in_parallel (jobs_.size (), static_cast<int> (workers), [&] (std::size_t i, std::size_t worker) {
     Job &job = jobs_[i];
-    run (job, images[job.view], older_of (job.view), memory_.of (worker));
+    run (job, images[job.view], memory_.of (worker));
   });
   for (std::size_t i = 0; i < count_; i++)
     result += sum_up (i);
   return {};
-}
-
-void
-fill_from (const ConstRangeImage &older, const RangeImage &image, const Roi &part)
-{
-  const Roi &a = older.roi, &b = image.roi;
-  const int begin = part.x, end = part.x + part.width;
-  const int left = std::clamp (a.x - b.x, begin, end);
-  const int right = std::clamp (a.x + a.width - b.x, left, end);
-  for (int y = part.y; y < part.y + part.height; y++) {
-    std::uint16_t *depth = image.depth.row (y);
-    const int from_y = b.y + y - a.y;
-    if (from_y < 0 || from_y >= a.height || left == right) {
-      std::fill (depth + begin, depth + end, kInvalidDepth);
-      continue;
-    }
-    const int from_x = b.x + left - a.x;
-    std::fill (depth + begin, depth + left, kInvalidDepth);
-    std::copy_n (older.depth.row (from_y) + from_x, right - left, depth + left);
-    std::copy_n (older.colour.row (from_y) + from_x, right - left, image.colour.row (y) + left);
-    std::fill (depth + right, depth + end, kInvalidDepth);
-  }
-}
-
-void
-fill_from (const ConstRangeImage &older, const RangeImage &image)
-{
-  fill_from (older, image, {0, 0, image.roi.width, image.roi.height});
 }
 
 } // namespace rangecast

@@ -64,7 +64,7 @@ SliceDecoder::depth_of (const SliceHeader &header) const
 
 Status
 SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
-    const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded,
+    const CodingReference &reference, const RangeImage &image, DecodedPixels &decoded,
     SliceMemory &memory) const
 {
   if (!(image.roi == header.roi) || image.depth.width != header.roi.width ||
@@ -80,7 +80,7 @@ SliceDecoder::decode (std::span<const std::uint8_t> unit, const SliceHeader &hea
     return body.empty () ? Status{} : damaged ();
   const DepthQuantiser *depth = depth_of (header);
   const ColourQuantiser &colour = colours_[header.colour_bits - 4];
-  DecoderReference usable = reference;
+  CodingReference usable = reference;
   if (!reference.before || !reference.before->serves (header))
     usable.before = nullptr;
   bool good = depth;

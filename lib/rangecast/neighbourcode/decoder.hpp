@@ -44,7 +44,7 @@ public:
    *  @param[in,out] pixels  is added to
    *  @return kBadData or kTruncated for damaged symbols, kBadSize for another ROI */
   Status decode (std::span<const std::uint8_t> unit, const SliceHeader &header,
-      const DecoderReference &reference, const RangeImage &image, DecodedPixels &pixels,
+      const CodingReference &reference, const RangeImage &image, DecodedPixels &pixels,
       SliceMemory &memory) const;
 
   /** Bytes of a slice all of whose pixels are invalid or equal a neighbour; no slice has fewer. */

@@ -118,7 +118,7 @@ GST_END_TEST;
 GST_START_TEST (test_works_again_after_null)
 {
   const Rig rig = ring_rig (1);
-  GstHarness *h = decoder_harness (rig, "neighbourcodedec conceal=last");
+  GstHarness *h = decoder_harness (rig);
   GstBuffer *coded = encoded (rig, make_frame_set (rig));
   gst_buffer_unref (gst_harness_push_and_pull (h, gst_buffer_ref (coded)));
   gst_element_set_state (h->element, GST_STATE_NULL);
@@ -171,25 +171,6 @@ GST_START_TEST (test_first_damage_of_a_stream_is_a_warning_and_losses_are_not)
   fail_unless_contains (next_warning (bus), "0:00:04.000000000");
   gst_element_set_bus (h->element, nullptr);
   gst_object_unref (bus);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_discont_of_a_lost_packet_does_not_stop_concealment_but_a_jump_in_time_does)
-{
-  const Rig rig = ring_rig (1);
-  auto units = encoded_units (rig, make_frame_set (rig));
-  GstHarness *h = decoder_harness (rig, "neighbourcodedec conceal=last");
-  GstBuffer *whole = gst_harness_push_and_pull (h, buffer_of (units));
-  units.erase (units.begin () + 3);
-  for (const GstClockTime time : {GST_SECOND / 30, 10 * GST_SECOND}) {
-    GstBuffer *with_gap = buffer_of (units, time);
-    GST_BUFFER_FLAG_SET (with_gap, GST_BUFFER_FLAG_DISCONT);
-    GstBuffer *output = gst_harness_push_and_pull (h, with_gap);
-    fail_unless_equals_int (points (output) == points (whole), time < GST_SECOND);
-    gst_buffer_unref (output);
-  }
-  gst_buffer_unref (whole);
   gst_harness_teardown (h);
 }
 GST_END_TEST;
@@ -281,87 +262,6 @@ GST_START_TEST (test_memory_for_each_view_decodes_as_one_memory)
 }
 GST_END_TEST;
 
-/* ---- conceal=last where much is lost or damaged ---- */
-
-static constexpr GstClockTime kStep = 100 * GST_MSECOND;
-using Units = std::vector<std::vector<guint8>>;
-
-/* A unit of a type that decoders pass over. */
-static const Units kNothing = {{kBitstreamVersion << 4 | 9, 0, 8, 0, 1, 2, 3, 4}};
-
-static GstHarness *
-concealing_decoder (const Rig &rig)
-{
-  GstHarness *h = harness_of ("neighbourcodedec conceal=last");
-  gst_harness_set_src_caps (h, coded_caps (rig));
-  return h;
-}
-
-/* What is shown of an access unit of these units. */
-static Pixels
-show (GstHarness *h, const Units &units, GstClockTime time, bool discont = false)
-{
-  GstBuffer *coded = buffer_of (units, time);
-  if (discont)
-    GST_BUFFER_FLAG_SET (coded, GST_BUFFER_FLAG_DISCONT);
-  GstBuffer *output = gst_harness_push_and_pull (h, coded);
-  const Pixels pixels = pixels_of (output, 320, 240);
-  gst_buffer_unref (output);
-  return pixels;
-}
-
-static Units
-of_view (const Units &units, int id)
-{
-  Units some = units;
-  std::erase_if (some, [&] (const auto &unit) { return header_of (unit).view_id != id; });
-  return some;
-}
-
-GST_START_TEST (test_view_of_which_nothing_comes_stays_for_a_second_and_goes)
-{
-  const Rig rig = ring_rig (2);
-  const Units units = encoded_units (rig, make_frame_set (rig));
-  GstHarness *h = concealing_decoder (rig);
-  const Pixels whole = show (h, units, 0);
-  for (int i = 1; i <= 10; i++)
-    fail_unless (show (h, of_view (units, 1), GstClockTime (i) * kStep) == whole, "at %d", i);
-  const Pixels one = show (h, of_view (units, 1), 11 * kStep);
-  fail_unless (!one.contains (0));
-  fail_unless_cmp (one.at (1), ==, whole.at (1));
-  fail_unless_cmp (show (h, units, 12 * kStep), ==, whole);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_frame_sets_of_which_nothing_is_sound_leave_the_picture)
-{
-  const Rig rig = ring_rig (2);
-  const Units units = encoded_units (rig, make_frame_set (rig));
-  Units damaged = units;
-  for (auto &unit : damaged)
-    unit[6] = 99; /* depth bits */
-  GstHarness *h = concealing_decoder (rig);
-  const Pixels whole = show (h, units, 0);
-  fail_unless_cmp (show (h, kNothing, kStep), ==, whole);
-  fail_unless_cmp (show (h, damaged, 2 * kStep), ==, whole);
-  fail_unless_cmp (show (h, {units[3]}, 3 * kStep), ==, whole);
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
-GST_START_TEST (test_flush_ends_concealment)
-{
-  const Rig rig = ring_rig (2);
-  const Units units = encoded_units (rig, make_frame_set (rig));
-  GstHarness *h = concealing_decoder (rig);
-  show (h, units, 0);
-  flush (h);
-  fail_unless (show (h, kNothing, kStep).empty ());
-  gst_harness_teardown (h);
-}
-GST_END_TEST;
-
 static Suite *
 neighbourcodedec_suite ()
 {
@@ -373,13 +273,8 @@ neighbourcodedec_suite ()
   tcase_add_test (tc, test_new_caps_in_the_stream_are_taken);
   tcase_add_test (tc, test_works_again_after_null);
   tcase_add_test (tc, test_first_damage_of_a_stream_is_a_warning_and_losses_are_not);
-  tcase_add_test (
-      tc, test_discont_of_a_lost_packet_does_not_stop_concealment_but_a_jump_in_time_does);
   tcase_add_test (tc, test_rig_beyond_the_limit_is_an_error_that_names_it);
   tcase_add_test (tc, test_memory_for_each_view_decodes_as_one_memory);
-  tcase_add_test (tc, test_view_of_which_nothing_comes_stays_for_a_second_and_goes);
-  tcase_add_test (tc, test_frame_sets_of_which_nothing_is_sound_leave_the_picture);
-  tcase_add_test (tc, test_flush_ends_concealment);
   return suite;
 }
 

@@ -89,7 +89,11 @@ with_padded_strides (GstBuffer *frame_set)
     gstrange::RangeFrameMap from (frame_set, GST_MAP_READ), to (padded, GST_MAP_WRITE);
     fail_unless_ok (from.status ());
     fail_unless_ok (to.status ());
-    fill_from (from.views ()[0], to.views ()[0]);
+    const RangeImage &source = from.views ()[0], &copy = to.views ()[0];
+    for (int y = 0; y < source.depth.height; y++) {
+      std::copy_n (source.depth.row (y), source.depth.width, copy.depth.row (y));
+      std::copy_n (source.colour.row (y), source.depth.width, copy.colour.row (y));
+    }
   }
   gst_buffer_unref (frame_set);
   return padded;

@@ -74,8 +74,7 @@ struct Decoded {
 };
 
 inline Decoded
-decode (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes,
-    std::span<const RangeImage> older = {}, bool whole_rois = true)
+decode (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes, bool whole_rois = true)
 {
   Decoded decoded;
   decoder.plan (bytes, decoded.result, whole_rois);
@@ -84,7 +83,7 @@ decode (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes,
   std::vector<RangeImage> images;
   for (Picture &picture : decoded.pictures)
     images.push_back (picture.image ());
-  EXPECT_TRUE (decoder.decode (images, 1, decoded.result, older).ok ());
+  EXPECT_TRUE (decoder.decode (images, 1, decoded.result).ok ());
   return decoded;
 }
 
@@ -112,13 +111,12 @@ units_of (std::span<const std::uint8_t> bytes)
 
 /** The same in a copy of exactly its size, so that one byte too far is seen. */
 inline Decoded
-decode_exact (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes,
-    std::span<const RangeImage> older = {})
+decode_exact (AccessUnitDecoder &decoder, std::span<const std::uint8_t> bytes)
 {
   const auto copy = std::make_unique<std::uint8_t[]> (bytes.size ());
   if (!bytes.empty ())
     std::memcpy (copy.get (), bytes.data (), bytes.size ());
-  return decode (decoder, {copy.get (), bytes.size ()}, older);
+  return decode (decoder, {copy.get (), bytes.size ()});
 }
 
 /** Each prefix of a stream must give all its whole slices, and one bad one for a cut one. */

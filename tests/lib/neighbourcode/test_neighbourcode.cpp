@@ -179,16 +179,6 @@ TEST (NeighbourCode, bad_settings_and_rois_are_refused)
   EXPECT_EQ (encoder.encode (twice, 0, 2, result).code (), StatusCode::kBadData);
 }
 
-TEST (NeighbourCode, missing_pixels_come_from_the_older_picture)
-{
-  Picture older (0, {10, 10, 20, 20}), now (0, {15, 5, 20, 20});
-  fill_from (older.image (), now.image ());
-  EXPECT_EQ (now.depth.view ().at (0, 5), older.depth.view ().at (5, 0));
-  EXPECT_EQ (now.depth.view ().at (14, 19), older.depth.view ().at (19, 14));
-  EXPECT_EQ (now.depth.view ().at (15, 10), 0);
-  EXPECT_EQ (now.depth.view ().at (0, 4), 0);
-}
-
 TEST (Units, rig_of_64_views_travels_in_small_units_in_any_order)
 {
   const StreamInfo info = {ring_rig (64), 15, 1};

@@ -96,17 +96,4 @@ ReferencePair::reset ()
     plane.reset ();
 }
 
-void
-show_older (const DecoderReference &reference, const RangeImage &image, int x, int y)
-{
-  if (!reference.older)
-    return;
-  const ConstRangeImage &older = *reference.older;
-  const int column = image.roi.x + x - older.roi.x, line = image.roi.y + y - older.roi.y;
-  if (column < 0 || line < 0 || column >= older.roi.width || line >= older.roi.height)
-    return;
-  image.depth.row (y)[x] = older.depth.row (line)[column];
-  image.colour.row (y)[x] = older.colour.row (line)[column];
-}
-
 } // namespace rangecast

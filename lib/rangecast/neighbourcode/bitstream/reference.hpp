@@ -94,21 +94,10 @@ struct CodingReference {
   ReferencePlane *now = nullptr;
 };
 
-/** The same for a decoder. */
-struct DecoderReference {
-  const ReferencePlane *before = nullptr;
-  ReferencePlane *now = nullptr;
-  /** The image that replaces unknown pixels; may be nullptr or have another ROI. */
-  const ConstRangeImage *older = nullptr;
-};
-
 /** Pixels of decoded slices. */
 struct DecodedPixels {
   std::uint64_t points = 0;  ///< valid
   std::uint64_t unknown = 0; ///< valid, but they refer to pixels that were not received
 };
-
-/** Fills a pixel of an image (column and row of its ROI) from `older`, if that has it. */
-void show_older (const DecoderReference &reference, const RangeImage &image, int x, int y);
 
 } // namespace rangecast

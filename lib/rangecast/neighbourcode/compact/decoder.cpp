@@ -269,7 +269,7 @@ CompactDecoder::decode_entropy_row (EntropyReader &code, const CompactQuantisers
 template <class Code>
 bool
 CompactDecoder::load_earlier (
-    Code &code, const SliceHeader &header, const DecoderReference &reference, int y)
+    Code &code, const SliceHeader &header, const CodingReference &reference, int y)
 {
   const int full_x = header.roi.x + header.first_column;
   const int full_y = header.roi.y + header.first_row + y;
@@ -292,7 +292,7 @@ CompactDecoder::load_earlier (
 template <class Code, bool Delta>
 bool
 CompactDecoder::decode_rows (Code code, const SliceHeader &header,
-    const CompactQuantisers &quantisers, const DecoderReference &reference, const RangeImage &image,
+    const CompactQuantisers &quantisers, const CodingReference &reference, const RangeImage &image,
     DecodedPixels &decoded)
 {
   constexpr bool kIsEntropy = std::is_same_v<Code, EntropyReader>;
@@ -333,10 +333,7 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
     }
     if constexpr (Delta)
       for (int x = 0; x < header.columns; x++)
-        if (row_.valid ()[static_cast<std::size_t> (x)] && row_.codes ()[x] == kNoPixel) {
-          show_older (reference, image, header.first_column + x, image_row);
-          unknown++;
-        }
+        unknown += row_.valid ()[static_cast<std::size_t> (x)] && row_.codes ()[x] == kNoPixel;
     decoded.points += points - unknown;
     decoded.unknown += unknown;
     if (reference.now)
@@ -351,7 +348,7 @@ CompactDecoder::decode_rows (Code code, const SliceHeader &header,
 
 bool
 CompactDecoder::decode (std::span<const std::uint8_t> body, const SliceHeader &header,
-    const CompactQuantisers &quantisers, const DecoderReference &reference, const RangeImage &image,
+    const CompactQuantisers &quantisers, const CodingReference &reference, const RangeImage &image,
     DecodedPixels &decoded)
 {
   const bool packed = header.profile == Profile::kPacked;

@@ -21,16 +21,16 @@ public:
    *  @param[in,out] decoded  is added to
    *  @return false for damage: the pixels may then be partly written */
   bool decode (std::span<const std::uint8_t> body, const SliceHeader &header,
-      const CompactQuantisers &quantisers, const DecoderReference &reference,
+      const CompactQuantisers &quantisers, const CodingReference &reference,
       const RangeImage &image, DecodedPixels &decoded);
 
 private:
   template <class Code, bool Delta>
   bool decode_rows (Code code, const SliceHeader &header, const CompactQuantisers &quantisers,
-      const DecoderReference &reference, const RangeImage &image, DecodedPixels &decoded);
+      const CodingReference &reference, const RangeImage &image, DecodedPixels &decoded);
   template <class Code>
   bool load_earlier (
-      Code &code, const SliceHeader &header, const DecoderReference &reference, int y);
+      Code &code, const SliceHeader &header, const CodingReference &reference, int y);
   bool decode_earlier_runs (PackedReader &code, std::size_t begin, std::size_t end);
   template <class Code> bool decode_valid (Code &code, int columns);
   template <bool Delta>
