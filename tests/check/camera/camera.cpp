@@ -27,7 +27,8 @@ GST_START_TEST (test_camera_is_found_by_each_of_its_names)
     const auto camera = open_camera (called);
     assert_equals_string (camera->info ().serial.c_str (), "GV03");
     assert_equals_string (camera->info ().address.c_str (), "127.0.0.3");
-    assert_equals_string (camera->interface_address ().c_str (), "127.0.0.1");
+    /* whichever of the loopback addresses its answer to the search reached first */
+    fail_unless (camera->interface_address ().starts_with ("127.0.0."));
     fail_unless (camera->info ().is_gige ());
   }
 }
