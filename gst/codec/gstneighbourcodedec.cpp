@@ -69,8 +69,7 @@ struct GstNeighbourCodeDecPrivate {
 
   StatsReporter reporter; /* any thread; has locks of its own */
 
-  /* Later frame sets refer to the latest. Written by the streaming thread, also read by src_event()
-   */
+  /* later frame sets refer to the latest; written by the streaming thread, read by src_event() */
   std::atomic<bool> is_temporal{false};
 
   /* streaming thread only */

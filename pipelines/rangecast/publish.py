@@ -83,9 +83,9 @@ class Publisher:
     def end_segment(self, seconds):
         if not self.units:
             return
-        name = f"{self.number}.rcnc"
-        self.write(name, b"".join(self.units))
-        self.units, self.number = [], self.number + 1
+        name, units, self.units = f"{self.number}.rcnc", self.units, []
+        self.write(name, b"".join(units))
+        self.number += 1
         if not self.listed:
             print(f"publishing {self.folder / PLAYLIST}", flush=True)
         self.listed.append((name, max(seconds - self.begin, 0.001), self.began))
@@ -111,12 +111,12 @@ class Publisher:
         part.replace(self.folder / name)  # who reads gets all of it or none
 
     def finish(self):
-        for name in self.old:
-            (self.folder / name).unlink(missing_ok=True)
         if self.units:
             self.end_segment(self.last)
         if self.listed:
             self.list_segments("#EXT-X-ENDLIST\n")
+            for name in self.old:
+                (self.folder / name).unlink(missing_ok=True)
 
 
 def read_units(stream):

@@ -148,7 +148,11 @@ onmessage = ({ data }) => {
     play: () => stage.control ('play', { paused: false }),
     pause: () => stage.control ('pause', { paused: true }),
     seek: async () => {
-      await stage.control ('seek', { time: data.time }, data.time);
+      try {
+        await stage.control ('seek', { time: data.time }, data.time);
+      } catch (error) {
+        stage.say (error.message);
+      }
       stage.post ({ type: 'sought' });
     },
     close: () => stage.close (),
