@@ -3,10 +3,9 @@
  * SECTION:element-rangedemux
  * @title: rangedemux
  *
- * Splits a stream of frame sets, raw or coded, into one stream per view; the inverse of rangemux.
- * Pad `src_3` has view 3. Pads are added with caps, whose rig names the views, and removed with a
- * rig that lacks them. The memories of raw views are shared; coded ones are copied into access
- * units with their own rig. A view missing in a frame set is a GAP on its pad.
+ * Splits a stream of frame sets into one stream per view; the inverse of rangemux. Pad `src_3` has
+ * view 3. Pads are added with caps, whose rig names the views, and removed with a rig that lacks
+ * them. Memories are shared. A view missing in a frame set is a GAP on its pad.
  *
  * ## Example launch line
  * |[
@@ -26,19 +25,12 @@
 #include <gstrange/gstrangeinfo.hpp>
 #include <gstrange/gstrangemeta.h>
 #include <gstrange/gstrangestatus.hpp>
-#include <rangecast/neighbourcode/bitstream/key_check.hpp>
-#include <rangecast/neighbourcode/bitstream/unit.hpp>
-#include <span>
-#include <vector>
 
-#include "common/accessunitwriter.hpp"
-#include "common/codedunits.hpp"
 #include "common/elementproperties.hpp"
 
 using gstrange::RangeInfo;
 using rangecast::kMaxViews;
 using rangecast::Status;
-using rangecast::StatusCode;
 using rangecast::View;
 
 GST_DEBUG_CATEGORY_STATIC (gst_range_demux_debug);
@@ -51,12 +43,6 @@ struct DemuxPad {
   GstPad *pad = nullptr; /* owned by the element; nullptr: the rig has no such view */
   GstCaps *caps = nullptr;
   bool fresh = true; /* no buffer was pushed yet */
-
-  /* coded: of the current frame set */
-  AccessUnitWriter writer;
-  std::vector<guint8> slices;
-  GstClockTime capture_time = GST_CLOCK_TIME_NONE; /* of the first slice */
-  rangecast::KeyCheck check;
 };
 
 } // namespace
@@ -69,9 +55,7 @@ struct GstRangeDemuxPrivate {
   std::array<DemuxPad, kMaxViews> pads; /* by view-id */
   GstFlowCombiner *combiner = gst_flow_combiner_new ();
   RangeInfo info;
-  bool coded = false;
   bool had_pads = false; /* since start */
-  GstSegment segment{};
   guint group_id = GST_GROUP_ID_INVALID;
 
   ~GstRangeDemuxPrivate () { gst_flow_combiner_free (combiner); }
@@ -80,48 +64,14 @@ struct GstRangeDemuxPrivate {
 DECLARE_ELEMENT (GstRangeDemux, gst_range_demux, RANGE_DEMUX, GstElement)
 
 static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
-    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (FRAME_SET_CAPS));
+    "sink", GST_PAD_SINK, GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS));
 static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE (
-    "src_%u", GST_PAD_SRC, GST_PAD_SOMETIMES, GST_STATIC_CAPS (FRAME_SET_CAPS));
+    "src_%u", GST_PAD_SRC, GST_PAD_SOMETIMES, GST_STATIC_CAPS (GST_RANGE_CAPS));
 
 G_DEFINE_TYPE (GstRangeDemux, gst_range_demux, GST_TYPE_ELEMENT)
 GST_ELEMENT_REGISTER_DEFINE (rangedemux, "rangedemux", GST_RANK_NONE, gst_range_demux_get_type ())
 
 /* ---- data ---- */
-
-/* Finds the slices of each view in a coded frame set. */
-static Status
-read_slices (GstRangeDemux *self, GstBuffer *frame_set)
-{
-  auto &pads = self->priv->pads;
-  for (DemuxPad &view : pads) {
-    view.slices.clear ();
-    view.check.reset ();
-  }
-  int dropped = 0;
-  Status end;
-  const auto handle = [&] (gsize, std::span<const guint8> unit,
-                          const rangecast::UnitHeader &header) {
-    rangecast::SliceHeader slice;
-    if (header.type != guint8 (rangecast::UnitType::kSlice))
-      return true;
-    if (!rangecast::read_slice_header (unit, slice).ok ()) {
-      dropped++;
-      return true;
-    }
-    DemuxPad &view = pads[slice.view_id];
-    if (view.slices.empty ())
-      view.capture_time = slice.capture_time_ns;
-    view.check.add (slice);
-    view.slices.insert (view.slices.end (), unit.begin (), unit.end ());
-    return true;
-  };
-  if (!for_each_unit (frame_set, handle, end))
-    return {StatusCode::kBadData, "cannot map a coded frame set"};
-  if (dropped > 0 || !end.ok ())
-    GST_DEBUG_OBJECT (self, "dropping %d damaged units", dropped + !end.ok ());
-  return {};
-}
 
 /* Times, flags and reference timestamps; the capture time is the view's own. */
 static void
@@ -140,32 +90,10 @@ copy_metadata (GstBuffer *view, GstBuffer *frame_set, GstClockTime capture)
     gst_range_buffer_set_capture_time (view, capture);
 }
 
-/* A view of a coded frame set, or nullptr if it is missing or memory is short. */
-static GstBuffer *
-make_coded_view (GstRangeDemuxPrivate *priv, GstBuffer *frame_set, int id)
-{
-  DemuxPad &entry = priv->pads[id];
-  if (entry.slices.empty ())
-    return nullptr;
-  const bool key =
-      entry.check.is_key () || !GST_BUFFER_FLAG_IS_SET (frame_set, GST_BUFFER_FLAG_DELTA_UNIT);
-  if (!entry.writer.begin (key, entry.slices.size ()).ok ())
-    return nullptr;
-  entry.writer.add (entry.slices);
-  GstBuffer *view =
-      entry.writer.finish (byte_stream_time (priv->segment, GST_BUFFER_PTS (frame_set)));
-  copy_metadata (view, frame_set, entry.capture_time);
-  set_key (view, key);
-  return view;
-}
-
 /* One view of the frame set, or nullptr if it is missing. */
 static GstBuffer *
 make_view (GstRangeDemux *self, GstBuffer *frame_set, int id)
 {
-  GstRangeDemuxPrivate *priv = self->priv;
-  if (priv->coded)
-    return make_coded_view (priv, frame_set, id);
   const GstRangeMeta *meta = gst_buffer_get_range_meta (frame_set, guint (id));
   GstBuffer *view = meta ? gst_range_buffer_copy_view (frame_set, meta) : nullptr;
   if (view)
@@ -228,11 +156,8 @@ gst_range_demux_chain (GstPad *, GstObject *parent, GstBuffer *buffer)
 {
   auto self = GST_RANGE_DEMUX (parent);
   GstRangeDemuxPrivate *priv = self->priv;
-  GstFlowReturn flow = priv->info.views () > 0 ? GST_FLOW_OK : GST_FLOW_NOT_NEGOTIATED;
-  if (flow == GST_FLOW_OK && priv->coded)
-    flow = gst_range_flow_return (GST_ELEMENT (self), read_slices (self, buffer));
-  if (flow == GST_FLOW_OK)
-    flow = push_views (self, buffer);
+  const GstFlowReturn flow =
+      priv->info.views () > 0 ? push_views (self, buffer) : GST_FLOW_NOT_NEGOTIATED;
   gst_buffer_unref (buffer);
   return flow;
 }
@@ -258,10 +183,8 @@ push_caps (GstRangeDemux *self, DemuxPad &entry, const View &view)
 {
   const RangeInfo &all = self->priv->info;
   const RangeInfo info = gstrange::make_info ({{view}}, all.fps_n, all.fps_d);
-  GstCaps *caps = self->priv->coded ? gstrange::make_neighbour_code_caps (info)
-                                    : gstrange::make_range_caps (info);
+  GstCaps *caps = gstrange::make_range_caps (info);
   GST_INFO_OBJECT (entry.pad, "%" GST_PTR_FORMAT, caps);
-  entry.writer.set_rig (info);
   if (!entry.caps || !gst_caps_is_equal (caps, entry.caps))
     gst_pad_push_event (entry.pad, gst_event_new_caps (caps));
   gst_caps_replace (&entry.caps, caps);
@@ -317,7 +240,6 @@ remove_pad (GstRangeDemux *self, DemuxPad &entry)
   gst_element_remove_pad (GST_ELEMENT (self), entry.pad);
   entry.pad = nullptr;
   gst_caps_replace (&entry.caps, nullptr);
-  entry.writer.drop ();
 }
 
 /* New pads are added before old ones are removed, so that an application always has one to show. */
@@ -351,13 +273,10 @@ handle_caps (GstRangeDemux *self, GstPad *sink, GstEvent *event)
   GstRangeDemuxPrivate *priv = self->priv;
   GstCaps *caps;
   gst_event_parse_caps (event, &caps);
-  const bool coded =
-      gst_structure_has_name (gst_caps_get_structure (caps, 0), GST_NEIGHBOUR_CODE_MEDIA_TYPE);
   const Status status = gstrange::parse_caps (caps, priv->info);
   gst_event_unref (event);
   if (gst_range_flow_return (GST_ELEMENT (self), status) != GST_FLOW_OK)
     return FALSE;
-  priv->coded = coded;
   update_pads (self, sink);
   return TRUE;
 }
@@ -386,9 +305,6 @@ gst_range_demux_sink_event (GstPad *sink, GstObject *parent, GstEvent *event)
       return handle_caps (self, sink, event);
     case GST_EVENT_STREAM_START:
       return handle_stream_start (self, event);
-    case GST_EVENT_SEGMENT:
-      gst_event_copy_segment (event, &self->priv->segment);
-      break;
     case GST_EVENT_FLUSH_STOP:
       gst_flow_combiner_reset (self->priv->combiner);
       break;
@@ -418,7 +334,6 @@ gst_range_demux_change_state (GstElement *element, GstStateChange transition)
         remove_pad (self, entry);
     gst_flow_combiner_reset (priv->combiner);
     priv->info = {};
-    priv->segment = {};
     priv->had_pads = false;
     priv->group_id = GST_GROUP_ID_INVALID;
     priv->last_seek = GST_SEQNUM_INVALID;
