@@ -40,7 +40,7 @@ LAYERS = (
 # Headers of other projects that a folder must do without.
 GSTREAMER = ("gst/", "glib", "gio/", "gobject")
 FOREIGN = (
-    (CORE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "tiny_gltf.h", "tiny_obj_loader.h", "zlib.h", "yaml.h") + GSTREAMER),
+    (CORE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "tiny_gltf.h", "tiny_obj_loader.h", "yaml.h") + GSTREAMER),
     (RIGFILE_FOLDERS, ("opencv2/", "ceres/", "Eigen/", "tiny_gltf.h", "tiny_obj_loader.h") + GSTREAMER),
     (VISION_FOLDERS, ("tiny_gltf.h", "tiny_obj_loader.h",) + GSTREAMER),
     (SCENE_FOLDERS, ("ceres/",) + GSTREAMER),

@@ -15,8 +15,8 @@ inline constexpr std::string_view kRigExtensions[] = {".yml", ".yaml", ".json"};
 /** Greatest size of a rig file, bytes: many times that of 64 views with three cameras. */
 inline constexpr std::uintmax_t kMaxRigFileSize = std::uintmax_t{4} << 20;
 
-/** Reads a rig from a file that cv::FileStorage opens, too: YAML or JSON by the file's extension,
- *  possibly with .gz; layout in docs/formats/rig.md. The rig is validated.
+/** Reads a rig from a file that cv::FileStorage opens, too: YAML or JSON; layout in
+ *  docs/formats/rig.md. The rig is validated.
  *  @return kNotFound, kBadData or validate()'s code; the message begins with the path */
 Status load_rig (const std::string &path, Rig &rig);
 /** Writes the same text that cv::FileStorage would. @return kBadValue, kNotFound; the message

@@ -2,11 +2,11 @@
 #include "yaml_tree.hpp"
 
 #include <yaml.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cstring>
+#include <fstream>
 #include <limits>
 #include <memory>
 #include <new>
@@ -20,24 +20,19 @@ struct BadYaml {
 };
 
 std::string
-unpacked (const std::string &path, gzFile file, std::uint64_t max_bytes)
+text_of (std::ifstream &file, std::uint64_t max_bytes)
 {
-  if (!gzdirect (file) && !path.ends_with (".gz"))
-    throw BadYaml{"is compressed; give it a name that ends in .gz"};
   std::string text;
-  for (int got = 1; got > 0;) {
-    constexpr unsigned kBlock = 65536;
-    const std::size_t size = text.size ();
+  for (std::size_t size = 0; file; text.resize (size)) {
+    constexpr std::size_t kBlock = 65536;
     text.resize (size + kBlock);
-    got = gzread (file, text.data () + size, kBlock);
-    text.resize (size + std::size_t (std::max (got, 0)));
-    int error = Z_OK; /* reports a truncated compressed file after its last byte */
-    gzerror (file, &error);
-    if (got < 0 || error != Z_OK)
-      throw BadYaml{"cannot be read to its end"};
-    if (text.size () > max_bytes)
+    file.read (text.data () + size, kBlock);
+    size += std::size_t (file.gcount ());
+    if (size > max_bytes)
       throw BadYaml{"has more than " + std::to_string (max_bytes) + " bytes"};
   }
+  if (!file.eof ())
+    throw BadYaml{"cannot be read to its end"};
   return text;
 }
 
@@ -50,7 +45,7 @@ standard_text (std::string_view text)
   if (text.starts_with (kMark))
     text.remove_prefix (kMark.size ());
   if (!text.starts_with (kYaml) && !text.starts_with ('{'))
-    throw BadYaml{"begins neither with %YAML nor with {"};
+    throw BadYaml{"begins neither with %YAML nor with { (compressed files are not read)"};
   std::string standard;
   standard.reserve (text.size ());
   for (std::size_t i = 0; i < text.size (); i++) {
@@ -223,12 +218,12 @@ YamlNode::integer () const
 Status
 read_yaml (const std::string &path, std::uint64_t max_bytes, YamlNode &root)
 {
-  const std::unique_ptr<gzFile_s, int (*) (gzFile)> file (gzopen (path.c_str (), "rb"), gzclose);
+  std::ifstream file (path, std::ios::binary);
   if (!file)
     return {StatusCode::kNotFound, path + ": cannot be opened"};
   root = {};
   try {
-    const std::string text = standard_text (unpacked (path, file.get (), max_bytes));
+    const std::string text = standard_text (text_of (file, max_bytes));
     YamlParser (text).document (root);
   } catch (const BadYaml &bad) {
     return {StatusCode::kBadData, path + ": " + bad.what};

@@ -40,8 +40,7 @@ inline constexpr int kMaxYamlDepth = 32;
 inline constexpr int kMaxYamlNodes = 100000;
 
 /** Reads a file that cv::FileStorage opens too: YAML that begins with %YAML, or JSON that begins
- *  with {, perhaps compressed (.gz). Aliases are refused: a few of them make a tree of any size.
- *  @param max_bytes  unpacked
+ *  with {. Aliases are refused: a few of them make a tree of any size.
  *  @param[out] root  a map; unspecified on failure
  *  @return kBadData, or kNotFound if it cannot be opened; the message begins with the path */
 Status read_yaml (const std::string &path, std::uint64_t max_bytes, YamlNode &root);

@@ -5,7 +5,6 @@
 #include <memory>
 #include <rangecast/rigfile/yaml_tree.hpp>
 #include <unistd.h>
-#include <zlib.h>
 
 using namespace rangecast;
 
@@ -168,27 +167,15 @@ TEST (YamlTree, every_truncated_prefix_is_refused_or_read)
   EXPECT_EQ (tree (text)["b"].items[0]["e"]["f"].text, "1");
 }
 
-TEST (YamlTree, limit_counts_unpacked_bytes_and_compressed_names_end_in_gz)
+TEST (YamlTree, limit_counts_bytes)
 {
-  const std::string named = temporary ("tree.yml.gz"), hidden = temporary ("hidden.yml");
-  const std::string text =
-      kHead + "a: 1\n" + repeated ("# " + std::string (1021, 'x') + "\n", 8192);
-  {
-    const std::unique_ptr<gzFile_s, int (*) (gzFile)> packed (
-        gzopen (named.c_str (), "wb"), gzclose);
-    gzwrite (packed.get (), text.data (), unsigned (text.size ()));
-  }
+  const std::string path = temporary ("tree.yml");
+  const std::string text = kHead + "a: 1\n" + repeated ("# " + std::string (1021, 'x') + "\n", 100);
+  std::ofstream (path) << text;
   YamlNode root;
-  EXPECT_TRUE (read_yaml (named, text.size (), root).ok ());
+  EXPECT_TRUE (read_yaml (path, text.size (), root).ok ());
   EXPECT_EQ (root["a"].integer (), 1);
-  EXPECT_NE (
-      read_yaml (named, text.size () - 1, root).message ().find ("bytes"), std::string::npos);
-  std::filesystem::copy_file (named, hidden);
-  EXPECT_NE (
-      read_yaml (hidden, text.size (), root).message ().find ("is compressed"), std::string::npos);
-  std::filesystem::resize_file (named, std::filesystem::file_size (named) / 2);
-  EXPECT_EQ (read_yaml (named, text.size (), root).code (), StatusCode::kBadData);
-  std::filesystem::remove (named);
-  std::filesystem::remove (hidden);
-  EXPECT_EQ (read_yaml (named, kLimit, root).code (), StatusCode::kNotFound);
+  EXPECT_NE (read_yaml (path, text.size () - 1, root).message ().find ("bytes"), std::string::npos);
+  std::filesystem::remove (path);
+  EXPECT_EQ (read_yaml (path, kLimit, root).code (), StatusCode::kNotFound);
 }
