@@ -145,7 +145,7 @@ export class Player extends EventTarget {
     if (!this.stopped)
       this.setState (state);
   }
-  hear ({ packet }) { this.speech.add (packet); }
+  hear ({ packet }) { this.speech.add (packet, this.live); }
   sound ({ available }) {
     this.audio = available;
     this.emit ('audiochange');

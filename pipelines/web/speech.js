@@ -43,6 +43,7 @@ export class Speech {
     this.holdPicture (0);
   }
   open () {
+    this.decoding = []; // when the packets were captured that the decoder has
     this.decoder = new AudioDecoder ({ output: (audio) => this.schedule (audio), error: (error) => this.fail (error) });
     this.decoder.configure ({ codec: 'opus', sampleRate: RATE, numberOfChannels: 2 });
   }
@@ -56,16 +57,18 @@ export class Speech {
   follow (latency) {
     this.seen = this.seen === 0 || Math.abs (latency - this.seen) > 1000 ? latency : this.seen + (latency - this.seen) / 16;
   }
-  // captured: ms since the epoch; data: a packet of Opus
-  add ({ captured, data }) {
+  // captured: ms since the epoch; data: a packet of Opus; live: later packets may take longer, else they come before they are due
+  add ({ captured, data }, live) {
     if (!this.isOn || this.context.state !== 'running')
       return;
-    const arrival = now () - captured;
+    const arrival = live ? now () - captured : 0;
     this.arrival = this.arrival === 0 || Math.abs (arrival - this.arrival) > 1000 ? arrival : Math.max (arrival, this.arrival * MEMORY);
-    if (this.seen > 0)
+    if (live && this.seen > 0)
       this.holdPicture (this.arrival + MARGIN - (this.seen - this.held));
-    if (this.decoder.state === 'configured')
-      this.decoder.decode (new EncodedAudioChunk ({ type: 'key', timestamp: Math.round (1000 * captured), data }));
+    if (this.decoder.state !== 'configured')
+      return;
+    this.decoding.push (captured); // Chromium counts samples from the first packet's timestamp, also over gaps
+    this.decoder.decode (new EncodedAudioChunk ({ type: 'key', timestamp: Math.round (1000 * captured), data }));
   }
 
   // Where packets take longer than pictures, pictures wait.
@@ -85,7 +88,7 @@ export class Speech {
   schedule (audio) {
     if (!this.isOn)
       return audio.close ();
-    const captured = audio.timestamp / 1000, wanted = Math.max (this.seen, this.arrival + MARGIN);
+    const captured = this.decoding.shift (), wanted = Math.max (this.seen, this.arrival + MARGIN);
     const due = this.contextTime (captured + wanted);
     const at = Math.abs (due - this.next) < STEP ? this.next : due;
     if (at >= this.context.currentTime) {
