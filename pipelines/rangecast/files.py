@@ -37,13 +37,9 @@ def build_record(args):
     fail_unless(not args.listen or not (args.views or args.size or args.frames), "--views, --size and --frames are for the built-in figure, without --listen")
     audio = audio_file_of(args.file)
     launch = Launch()
+    fail_unless(not args.audio_port or audio != args.file, f"{args.file}: audio goes to a file of that name; choose one that does not end in .opus")
     if args.listen:
-        transport.receive_stream(args, launch)
-        if args.audio_port:
-            fail_unless(audio != args.file, f"{args.file}: audio goes to a file of that name; choose one that does not end in .opus")
-            # Both files begin with the first key frame set.
-            # The parser writes the times of capturesync into the file.
-            launch.add(*"! sync.sink_0 capturesync name=sync start-with=sink_0 sync.src_0 ! neighbourcodeparse".split())
+        transport.receive_in_sync(args, launch)
     else:
         launch.add("avatartestsrc", f"views={args.views or 4}", f"num-buffers={args.frames or 60}", "range-person-only=true")
         launch.add("!", size_caps(args.size or (320, 240), 15, "video/x-range"))

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """publish: a stream as segments and a playlist, which any web server can carry."""
 
+import collections
 import datetime
 import fcntl
 import os
 import re
 import struct
+import threading
 import time
 from pathlib import Path
 
@@ -26,16 +28,16 @@ def add_publish(parser):
     parser.add_argument("--record", type=options.output_file, metavar="FILE", help="write the whole stream to a recording, too")
     options.add(parser, "--source", help="publish what ends with coded frame sets, e.g. '... ! neighbourcodeenc'")
     options.add_receiver(parser, listen_required=False)
-    parser.set_defaults(build=build_publish, run=run_publish, pipe=None)
+    parser.set_defaults(build=build_publish, run=run_publish, pipes=None)
 
 
 def build_publish(args):
     fail_unless(not (args.listen and args.source), "--listen and --source exclude each other")
-    fail_unless(not args.audio_port, "--audio-port: publish carries no audio yet; use rangecast serve")
+    fail_unless(not (args.audio_port and args.record), "--record: of a stream with audio, only rangecast record makes a recording")
     transport.check_listen(args)
     launch = Launch()
     if args.listen:
-        transport.receive_stream(args, launch)
+        transport.receive_in_sync(args, launch)
     else:
         launch.add(*(args.source or [*transport.LIVE_FIGURE, f"key-interval={1000 * args.segment}"]))
     if not args.print:
@@ -44,8 +46,13 @@ def build_publish(args):
         if args.record:
             fail_unless(not Path(args.folder).samefile(Path(args.record).parent), "--record: use another folder than that of the segments")
             keep_existing(args.record)
-        args.pipe = os.pipe()
-    launch.add("!", "fdsink", "sync=false", "async=false", f"fd={args.pipe[1] if args.pipe else 1}")
+        args.pipes = os.pipe(), os.pipe()
+    (_, frames), (_, audio) = args.pipes or ((0, 1), (0, 3))
+    # Audio comes first, so that what belongs to a segment is there when it ends.
+    launch.add(*["!", "queue", "!", "fdsink", "ts-offset=200000000"] if args.audio_port else ["!", "fdsink", "sync=false"], "async=false", f"fd={frames}")
+    if args.audio_port:
+        transport.receive_audio(args, launch)
+        launch.add(*"! sync.sink_1 sync.src_1 ! rtpopuspay timestamp-offset=0 ! rtpstreampay ! fdsink async=false".split(), f"fd={audio}")
     return launch
 
 
@@ -64,7 +71,8 @@ class Publisher:
 
     def __init__(self, folder, seconds, keep):
         self.folder, self.seconds, self.keep = Path(folder), seconds, keep
-        self.listed, self.old, self.units = [], [], []  # listed: (name, seconds, when it began); old: those that go
+        self.listed, self.old, self.units = [], [], []  # listed: (name, audio's name, seconds, when it began); old: those that go
+        self.audio = collections.deque(maxlen=3000)  # RTP packets that no segment has yet, of a minute; follow_audio() appends
         if (self.folder / PLAYLIST).exists():
             self.old = re.findall(r"^(\d+\.rcnc)$", (self.folder / PLAYLIST).read_text(errors="replace"), re.M)
         self.number = max(int(time.time()), *(int(name[:-5]) + 1 for name in self.old), 0)  # later than all of an earlier run
@@ -85,19 +93,27 @@ class Publisher:
             return
         name, units, self.units = f"{self.number}.rcnc", self.units, []
         self.write(name, b"".join(units))
+        packets = []
+        while self.audio and samples_from(seconds, self.audio[0]) < 0:
+            packet = self.audio.popleft()
+            packets.append(packet[:6] + samples_from(self.begin, packet).to_bytes(4, "big", signed=True) + packet[10:])
+        audio = f"{self.number}.rtp" if packets else ""
+        if packets:
+            self.write(audio, b"".join(packets))
         self.number += 1
         if not self.listed:
             print(f"publishing {self.folder / PLAYLIST}", flush=True)
-        self.listed.append((name, max(seconds - self.begin, 0.001), self.began))
+        self.listed.append((name, audio, max(seconds - self.begin, 0.001), self.began))
         self.old += [self.listed.pop(0)[0] for _ in self.listed[self.keep :]]
         self.list_segments()
         while len(self.old) > 3:  # who has read the playlist before may still fetch some
-            (self.folder / self.old.pop(0)).unlink(missing_ok=True)
+            self.delete(self.old.pop(0))
 
     def list_segments(self, ending=""):
-        longest = max(int(seconds + 0.5) for _, seconds, _ in self.listed)
+        longest = max(int(seconds + 0.5) for _, _, seconds, _ in self.listed)
         lines = ["#EXTM3U", "#EXT-X-VERSION:3", f"#EXT-X-TARGETDURATION:{max(longest, 1)}", f"#EXT-X-MEDIA-SEQUENCE:{self.number - len(self.listed)}"]
-        for name, seconds, began in self.listed:
+        for name, audio, seconds, began in self.listed:
+            lines += [f"#EXT-X-RANGECAST-AUDIO:{audio}"] if audio else []
             lines += [f"#EXT-X-PROGRAM-DATE-TIME:{began.isoformat(timespec='milliseconds')}", f"#EXTINF:{seconds:.3f},", name]
         self.write(PLAYLIST, ("\n".join(lines) + "\n" + ending).encode())
 
@@ -110,13 +126,29 @@ class Publisher:
             raise Fail(f"'{self.folder / name}': {error.strerror}") from None
         part.replace(self.folder / name)  # who reads gets all of it or none
 
+    def delete(self, name):
+        for suffix in (".rcnc", ".rtp"):
+            (self.folder / name).with_suffix(suffix).unlink(missing_ok=True)
+
     def finish(self):
         if self.units:
             self.end_segment(self.last)
         if self.listed:
             self.list_segments("#EXT-X-ENDLIST\n")
             for name in self.old:
-                (self.folder / name).unlink(missing_ok=True)
+                self.delete(name)
+
+
+def samples_from(seconds, packet):
+    """From a running time to that of an RTP packet of Opus with its length before it, whose timestamp is modulo 2^32."""
+    distance = (int.from_bytes(packet[6:10], "big") - int(48000 * seconds)) % 2**32
+    return distance - (distance >> 31 << 32)
+
+
+def follow_audio(stream, packets):
+    """Reads RTP packets as RFC 4571 frames them, each with its length."""
+    while len(size := stream.read(2)) == 2:
+        packets.append(size + stream.read(int.from_bytes(size, "big")))
 
 
 def read_units(stream):
@@ -134,10 +166,12 @@ def read_units(stream):
 
 def run_publish(args, launch):
     publisher = Publisher(args.folder, args.segment, args.keep)
-    read, write = args.pipe
-    with Processes() as processes, open(read, "rb") as stream, open(args.record or os.devnull, "wb") as recording:
-        child = processes.start("stream", launch, pass_fds=[write])
-        os.close(write)
+    frames, audio = args.pipes
+    with open(frames[0], "rb") as stream, open(args.record or os.devnull, "wb") as recording, Processes() as processes:
+        child = processes.start("stream", launch, pass_fds=[frames[1], audio[1]])
+        os.close(frames[1])
+        os.close(audio[1])
+        threading.Thread(target=follow_audio, args=(open(audio[0], "rb"), publisher.audio), daemon=True).start()  # noqa: SIM115
         try:
             for unit, seconds, is_key in read_units(stream):
                 publisher.add(unit, seconds, is_key)

@@ -125,6 +125,13 @@ def receive_stream(args, launch):
             feedback=args.feedback_to, rtx=args.rtx)  # fmt: skip
 
 
+def receive_in_sync(args, launch):
+    """With audio, what follows has the times of capturesync, on whose pads sink_1 and src_1 audio goes; a file begins with a key frame set."""
+    receive_stream(args, launch)
+    if args.audio_port:  # the parser writes the times into the stream
+        launch.add(*"! sync.sink_0 capturesync name=sync start-with=sink_0 sync.src_0 ! neighbourcodeparse".split())
+
+
 def speak(launch, source, filters=(), payloader=()):
     """Adds the elements from a microphone to RTP. The pipeline's clock has to be that of the camera hosts."""
     launch.add(*source)

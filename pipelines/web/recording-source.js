@@ -117,7 +117,8 @@ export class RecordingSource {
     this.stage.post ({ type: 'position', time: this.time, duration, playing: this.playing, ended: this.atEnd });
   }
 
-  play () {
+  // origin: performance.now () of time 0
+  play (origin) {
     if (this.failed || this.playing)
       return;
     if (this.atEnd) {
@@ -126,7 +127,7 @@ export class RecordingSource {
         return;
     }
     this.playing = true;
-    this.origin = performance.now () - this.time;
+    this.origin = origin ?? performance.now () - this.time;
     this.reportPosition ();
     this.schedule ();
   }

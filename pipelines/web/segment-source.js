@@ -6,28 +6,44 @@ import { RecordingSource } from './recording-source.js';
 
 const AHEAD = 3; // segments that are fetched before they are played
 const MAX_BEHIND = 4; // segments; who plays the live end then jumps to it
+const MAX_SHIFT = 30; // ms that a segment may begin late or early without moving all that follows
 const MAX_SEGMENT = 256 << 20; // bytes
+const AUDIO = '#EXT-X-RANGECAST-AUDIO:', RTP_HEADER = 12, SAMPLES = 48; // bytes; in a ms
+const AUDIO_AHEAD = 200; // ms that packets leave before they are heard
 const RETRY = 1000, PATIENCE = 10000; // ms: until the playlist is asked for again; that an answer may take
 
-// @return { target: ms, ended, segments: [{ number, address, length: ms }] }
+// @return { target: ms, ended, segments: [{ number, address, audio: its address, length: ms }] }
 export const parsePlaylist = (text, address) => {
   if (!text.startsWith ('#EXTM3U'))
     throw new Error (`${address} is not a playlist (it does not begin with #EXTM3U)`);
   const tag = (name) => Number (text.match (new RegExp (`^#EXT-X-${name}:(\\d+)`, 'm'))?.[1]);
   const first = tag ('MEDIA-SEQUENCE') || 0, segments = [];
-  let length = NaN;
+  let length = NaN, audio;
   for (const line of text.split (/\r?\n/))
     if (line.startsWith ('#EXTINF:'))
       length = 1000 * parseFloat (line.slice (8));
+    else if (line.startsWith (AUDIO))
+      audio = new URL (line.slice (AUDIO.length), address).href;
     else if (line !== '' && !line.startsWith ('#')) {
       if (!(length >= 0))
         throw new Error (`${address} has a segment without #EXTINF`);
-      segments.push ({ number: first + segments.length, address: new URL (line, address).href, length });
+      segments.push ({ number: first + segments.length, address: new URL (line, address).href, audio, length });
       length = NaN;
+      audio = undefined;
     }
   if (segments.length === 0)
     throw new Error (`${address} has no segments`);
   return { target: 1000 * tag ('TARGETDURATION') || 1000, ended: /^#EXT-X-ENDLIST/m.test (text), segments };
+};
+
+// RTP packets of Opus (RFC 7587), each after its length (RFC 4571). @return [{ time: from the beginning of the segment, ms; data }]
+export const parseAudio = (bytes) => {
+  const view = new DataView (bytes.buffer), packets = [];
+  for (let at = 0, end; at + 2 + RTP_HEADER < bytes.length; at = end) {
+    end = at + 2 + view.getUint16 (at);
+    packets.push ({ time: view.getInt32 (at + 6) / SAMPLES, data: bytes.subarray (at + 2 + RTP_HEADER, end) });
+  }
+  return packets;
 };
 
 const load = async (address, options) => {
@@ -75,11 +91,20 @@ export class SegmentSource extends RecordingSource {
     this.target = target;
     this.ended = ended;
   }
+  // Whether the playlist has sound, where that has changed.
+  reportSound () {
+    const available = this.segments.some (({ audio }) => audio);
+    if (available !== this.hasSound)
+      this.stage.post ({ type: 'sound', available });
+    this.hasSound = available;
+  }
 
   // The one that plays or is to be played; where that is gone, the next.
   segment () { return this.segments.find (({ number }) => number >= this.number); }
   fetched (segment) {
     return segment.loading ??= load (segment.address).then (async (answer) => {
+      const audio = segment.audio && await load (segment.audio).catch (() => null); // without it the picture plays
+      segment.packets = audio ? parseAudio (new Uint8Array (await audio.arrayBuffer ())) : [];
       segment.bytes = new Uint8Array (await answer.arrayBuffer ());
       segment.failure = undefined;
     }).catch ((error) => {
@@ -93,6 +118,7 @@ export class SegmentSource extends RecordingSource {
     this.number = this.segment ().number;
     this.failed = this.atEnd = this.saidDamage = false;
     this.wantsPlay = !paused;
+    this.reportSound ();
     if (time > 0)
       this.seek (1000 * Math.floor (time / 1000));
     else
@@ -114,6 +140,7 @@ export class SegmentSource extends RecordingSource {
         await this.update ();
         if (this.closed)
           return;
+        this.reportSound ();
         if (this.away)
           this.stage.say ('');
         this.away = false;
@@ -134,7 +161,7 @@ export class SegmentSource extends RecordingSource {
   fetchAhead () {
     for (const segment of this.segments)
       if (segment.number < this.number)
-        segment.loading = segment.bytes = segment.failure = undefined;
+        segment.loading = segment.bytes = segment.packets = segment.failure = undefined;
       else if (segment.number <= this.number + AHEAD)
         this.fetched (segment);
   }
@@ -166,7 +193,7 @@ export class SegmentSource extends RecordingSource {
     while (this.visit === visit && this.next () && this.time < time)
       ;
     if (this.visit === visit && this.wantsPlay)
-      super.play ();
+      super.play (Math.abs (performance.now () - this.origin - this.time) < MAX_SHIFT ? this.origin : undefined);
     this.fetchAhead ();
   }
   // After a failure of the core, too.
@@ -188,6 +215,20 @@ export class SegmentSource extends RecordingSource {
     if (core.message () !== '' && outcome !== END)
       this.stage.say (`A part of the stream cannot be shown: ${core.message ()}`, 'note');
     return this.leave ();
+  }
+
+  // The sound of until shortly after the next frame set, of which the next segment may have the end.
+  schedule () {
+    super.schedule ();
+    const period = this.frameDuration (), until = this.time + period + AUDIO_AHEAD;
+    if (!(this.heard >= this.time - period && this.heard <= until)) // it was elsewhere before
+      this.heard = this.time;
+    for (const { number, start, packets } of this.segments)
+      if (number === this.number || number === this.number + 1)
+        for (const { time, data } of packets ?? [])
+          if (start + time >= this.heard && start + time < until)
+            this.stage.post ({ type: 'hear', packet: { captured: this.dueOf (start + time), data } });
+    this.heard = until;
   }
 
   timeOf (pts) {

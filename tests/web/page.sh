@@ -16,6 +16,7 @@ for recording in moving:15 slow:1; do # of slow something is left to play, howev
     ! "video/x-range,width=160,height=120,framerate=${recording#*:}/1" ! neighbourcodeenc ! filesink "location=$work/${recording%:*}.rcnc"
 done
 gst-launch-1.0 -q filesrc "location=$source" ! neighbourcodeparse ! neighbourcodedec ! plyenc ! model/gltf-binary ! filesink "location=$work/scene.glb"
+gst-launch-1.0 -q avatartestsrc views=1 num-buffers=1 "rig-export=$work/rig.yaml" ! video/x-range,width=160,height=120 ! fakesink
 for angle in -30 100; do
   gst-launch-1.0 -q filesrc "location=$source" ! neighbourcodeparse ! neighbourcodedec ! striprender mode=blend fit=true "azimuth=$angle" \
     ! "video/x-raw,format=RGBA,width=640,height=480" ! videoconvert ! pngenc snapshot=true \

@@ -6,6 +6,7 @@ import fs from 'node:fs';
 import http from 'node:http';
 import path from 'node:path';
 import test, { after, before } from 'node:test';
+import { assertInSync, CLAPS, withoutPolicy } from './claps.js';
 import { frameSets, framesShown, launch, message, messageMatches, openPage, sleep, work } from './browser.js';
 import { build } from './support.js';
 
@@ -36,8 +37,8 @@ const until = async (condition) => {
     await sleep (100);
   assert.ok (await condition (), String (condition));
 };
-const open = async (address = `${origin.address}/live.m3u8`) => {
-  const opened = await openPage (browser, `${pages.address}/index.html?src=${encodeURIComponent (address)}`);
+const open = async (address = `${origin.address}/live.m3u8`, prepare = undefined) => {
+  const opened = await openPage (browser, `${pages.address}/index.html?src=${encodeURIComponent (address)}`, undefined, prepare);
   await opened.evaluate (() => {
     const view = document.querySelector ('rangecast-view');
     window.events = [];
@@ -136,5 +137,21 @@ test ('a stream that begins again goes on, and one that ends has ended', async (
   publisher.kill ('SIGINT');
   await opened.waitForFunction (() => window.events.includes ('ended'));
   assert.match (fs.readFileSync (path.join (folder, 'live.m3u8'), 'utf8'), /#EXT-X-ENDLIST\n$/);
+  await opened.close ();
+});
+
+test ('sound is heard with the picture', async () => {
+  const camera = spawn ('rangecast', ['camera', '--view', '0', '--rig', path.join (work, 'rig.yaml'), '--input', 'range', '--size', '160x120', '--learn', '5',
+    '--to', '127.0.0.1:20010', '--microphone', 'audiotestsrc is-live=true wave=silence', '--audio-to', '127.0.0.1:20020'],
+  { stdio: 'inherit', env: { ...process.env, ...CLAPS } });
+  publisher.kill ('SIGKILL');
+  publisher = publish ('--listen', '20010', '--audio-port', '20020');
+  await until (() => listed ().some ((name) => fs.existsSync (path.join (folder, name.replace ('.rcnc', '.rtp')))));
+  const opened = await open (undefined, withoutPolicy);
+  await framesShown (opened, 10);
+  await assertInSync (opened);
+  camera.kill ('SIGINT');
+  publisher.kill ('SIGINT');
+  await opened.waitForFunction (() => window.events.includes ('ended'));
   await opened.close ();
 });
