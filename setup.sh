@@ -56,7 +56,7 @@ packages=(
   # tests of the page
   nodejs chromium
   # tests
-  libgtest-dev python3-opencv iproute2 openssl curl valgrind xvfb xauth xdotool
+  abigail-tools libgtest-dev python3-opencv iproute2 openssl curl valgrind xvfb xauth xdotool
 )
 
 installed= # "yes" once packages were

@@ -32,6 +32,15 @@ test_each_list_belongs_to_a_package () {
   done
 }
 
+test_versions_agree () {
+  local version
+  version=$(meson introspect --projectinfo "$build" | python3 -c 'import json, sys; print(json.load(sys.stdin)["version"])')
+  rangecast --version | grep -qF " $version" || fail "rangecast is not $version: $(rangecast --version)"
+  grep -qF "\"version\": \"$version\"" "$source_dir/pipelines/web/package.json" || fail "the npm package is not $version"
+  [ "$(gst-inspect-1.0 striprender | awk '$1 == "Version" { print $2 }')" = "$version" ] || fail "the plugins are not $version"
+  [[ "$(grep -m 1 '^## ' "$source_dir/CHANGELOG.md")" = *"$version"* ]] || fail "CHANGELOG.md does not begin with $version"
+}
+
 test_what_is_missing_is_said () {
   expect_error "give one argument" "$pipelines/make-packages.sh"
   expect_error "unknown option '--x'" "$pipelines/make-packages.sh" --x
