@@ -39,7 +39,7 @@ def build_record(args):
     launch = Launch()
     fail_unless(not args.audio_port or audio != args.file, f"{args.file}: audio goes to a file of that name; choose one that does not end in .opus")
     if args.listen:
-        transport.receive_in_sync(args, launch)
+        transport.receive_in_sync(args, launch, "start-with=sink_0")  # both files begin with the first key frame set
     else:
         launch.add("avatartestsrc", f"views={args.views or 4}", f"num-buffers={args.frames or 60}", "range-person-only=true")
         launch.add("!", size_caps(args.size or (320, 240), 15, "video/x-range"))

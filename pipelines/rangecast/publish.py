@@ -33,7 +33,7 @@ def add_publish(parser):
 
 def build_publish(args):
     fail_unless(not (args.listen and args.source), "--listen and --source exclude each other")
-    fail_unless(not (args.audio_port and args.record), "--record: of a stream with audio, only rangecast record makes a recording")
+    fail_unless(not (args.audio_port and args.record), "--record does not record audio; use rangecast record")
     transport.check_listen(args)
     launch = Launch()
     if args.listen:
@@ -47,12 +47,12 @@ def build_publish(args):
             fail_unless(not Path(args.folder).samefile(Path(args.record).parent), "--record: use another folder than that of the segments")
             keep_existing(args.record)
         args.pipes = os.pipe(), os.pipe()
-    (_, frames), (_, audio) = args.pipes or ((0, 1), (0, 3))
-    # Audio comes first, so that what belongs to a segment is there when it ends.
-    launch.add(*["!", "queue", "!", "fdsink", "ts-offset=200000000"] if args.audio_port else ["!", "fdsink", "sync=false"], "async=false", f"fd={frames}")
+    launch.add(*["!", "queue"] * bool(args.audio_port), "!", "fdsink", "async=false", f"fd={args.pipes[0][1] if args.pipes else 1}")
     if args.audio_port:
+        launch.add("sync=true", "ts-offset=200000000")  # a segment's audio is there when it ends
         transport.receive_audio(args, launch)
-        launch.add(*"! sync.sink_1 sync.src_1 ! rtpopuspay timestamp-offset=0 ! rtpstreampay ! fdsink async=false".split(), f"fd={audio}")
+        launch.add(*"! sync.sink_1 sync.src_1 ! rtpopuspay timestamp-offset=0 ! rtpstreampay !".split())
+        launch.add(*["fdsink", f"fd={args.pipes[1][1]}"] if args.pipes else ["filesink", "location=live.rtp"], "async=false")
     return launch
 
 
@@ -72,7 +72,8 @@ class Publisher:
     def __init__(self, folder, seconds, keep):
         self.folder, self.seconds, self.keep = Path(folder), seconds, keep
         self.listed, self.old, self.units = [], [], []  # listed: (name, audio's name, seconds, when it began); old: those that go
-        self.audio = collections.deque(maxlen=3000)  # RTP packets that no segment has yet, of a minute; follow_audio() appends
+        self.longest = max(10, 3 * seconds)
+        self.audio = collections.deque(maxlen=int(400 * self.longest))  # RTP packets that no segment has yet; follow_audio() appends
         if (self.folder / PLAYLIST).exists():
             self.old = re.findall(r"^(\d+\.rcnc)$", (self.folder / PLAYLIST).read_text(errors="replace"), re.M)
         self.number = max(int(time.time()), *(int(name[:-5]) + 1 for name in self.old), 0)  # later than all of an earlier run
@@ -85,7 +86,7 @@ class Publisher:
         if self.units or is_key:
             self.units.append(unit)
         self.last = seconds
-        if self.units and not is_key and seconds - self.begin > max(10, 3 * self.seconds):
+        if self.units and not is_key and seconds - self.begin > self.longest:
             raise Fail(f"segments begin with key frame sets, and for {seconds - self.begin:.0f} s there was none: set key-interval=1000 on neighbourcodeenc")
 
     def end_segment(self, seconds):
@@ -97,8 +98,7 @@ class Publisher:
         while self.audio and samples_from(seconds, self.audio[0]) < 0:
             packet = self.audio.popleft()
             packets.append(packet[:6] + samples_from(self.begin, packet).to_bytes(4, "big", signed=True) + packet[10:])
-        audio = f"{self.number}.rtp" if packets else ""
-        if packets:
+        if audio := f"{self.number}.rtp" if packets else "":
             self.write(audio, b"".join(packets))
         self.number += 1
         if not self.listed:
@@ -140,7 +140,7 @@ class Publisher:
 
 
 def samples_from(seconds, packet):
-    """From a running time to that of an RTP packet of Opus with its length before it, whose timestamp is modulo 2^32."""
+    """Samples from a running time to an RTP packet's timestamp, which is modulo 2^32."""
     distance = (int.from_bytes(packet[6:10], "big") - int(48000 * seconds)) % 2**32
     return distance - (distance >> 31 << 32)
 
@@ -167,15 +167,22 @@ def read_units(stream):
 def run_publish(args, launch):
     publisher = Publisher(args.folder, args.segment, args.keep)
     frames, audio = args.pipes
-    with open(frames[0], "rb") as stream, open(args.record or os.devnull, "wb") as recording, Processes() as processes:
+    with Processes() as processes, open(frames[0], "rb") as stream, open(args.record or os.devnull, "wb") as recording:
         child = processes.start("stream", launch, pass_fds=[frames[1], audio[1]])
         os.close(frames[1])
         os.close(audio[1])
-        threading.Thread(target=follow_audio, args=(open(audio[0], "rb"), publisher.audio), daemon=True).start()  # noqa: SIM115
+        follower = threading.Thread(target=follow_audio, args=(open(audio[0], "rb"), publisher.audio), daemon=True)  # noqa: SIM115
+        follower.start()
         try:
             for unit, seconds, is_key in read_units(stream):
                 publisher.add(unit, seconds, is_key)
                 recording.write(unit)
+        except SystemExit:
+            child.terminate()
+            while stream.read(65536):  # else it could not end
+                pass
+            raise
         finally:
+            follower.join(1)
             publisher.finish()
         return child.wait()

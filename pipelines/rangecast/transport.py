@@ -125,11 +125,11 @@ def receive_stream(args, launch):
             feedback=args.feedback_to, rtx=args.rtx)  # fmt: skip
 
 
-def receive_in_sync(args, launch):
-    """With audio, what follows has the times of capturesync, on whose pads sink_1 and src_1 audio goes; a file begins with a key frame set."""
+def receive_in_sync(args, launch, *properties):
+    """Adds receive_stream(). With audio, adds capturesync (audio uses its pads sink_1 and src_1), so that both share one timeline."""
     receive_stream(args, launch)
     if args.audio_port:  # the parser writes the times into the stream
-        launch.add(*"! sync.sink_0 capturesync name=sync start-with=sink_0 sync.src_0 ! neighbourcodeparse".split())
+        launch.add("!", "sync.sink_0", "capturesync", "name=sync", *properties, "sync.src_0", "!", "neighbourcodeparse")
 
 
 def speak(launch, source, filters=(), payloader=()):

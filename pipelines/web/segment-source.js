@@ -41,7 +41,7 @@ export const parseAudio = (bytes) => {
   const view = new DataView (bytes.buffer), packets = [];
   for (let at = 0, end; at + 2 + RTP_HEADER < bytes.length; at = end) {
     end = at + 2 + view.getUint16 (at);
-    packets.push ({ time: view.getInt32 (at + 6) / SAMPLES, data: bytes.subarray (at + 2 + RTP_HEADER, end) });
+    packets.push ({ time: view.getInt32 (at + 6) / SAMPLES, data: bytes.slice (at + 2 + RTP_HEADER, end) });
   }
   return packets;
 };
@@ -102,9 +102,10 @@ export class SegmentSource extends RecordingSource {
   // The one that plays or is to be played; where that is gone, the next.
   segment () { return this.segments.find (({ number }) => number >= this.number); }
   fetched (segment) {
+    segment.sound ??= segment.audio && load (segment.audio).then ((answer) => answer.arrayBuffer ()).then ((bytes) => {
+      segment.packets = parseAudio (new Uint8Array (bytes));
+    }).catch (() => {}); // the picture plays without it
     return segment.loading ??= load (segment.address).then (async (answer) => {
-      const audio = segment.audio && await load (segment.audio).catch (() => null); // without it the picture plays
-      segment.packets = audio ? parseAudio (new Uint8Array (await audio.arrayBuffer ())) : [];
       segment.bytes = new Uint8Array (await answer.arrayBuffer ());
       segment.failure = undefined;
     }).catch ((error) => {
@@ -152,6 +153,7 @@ export class SegmentSource extends RecordingSource {
       }
       if (this.live && this.wantsPlay && this.segments.at (-1).number - this.number > MAX_BEHIND) {
         this.number = this.segments.at (-1).number;
+        this.heard = undefined;
         this.enter ();
       } else if (this.stalled)
         this.enter ();
@@ -161,7 +163,7 @@ export class SegmentSource extends RecordingSource {
   fetchAhead () {
     for (const segment of this.segments)
       if (segment.number < this.number)
-        segment.loading = segment.bytes = segment.packets = segment.failure = undefined;
+        segment.loading = segment.bytes = segment.sound = segment.packets = segment.failure = undefined;
       else if (segment.number <= this.number + AHEAD)
         this.fetched (segment);
   }
@@ -185,7 +187,7 @@ export class SegmentSource extends RecordingSource {
       return this.leave ();
     }
     this.current = segment;
-    const { bytes } = segment;
+    const { bytes } = segment, isOnTime = Math.abs (performance.now () - this.origin - segment.start) < MAX_SHIFT;
     this.stage.core.read = (offset, size) => bytes.subarray (offset, offset + size);
     this.stage.core.call ('rc_open', bytes.length);
     this.first = null;
@@ -193,7 +195,7 @@ export class SegmentSource extends RecordingSource {
     while (this.visit === visit && this.next () && this.time < time)
       ;
     if (this.visit === visit && this.wantsPlay)
-      super.play (Math.abs (performance.now () - this.origin - this.time) < MAX_SHIFT ? this.origin : undefined);
+      super.play (time < 0 && isOnTime ? this.origin : undefined);
     this.fetchAhead ();
   }
   // After a failure of the core, too.
@@ -217,18 +219,18 @@ export class SegmentSource extends RecordingSource {
     return this.leave ();
   }
 
-  // The sound of until shortly after the next frame set, of which the next segment may have the end.
+  // Posts the sound up to AUDIO_AHEAD past the next frame set; it may be in the next segment.
   schedule () {
     super.schedule ();
-    const period = this.frameDuration (), until = this.time + period + AUDIO_AHEAD;
-    if (!(this.heard >= this.time - period && this.heard <= until)) // it was elsewhere before
-      this.heard = this.time;
-    for (const { number, start, packets } of this.segments)
-      if (number === this.number || number === this.number + 1)
-        for (const { time, data } of packets ?? [])
+    const until = this.time + (this.frameDuration () || 40) + AUDIO_AHEAD;
+    this.heard ??= this.time;
+    for (const { number, start, length, packets } of this.segments)
+      if (packets && (number === this.number || number === this.number + 1)) {
+        for (const { time, data } of packets)
           if (start + time >= this.heard && start + time < until)
             this.stage.post ({ type: 'hear', packet: { captured: this.dueOf (start + time), data } });
-    this.heard = until;
+        this.heard = Math.max (this.heard, Math.min (until, start + length));
+      }
   }
 
   timeOf (pts) {
@@ -248,6 +250,7 @@ export class SegmentSource extends RecordingSource {
   }
   pause () {
     this.wantsPlay = this.live = false;
+    this.heard = undefined;
     return this.stop ();
   }
   toggle () { return this.wantsPlay && !this.atEnd ? this.pause () : this.play (); }
@@ -257,6 +260,7 @@ export class SegmentSource extends RecordingSource {
     this.live = found === last && !this.ended;
     this.number = found.number;
     this.atEnd = false;
+    this.heard = undefined;
     return this.enter (time);
   }
 }

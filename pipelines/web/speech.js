@@ -41,6 +41,7 @@ export class Speech {
     this.context.close ();
     this.context = null;
     this.holdPicture (0);
+    this.seen = this.arrival = 0;
   }
   open () {
     this.decoding = []; // when the packets were captured that the decoder has
@@ -57,7 +58,7 @@ export class Speech {
   follow (latency) {
     this.seen = this.seen === 0 || Math.abs (latency - this.seen) > 1000 ? latency : this.seen + (latency - this.seen) / 16;
   }
-  // captured: ms since the epoch; data: a packet of Opus; live: later packets may take longer, else they come before they are due
+  // captured: ms since the epoch; data: a packet of Opus; live: packets may arrive late; otherwise they arrive before they are due
   add ({ captured, data }, live) {
     if (!this.isOn || this.context.state !== 'running')
       return;

@@ -60,6 +60,16 @@ test_published_segments_are_recordings_that_follow_each_other () {
   expect_error "not a stream of coded frame sets" rangecast publish full --source 'videotestsrc num-buffers=9'
   [ -z "$(ls full)" ] || fail "left: $(ls full)"
   expect_error "for 10 s there was none: set key-interval" rangecast publish full --source "${coded/=40/=200} refresh-period=0"
+  python3 - "$pipelines" <<'END'
+import sys
+
+sys.path.insert(0, sys.argv[1])
+from rangecast.publish import samples_from
+
+packet = lambda time: bytes(6) + (time % 2**32).to_bytes(4, "big")
+day = 2**32 / 48000  # timestamps begin again
+assert [samples_from(second, packet(time)) for second, time in ((1, 48000), (1, 47999), (day + 1, 48960), (day, -960))] == [0, -1, 960, -960]
+END
   flock full sh -c '! rangecast publish full' 2>&1 | grep "another program publishes in 'full'"
 }
 

@@ -2,6 +2,7 @@
 // The page's side of docs/formats/web-protocol.md, without a network.
 import assert from 'node:assert/strict';
 import test from 'node:test';
+import { parseAudio, parsePlaylist } from '../../pipelines/web/segment-source.js';
 import { MAX_FRAME_SET, readFrameSet, readSpeech, ServerClock } from '../../pipelines/web/protocol.js';
 
 // Messages as the page of the protocol defines them, byte by byte.
@@ -40,4 +41,21 @@ test ("the server's clock is that of the shortest exchange", () => {
   clock.add (400, 410, 5405); // 10 ms: 5000 ahead
   clock.add (500, 560, 5600);
   assert.equal (clock.toLocal (6000), 1000);
+});
+
+test ('the audio of a segment may begin before it, and end in the middle of a packet', () => {
+  const packet = (time, ...data) => { // RFC 4571, RFC 3550
+    const bytes = new Uint8Array (14 + data.length), view = new DataView (bytes.buffer);
+    view.setUint16 (0, 12 + data.length);
+    view.setInt32 (6, time);
+    bytes.set (data, 14);
+    return [...bytes];
+  };
+  const bytes = Uint8Array.from ([...packet (-960, 1, 2), ...packet (0, 3), ...packet (960), ...packet (1920, 4, 5)]);
+  const times = (size) => parseAudio (bytes.slice (0, size)).map (({ time, data }) => [time, ...data]);
+  assert.deepEqual (times (bytes.length), [[-20, 1, 2], [0, 3], [20], [40, 4, 5]]);
+  assert.deepEqual (times (bytes.length - 1), [[-20, 1, 2], [0, 3], [20], [40, 4]]);
+  assert.deepEqual (times (20), [[-20, 1, 2]]);
+  const { segments } = parsePlaylist ('#EXTM3U\n#EXT-X-RANGECAST-AUDIO:1.rtp\n#EXTINF:1,\n1.rcnc\n#EXTINF:1,\n2.rcnc\n', 'http://host/live.m3u8');
+  assert.deepEqual (segments.map (({ audio }) => audio), ['http://host/1.rtp', undefined]);
 });

@@ -153,5 +153,7 @@ test ('sound is heard with the picture', async () => {
   camera.kill ('SIGINT');
   publisher.kill ('SIGINT');
   await opened.waitForFunction (() => window.events.includes ('ended'));
+  const sounds = fs.readdirSync (folder).filter ((name) => name.endsWith ('.rtp')).map ((name) => name.replace ('.rtp', '.rcnc'));
+  assert.deepEqual (sounds.filter ((name) => !listed ().includes (name)), []);
   await opened.close ();
 });
