@@ -23,9 +23,9 @@
 
 namespace rangecast::testing {
 
-/** GStreamer 1.22 keeps an event at a pad that was deactivated while it passed, of which it warns:
- * chance decides whether a pipeline that a test ends at its beginning does so. */
-inline GstCheckLogFilter *const kIgnored = gst_check_add_log_filter (
+/** Ignores a warning of GStreamer 1.22, which stores an event at a pad that was deactivated while
+ * it passed: chance decides whether a pipeline that a test ends at its beginning does so. */
+inline GstCheckLogFilter *const kStickyOrderFilter = gst_check_add_log_filter (
     "GStreamer", G_LOG_LEVEL_WARNING,
     g_regex_new ("got 'segment' before 'stream-start'", {}, {}, nullptr),
     [] (const gchar *, GLogLevelFlags, const gchar *, gpointer) -> gboolean { return TRUE; },

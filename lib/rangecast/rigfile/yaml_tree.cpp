@@ -8,7 +8,6 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
-#include <memory>
 #include <new>
 
 namespace rangecast {
@@ -45,7 +44,7 @@ standard_text (std::string_view text)
   if (text.starts_with (kMark))
     text.remove_prefix (kMark.size ());
   if (!text.starts_with (kYaml) && !text.starts_with ('{'))
-    throw BadYaml{"begins neither with %YAML nor with { (compressed files are not read)"};
+    throw BadYaml{"must begin with %YAML or { (compressed files are not supported)"};
   std::string standard;
   standard.reserve (text.size ());
   for (std::size_t i = 0; i < text.size (); i++) {

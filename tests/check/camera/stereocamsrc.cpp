@@ -330,9 +330,10 @@ GST_START_TEST (test_latency_is_exposure_and_a_period_also_before_the_cameras_an
   fail_unless (p.wait_for_pictures (0, 3));
   for (int i = 0; i < 2; i++) {
     const GstClockTime now = latency_now (p);
-    ck_assert_uint_ge (now, 5 * GST_MSECOND + kPeriod);
-    ck_assert_uint_ne (
-        now, 5 * GST_MSECOND + GST_SECOND / 30); /* more only where images came late */
+    /* Where images come late it is raised, by three eighths at least. */
+    const GstClockTime expected = 5 * GST_MSECOND + kPeriod;
+    fail_unless (now == expected || now > expected * 11 / 8, "%" G_GUINT64_FORMAT, now);
+    ck_assert_uint_ne (now, 5 * GST_MSECOND + GST_SECOND / 30); /* of before the cameras answered */
     gst_element_set_state (p.pipeline (), GST_STATE_READY);
     gst_element_set_state (p.pipeline (), GST_STATE_PAUSED); /* then it is as it was */
   }

@@ -2,7 +2,6 @@
 #include "test-support.hpp"
 
 #include <fstream>
-#include <memory>
 #include <rangecast/rigfile/yaml_tree.hpp>
 #include <unistd.h>
 
@@ -99,7 +98,7 @@ TEST (YamlTree, other_formats_are_refused)
 {
   for (const char *text :
       {"", "\n", "a: 1\n", "<?xml version=\"1.0\"?>\n", "\xff\xfe%\0Y\0", "[1]"})
-    expect_refused (text, "begins neither with %YAML nor with {");
+    expect_refused (text, "must begin with %YAML or {");
   expect_refused (kHead + "- 1\n", "is not a map of fields");
   expect_refused (kHead + "text\n", "is not a map of fields");
   expect_refused ("%YAML:1.0\n", "is not a map of fields");
