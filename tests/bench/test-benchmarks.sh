@@ -16,6 +16,7 @@ test_benchmarks_print_their_tables () {
   prints_rows 1 roi_bench --frames 1 --depth range --room standard
   prints_rows 2 roi_bench --changes --depth range --room lamp
   prints_rows 3 cameras_bench --size 160x120 --seconds 1 --rounds 1
+  prints_rows 1 c_library_bench --rounds 1 --recording "$pipelines/examples/head.rcnc"
   prints_rows 1 network_bench --views 2 --size 160x120 --fps 30 --frames 36 --loss 0.05 --reorder 0.1 --duplicate 0.1 --jitter 20 --fec 50
 }
 
