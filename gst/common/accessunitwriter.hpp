@@ -10,9 +10,6 @@
 
 #include "recycledmemories.hpp"
 
-/** Raw frame sets, or coded ones as access units. */
-#define FRAME_SET_CAPS GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_CAPS
-
 /** Makes access units that describe themselves: an access-unit unit, the rig in key ones and where
  *  it is new, then the slices, in one memory that is recycled. Streaming thread. */
 class AccessUnitWriter {

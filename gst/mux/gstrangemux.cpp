@@ -108,10 +108,10 @@ struct GstRangeMuxPrivate {
 
 DECLARE_ELEMENT (GstRangeMux, gst_range_mux, RANGE_MUX, GstAggregator)
 
-static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE (
-    "sink_%u", GST_PAD_SINK, GST_PAD_REQUEST, GST_STATIC_CAPS (FRAME_SET_CAPS));
-static GstStaticPadTemplate src_template =
-    GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC, GST_PAD_ALWAYS, GST_STATIC_CAPS (FRAME_SET_CAPS));
+static GstStaticPadTemplate sink_template = GST_STATIC_PAD_TEMPLATE ("sink_%u", GST_PAD_SINK,
+    GST_PAD_REQUEST, GST_STATIC_CAPS (GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_CAPS));
+static GstStaticPadTemplate src_template = GST_STATIC_PAD_TEMPLATE ("src", GST_PAD_SRC,
+    GST_PAD_ALWAYS, GST_STATIC_CAPS (GST_RANGE_CAPS "; " GST_NEIGHBOUR_CODE_CAPS));
 
 G_DEFINE_TYPE_WITH_CODE (GstRangeMux, gst_range_mux, GST_TYPE_AGGREGATOR,
     G_IMPLEMENT_INTERFACE (GST_TYPE_CHILD_PROXY, init_pad_proxy))

@@ -57,7 +57,7 @@ RangecastDecoder::reset ()
   used_generation_ = 0;
   has_rig_ = false;
   refusal_.clear ();
-  decoder_ = {};
+  decoder_.reset_references ();
   drop_frame_set ();
   has_stream_ = false;
   stream_ = {};

@@ -25,9 +25,13 @@ make_invalid (const RangeImage &image, const Roi &part)
 Status
 AccessUnitDecoder::set_rig (const Rig &rig)
 {
+  const bool same = encode_rig (rig) == encode_rig (decoder_.rig ());
   if (Status s = decoder_.set_rig (rig); !s.ok ())
     return s;
-  references_ = {}; /* frees memory, too: the views may differ */
+  if (same)
+    reset_references ();
+  else
+    references_ = {}; /* memory of what other views need */
   count_ = 0;
   return {};
 }
