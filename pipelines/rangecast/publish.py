@@ -41,18 +41,18 @@ def build_publish(args):
     else:
         launch.add(*(args.source or [*transport.LIVE_FIGURE, f"key-interval={1000 * args.segment}"]))
     if not args.print:
-        fail_unless(Path(args.folder).is_dir(), f"no folder '{args.folder}'")
+        fail_unless(Path(args.folder).is_dir() and os.access(args.folder, os.W_OK), f"no folder '{args.folder}' that can be written")
         args.lock = lock(args.folder)
         if args.record:
             fail_unless(not Path(args.folder).samefile(Path(args.record).parent), "--record: use another folder than that of the segments")
             keep_existing(args.record)
         args.pipes = os.pipe(), os.pipe()
-    launch.add(*["!", "queue"] * bool(args.audio_port), "!", "fdsink", "async=false", f"fd={args.pipes[0][1] if args.pipes else 1}")
+    frames, audio = [f"fdsink fd={write}" for _, write in args.pipes] if args.pipes else ["filesink location=live.rcnc", "filesink location=live.rtp"]
+    launch.add(*["!", "queue"] * bool(args.audio_port), "!", *frames.split(), "async=false")
     if args.audio_port:
-        launch.add("sync=true", "ts-offset=200000000")  # a segment's audio is there when it ends
+        launch.add("sync=true", "ts-offset=200000000")  # so that a segment's audio has arrived when the segment ends
         transport.receive_audio(args, launch)
-        launch.add(*"! sync.sink_1 sync.src_1 ! rtpopuspay timestamp-offset=0 ! rtpstreampay !".split())
-        launch.add(*["fdsink", f"fd={args.pipes[1][1]}"] if args.pipes else ["filesink", "location=live.rtp"], "async=false")
+        launch.add(*f"! sync.sink_1 sync.src_1 ! rtpopuspay timestamp-offset=0 ! rtpstreampay ! {audio} async=false".split())
     return launch
 
 
@@ -71,7 +71,7 @@ class Publisher:
 
     def __init__(self, folder, seconds, keep):
         self.folder, self.seconds, self.keep = Path(folder), seconds, keep
-        self.listed, self.old, self.units = [], [], []  # listed: (name, audio's name, seconds, when it began); old: those that go
+        self.listed, self.old, self.units = [], [], []  # listed: (name, audio's name, seconds, when it began); old: no longer listed, to be deleted
         self.longest = max(10, 3 * seconds)
         self.audio = collections.deque(maxlen=int(400 * self.longest))  # RTP packets that no segment has yet; follow_audio() appends
         if (self.folder / PLAYLIST).exists():
@@ -79,9 +79,10 @@ class Publisher:
         self.number = max(int(time.time()), *(int(name[:-5]) + 1 for name in self.old), 0)  # later than all of an earlier run
 
     def add(self, unit, seconds, is_key):
-        goes_back = self.units and seconds < self.last
-        if is_key and (not self.units or seconds - self.begin >= self.seconds or goes_back):
-            self.end_segment(self.last if goes_back else seconds)
+        breaks = self.units and not 0 <= seconds - self.last < 2  # the sender began again, or was away
+        if breaks or (is_key and self.units and seconds - self.begin >= self.seconds):
+            self.end_segment(self.last if breaks else seconds)
+        if is_key and not self.units:
             self.begin, self.began = seconds, datetime.datetime.now(datetime.timezone.utc)
         if self.units or is_key:
             self.units.append(unit)
@@ -90,8 +91,6 @@ class Publisher:
             raise Fail(f"segments begin with key frame sets, and for {seconds - self.begin:.0f} s there was none: set key-interval=1000 on neighbourcodeenc")
 
     def end_segment(self, seconds):
-        if not self.units:
-            return
         name, units, self.units = f"{self.number}.rcnc", self.units, []
         self.write(name, b"".join(units))
         packets = []
@@ -177,9 +176,9 @@ def run_publish(args, launch):
             for unit, seconds, is_key in read_units(stream):
                 publisher.add(unit, seconds, is_key)
                 recording.write(unit)
-        except SystemExit:
+        except (Fail, SystemExit):
             child.terminate()
-            while stream.read(65536):  # else it could not end
+            while stream.read(65536):  # else the child could not write, and not end
                 pass
             raise
         finally:

@@ -43,7 +43,7 @@ test_recording_becomes_points_film_and_numbers () {
 
 test_published_segments_are_recordings_that_follow_each_other () {
   local coded='avatartestsrc views=1 num-buffers=40 ! video/x-range,width=64,height=48,framerate=10/1 ! neighbourcodeenc temporal=true'
-  mkdir out full
+  mkdir out full away
   rangecast publish out --source "$coded key-interval=1000" --record all.rcnc
   [ "$(grep -c '^[0-9]*\.rcnc$' out/live.m3u8)" = 4 ] && [ "$(tail -n 1 out/live.m3u8)" = '#EXT-X-ENDLIST' ] || fail "$(cat out/live.m3u8)"
   # shellcheck disable=SC2046
@@ -64,12 +64,17 @@ test_published_segments_are_recordings_that_follow_each_other () {
 import sys
 
 sys.path.insert(0, sys.argv[1])
-from rangecast.publish import samples_from
+from rangecast.publish import Publisher, samples_from
 
 packet = lambda time: bytes(6) + (time % 2**32).to_bytes(4, "big")
 day = 2**32 / 48000  # timestamps begin again
+publisher = Publisher("away", 1, 3)  # 4 s without frame sets, of which the first is no key one
+for unit, second in ((1, 0), (2, 0.5), (0, 4.5), (3, 5), (4, 5.2), (5, 5.5)):
+    publisher.add(f"{unit}".encode(), second, unit in (1, 3))
+publisher.finish()
 assert [samples_from(second, packet(time)) for second, time in ((1, 48000), (1, 47999), (day + 1, 48960), (day, -960))] == [0, -1, 960, -960]
 END
+  grep -A1 '^#EXTINF:0.500' away/live.m3u8 | grep '^[0-9]' | (cd away && xargs cat) | grep -qx 12345 || fail "$(cat away/live.m3u8)"
   flock full sh -c '! rangecast publish full' 2>&1 | grep "another program publishes in 'full'"
 }
 
