@@ -12,10 +12,10 @@ skip () { echo "skipped: $*"; exit 77; }
 [ -n "$CHROMIUM" ] || skip "chromium is missing"
 work=$RANGECAST_BUILD/web-test
 mkdir -p "$work"
-packages=(puppeteer-core three vite ws)
+packages=(puppeteer-core three vite ws iwer aframe)
 for package in "${packages[@]}"; do
   [ -d "$work/node_modules/$package" ] && continue
   command -v npm >/dev/null || skip "npm is missing, which installs ${packages[*]}"
-  (cd "$work" && echo '{}' >package.json && timeout 240 npm install --silent --no-audit --no-fund "${packages[@]}" >/dev/null 2>&1) ||
+  (cd "$work" && echo '{"overrides": {"three-bmfont-text": "3.0.1"}}' >package.json && timeout 240 npm install --silent --no-audit --no-fund "${packages[@]}" >/dev/null 2>&1) ||
     skip "npm cannot install ${packages[*]}"
 done
