@@ -44,7 +44,7 @@ const open = async (address = `${origin.address}/live.m3u8`, prepare = undefined
     window.events = [];
     for (const type of ['pause', 'seeked', 'ended', 'error'])
       view.addEventListener (type, () => window.events.push (type));
-    view.player.addEventListener ('frame', ({ detail }) => { window.captured = detail.captureTime; });
+    view.player.addEventListener ('frame', ({ detail }) => { Object.assign (window, { captured: detail.captureTime, views: detail.layers.length }); });
   });
   return opened;
 };
@@ -101,14 +101,16 @@ test ('a server that is away, and parts that are missing or damaged, are survive
   fault = () => false;
   await framesShown (opened, await frameSets (opened) + 15);
   await until (async () => await message (opened) === '');
+  const otherRig = fs.readFileSync (path.join (work, 'scene.rcnc'));
+  const damaged = [(old) => old.subarray (0, 3000), (old) => old, () => otherRig, ([first, ...rest]) => Buffer.from ([first + 16, ...rest])]; // also a wrong number, and another version
   const faults = [(response) => response.writeHead (404, CORS).end (), (response) => response.writeHead (200, CORS).end ('<html>not here</html>'),
-    (response) => response.writeHead (200, CORS).end (fs.readFileSync (path.join (folder, listed ()[0])).subarray (0, 3000))];
+    ...damaged.map ((change) => (response) => response.writeHead (200, CORS).end (change (fs.readFileSync (path.join (folder, listed ()[0])))))];
   const seen = [];
-  fault = (name, response) => name.endsWith ('.rcnc') && seen.length < 3 && !faults[seen.push (name) - 1] (response) || seen.at (-1) === name;
-  await until (() => seen.length === 3);
+  fault = (name, response) => name.endsWith ('.rcnc') && seen.length < faults.length && !faults[seen.push (name) - 1] (response) || seen.at (-1) === name;
+  await until (() => seen.length === faults.length);
   fault = () => false;
   await framesShown (opened, await frameSets (opened) + 30);
-  assert.deepEqual (await opened.evaluate (() => window.events.filter ((type) => type !== 'seeked')), []);
+  assert.deepEqual (await opened.evaluate (() => [window.views, ...window.events.filter ((type) => type !== 'seeked')]), [2]);
   await opened.close ();
 });
 
