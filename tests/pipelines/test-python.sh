@@ -35,6 +35,21 @@ END
   G_DEBUG=fatal-criticals $python program.py "$@"
 }
 
+# The second C block and the Python one; a picture in place of a window.
+test_programs_of_the_guide_run () {
+  need_python
+  cp "$examples/head.rcnc" person.rcnc
+  block () { awk -v RS='```' -v first="^$1\n$2" '$0 ~ first { sub (/^[a-z]*/, ""); print }' "$source_dir/docs/guide/embed.md"; }
+  block python 'import gi' >program.py
+  block c '#include <gst' | sed 's/autovideosink/pngenc snapshot=true ! filesink location=person.png/' >program.c
+  $python program.py >views.txt || fail "$(cat views.txt)"
+  [ "$(awk '$2 > 5000 && $3 > 20' views.txt | wc -l)" = 4 ] || fail "$(cat views.txt)"
+  # shellcheck disable=SC2046
+  cc -Wall -Werror program.c -o program $(pkg-config --cflags --libs gstreamer-1.0)
+  timeout 60 ./program
+  expect_file person.png 20000
+}
+
 test_arrays_come_back_as_they_were () {
   cat >body <<'END'
 views = GstRange.map_views(both(), caps)
