@@ -103,7 +103,7 @@ def add_source(launch, args):
                     "side-by-side=SOURCE, top-bottom=SOURCE, openni2, v4l2=DEPTH,COLOUR, a folder of recorded pairs")  # fmt: skip
         for side in ("left", "right"):
             launch.add(*recorded_side(args.input, args.view, side, args.fps))
-    return launch.add("stereodepth", "name=depth", f"rig={args.rig}", f"view-id={args.view}", *matching, *args.depth)
+    return launch.add("stereodepth", "name=depth", f"rig={args.rig}", f"view-id={args.view}", *args.threads, *matching, *args.depth)
 
 
 def build_camera(args):
@@ -118,10 +118,9 @@ def build_camera(args):
     fail_unless(not adaptive or (args.feedback_port and len(args.to) == 1 and not transport.is_multicast(args.to)),
                 "--encoder: adaptive-bitrate needs --feedback-port, and one receiver in --to")  # fmt: skip
     launch = Launch()
+    args.threads = [f"n-threads={args.threads}"] if args.threads else []
     add_source(launch, args)
-    if args.threads:
-        launch.environment["OPENCV_FOR_THREADS_NUM"] = str(args.threads)  # OpenCV's own pool works for our loops, too
-    launch.add("!", "roiextract", f"background-frames={args.learn}", "!", *QUEUE, "leaky=downstream", "!", "neighbourcodeenc", *args.encoder)
+    launch.add("!", "roiextract", f"background-frames={args.learn}", *args.threads, "!", *QUEUE, "leaky=downstream", "!", "neighbourcodeenc", *args.encoder)
     transport.send(args, launch, adaptive)
     fail_unless(bool(args.microphone) == bool(args.audio_to), "--microphone and --audio-to need each other")
     if args.microphone:
