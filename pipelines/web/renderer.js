@@ -74,7 +74,7 @@ class SoftwareRenderer {
     });
   }
   draw () {
-    const { width, height } = this.canvas, address = this.core.call ('rc_draw', width, height, this.transparent ? 1 : 0);
+    const { width, height } = this.canvas, address = this.core.call ('rc_draw', width, height, this.transparent ? 1 : 0, this.strips);
     this.context.putImageData (new ImageData (new Uint8ClampedArray (this.core.memory.buffer, address, 4 * width * height), width, height), 0, 0);
   }
   finished () { return Promise.resolve (); }
@@ -159,7 +159,7 @@ export class WebGlRenderer {
     return { colours: this.ownTarget.colours, depths: this.sumTarget.depths, part: picture[4] > 0 ? [...picture.subarray (8, 12)] : [0, 0, 0, 0] };
   }
   drawTo (framebuffer, width, height) {
-    const { gl } = this, address = this.core.call ('rc_camera_picture', width, height, this.largest);
+    const { gl } = this, address = this.core.call ('rc_camera_picture', width, height, this.largest, this.strips);
     const picture = this.core.floats (address, HEAD + LAYER * this.layers.length);
     gl.bindFramebuffer (gl.FRAMEBUFFER, framebuffer);
     gl.viewport (0, 0, width, height);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // <rangecast-view>: a live person or a recording in 3D, with the camera in the viewer's hands. Attributes (docs/guide/embed.md):
 //   src (ws: or wss: of a stream, or a recording), token, autoplay=false, controls, azimuth, elevation (degrees), distance (m), fit=false,
-//   renderer (webgl or software), transparent, show-stats
+//   mode (blend or strips), renderer (webgl or software), transparent, show-stats
 // The event framesetchange follows each frame set that was drawn; `player` is the Player.
 import { Core } from './core.js';
 import { Player } from './player.js';
@@ -62,7 +62,7 @@ const save = (blob, name) => {
 const timeText = (seconds) => `${Math.floor (seconds / 60)}:${(seconds % 60).toFixed (1).padStart (4, '0')}`;
 
 export class RangecastView extends HTMLElement {
-  static observedAttributes = ['src', 'token', 'azimuth', 'elevation', 'distance', 'show-stats'];
+  static observedAttributes = ['src', 'token', 'azimuth', 'elevation', 'distance', 'mode', 'show-stats'];
 
   constructor () {
     super ();
@@ -120,8 +120,9 @@ export class RangecastView extends HTMLElement {
       this.element ('stats').hidden = value === null;
     else if (name === 'src' || name === 'token')
       this.load ();
-    else
+    else if (name !== 'mode')
       this.setOrbit ();
+    this.draw ();
   }
 
   // ---- as of a media element ----
@@ -305,6 +306,7 @@ export class RangecastView extends HTMLElement {
         this.camera.setScene (frame.state);
         this.renderer.upload (frame.layers);
       }
+      this.renderer.strips = this.getAttribute ('mode') === 'strips';
       this.renderer.draw ();
     } catch (error) {
       this.report (error.message);

@@ -97,6 +97,28 @@ test ('two elements on a page play, seek and leave the document by themselves', 
   await page.close ();
 });
 
+test ('mode=strips shows the nearest surface, in WebGL as in software', async () => {
+  write ('modes.html', `<!doctype html><body><script type="module" src="./view.js"></script><style>rangecast-view { width: 400px; height: 300px; }</style>
+    ${['webgl', 'software'].map ((renderer) => `<rangecast-view src="examples/scene.rcnc" azimuth="45" mode="strips" renderer="${renderer}"></rangecast-view>`)}`);
+  const { page, errors } = await open ('modes.html');
+  await page.waitForFunction (() => [...document.querySelectorAll ('rangecast-view')].every ((view) => view.stats?.points > 0 && view.state !== 'loading'));
+  const { strips, blended } = await page.evaluate (async () => {
+    const views = [...document.querySelectorAll ('rangecast-view')];
+    const pixels = () => Promise.all (views.map (async (view) => {
+      const image = await createImageBitmap (await view.picture ()), context = new OffscreenCanvas (image.width, image.height).getContext ('2d');
+      context.drawImage (image, 0, 0);
+      return context.getImageData (0, 0, image.width, image.height).data;
+    }));
+    const difference = ([a, b]) => a.reduce ((sum, level, i) => sum + Math.abs (level - b[i]), 0) / a.length;
+    const strips = await pixels ();
+    views.forEach ((view) => view.setAttribute ('mode', 'blend'));
+    return { strips: difference (strips), blended: (await pixels ()).map ((now, i) => difference ([now, strips[i]])) };
+  });
+  assert.ok (3 * strips < Math.min (...blended), `${strips} ${blended}`); // 0.01 and 0.15 levels
+  assert.deepEqual (errors, []);
+  await page.close ();
+});
+
 // In the page of examples/three.html: SSIM of three.js's picture and of the software renderer's, in blocks of 8 pixels that show the person.
 const similarity = (page) => page.evaluate (async () => {
   const { THREE, scene, camera, person, renderer } = window, { Core } = await import ('/core.js');

@@ -15,10 +15,15 @@
 using rangecast::Mat4;
 using rangecast::Roi;
 using rangecast::SceneFrame;
+using rangecast::StripMode;
 using rangecast::Vec3;
 using rangecast::View;
 
 namespace {
+
+constexpr unsigned kColour = rangecast::kBackgroundColour;
+constexpr float kBackground[] = {
+    (kColour >> 16) / 255.f, (kColour >> 8 & 255) / 255.f, (kColour & 255) / 255.f, 1};
 
 struct Layer {
   View view;
@@ -78,10 +83,8 @@ struct Camera {
 Camera &
 camera ()
 {
-  static Camera *made = nullptr;
-  if (!made)
-    made = new Camera;
-  return *made;
+  static Camera &made = *new Camera;
+  return made;
 }
 
 /* ---- the picture's record ---- */
@@ -99,8 +102,8 @@ write (std::vector<float> &to, std::initializer_list<double> values)
  *  what leads to it from a pixel of the picture (x, y), lens (4), viewer (3), unit
  *  @param max_side  of a texture, pixels */
 void
-write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from_world, int width,
-    int height, int max_side)
+write_picture (std::vector<float> &to, const Scene &scene, StripMode mode,
+    const Mat4 &clip_from_world, int width, int height, int max_side)
 {
   static rangecast::BlendAtlas atlas;
   static std::vector<double> alignments;
@@ -108,16 +111,15 @@ write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from
       rangecast::covered_part (clip_from_world, scene.hull, width, height, {0, 0, width, height});
   const auto shift =
       rangecast::depth_shift (clip_from_world, clip_from_world, rangecast::kBlendRange_m);
-  constexpr unsigned colour = rangecast::kBackgroundColour;
   alignments.clear ();
   for (const Layer &layer : scene.layers)
     alignments.push_back (rangecast::view_alignment (clip_from_world, layer.view));
   const bool any = !covered.empty () && !alignments.empty ();
   if (any)
-    rangecast::make_blend_atlas (alignments, rangecast::kMaxBlendCells, covered,
+    rangecast::make_blend_atlas (alignments,
+        mode == StripMode::kBlend ? rangecast::kMaxBlendCells : 1, covered,
         std::max ({max_side, width, height}), atlas);
-  to.clear ();
-  write (to, {(colour >> 16) / 255.0, (colour >> 8 & 255) / 255.0, (colour & 255) / 255.0, 1});
+  to.assign (std::begin (kBackground), std::end (kBackground));
   write (to, {any ? double (atlas.cells) : 0, double (atlas.width), double (atlas.height), 0});
   write (to,
       {double (covered.x), double (covered.y), double (covered.width), double (covered.height)});
@@ -125,9 +127,9 @@ write_picture (std::vector<float> &to, const Scene &scene, const Mat4 &clip_from
                  double (rangecast::mirrors (clip_from_world)), double (scene.layers.size ())});
   for (std::size_t i = 0; i < scene.layers.size (); i++) {
     const auto &[view, roi, vertices] = scene.layers[i];
-    const rangecast::LayerPlace place = rangecast::place_layer (
-        rangecast::clip_from_pixel (clip_from_world, view, roi), clip_from_world,
-        rangecast::layer_gap (rangecast::StripMode::kBlend, clip_from_world, view));
+    const rangecast::LayerPlace place =
+        rangecast::place_layer (rangecast::clip_from_pixel (clip_from_world, view, roi),
+            clip_from_world, rangecast::layer_gap (mode, clip_from_world, view));
     const rangecast::LayerAngles angles = rangecast::layer_angles (clip_from_world, view, roi);
     const std::size_t cell = any ? atlas.cell_of[i] : 0;
     to.insert (to.end (), place.clip_from_pixel.begin (), place.clip_from_pixel.end ());
@@ -180,14 +182,16 @@ RC_EXPORT (rc_set_clip) void rc_set_clip (std::uint32_t size)
 
 /** The camera's numbers for a picture of the scene, in OpenGL's coordinates (first row at the
  *  bottom).
- *  @param max_side  of a texture, pixels
+ *  @param max_side  of a texture, pixels; @param strips  1: views are not blended
  *  @return as write_picture() */
 RC_EXPORT (rc_camera_picture)
 const float *
-rc_camera_picture (std::int32_t width, std::int32_t height, std::int32_t max_side)
+rc_camera_picture (
+    std::int32_t width, std::int32_t height, std::int32_t max_side, std::int32_t strips)
 {
   Camera &c = camera ();
-  write_picture (c.picture, c.scene, look (width, height, false), width, height, max_side);
+  write_picture (c.picture, c.scene, strips ? StripMode::kStrips : StripMode::kBlend,
+      look (width, height, false), width, height, max_side);
   return c.picture.data ();
 }
 
@@ -203,27 +207,23 @@ RC_EXPORT (rc_draw_layer) void *rc_draw_layer (std::uint32_t index, std::uint32_
 }
 
 /** Draws the scene as striprender does in software.
- *  @param transparent  1: without background
+ *  @param transparent  1: without background; @param strips  1: views are not blended
  *  @return R, G, B, A of the pixels, rows from the top */
 RC_EXPORT (rc_draw)
 const rangecast::Rgbx *
-rc_draw (std::int32_t width, std::int32_t height, std::int32_t transparent)
+rc_draw (std::int32_t width, std::int32_t height, std::int32_t transparent, std::int32_t strips)
 {
   Camera &c = camera ();
-  rangecast::SurfacePicture picture;
-  picture.clip_from_world = look (width, height, true);
-  picture.width = width;
-  picture.height = height;
-  picture.part = {0, 0, width, height};
+  rangecast::SurfacePicture picture = {.clip_from_world = look (width, height, true),
+      .mode = strips ? StripMode::kStrips : StripMode::kBlend,
+      .back_faces = true,
+      .width = width,
+      .height = height,
+      .part = {0, 0, width, height}};
   picture.covered =
       rangecast::covered_part (picture.clip_from_world, c.scene.hull, width, height, picture.part);
   for (int i = 0; i < 4; i++)
-    picture.background[i] =
-        transparent
-            ? 0
-            : float (
-                  (0xff000000 | rangecast::kBackgroundColour) >> (i == 3 ? 24 : 16 - 8 * i) & 255) /
-                  255;
+    picture.background[i] = transparent ? 0 : kBackground[i];
   c.drawn.clear ();
   for (const Layer &layer : c.scene.layers)
     c.drawn.push_back ({{layer.view.id, layer.roi, {}, {}}, &layer.view, layer.vertices});
