@@ -9,11 +9,11 @@ export const withoutPolicy = (page) => page.setBypassCSP (true); // for the list
 const median = (values) => values.toSorted ((a, b) => a - b)[values.length >> 1];
 
 // Turns the sound on, and asserts that it is heard within 40 ms of when the picture of the same moment is seen.
-export const assertInSync = async (page) => {
+export const assertInSync = async (page, t) => {
   await page.click ('>>> #sound');
   await page.evaluate (async () => {
     const { player, meter } = window.rangecastView, { seen } = meter, { context } = player.speech;
-    window.heard = []; // for each clap that is heard: capture times of pictures that were seen just before, ms
+    window.heard = []; // for each clap: when it was heard (ms), and how late the pictures of the four seconds before were seen (ms, sorted)
     const pictures = [];
     let shown;
     player.addEventListener ('frame', ({ detail }) => { shown = detail; });
@@ -35,17 +35,20 @@ export const assertInSync = async (page) => {
     onsets.port.onmessage = ({ data }) => {
       const { contextTime, performanceTime } = context.getOutputTimestamp ();
       const time = performance.timeOrigin + performanceTime + 1000 * (data - contextTime);
-      window.heard.push (pictures.filter ((one) => Math.abs (one.time - time) < 500).map (({ age }) => time - age));
+      window.heard.push ({ ages: pictures.filter ((one) => one.time > time - 4000 && one.time < time + 100).map (({ age }) => age).sort ((a, b) => a - b), time });
     };
     player.speech.destination.connect (onsets);
   });
-  let differences = [];
-  // A busy machine shows pictures late and interrupts the sound, by chance: the median of more claps tells, of up to thirty.
-  while ((differences.length < 5 || Math.abs (median (differences)) >= 40) && differences.length < 30) {
-    await page.waitForFunction ((before) => window.heard.length > before + 1, {}, differences.length);
-    const heard = await page.evaluate (() => window.heard);
-    differences = heard.slice (1).map ((times) => (median (times) + 1000) % 2000 - 1000);
+  // A busy machine shows pictures unevenly, which no sound can follow: claps count where four fifths are equally late. The first is too early.
+  let heard = [], differences = [];
+  while (differences.length < 5 && heard.length < 15) {
+    await page.waitForFunction ((before) => window.heard.length > before + 1, {}, heard.length);
+    heard = (await page.evaluate (() => window.heard)).slice (1);
+    const even = heard.filter (({ ages }) => ages[Math.floor (0.9 * ages.length)] - ages[Math.floor (0.1 * ages.length)] < 40);
+    differences = even.map (({ ages, time }) => (time - median (ages) + 1000) % 2000 - 1000);
   }
   console.log (`sound after picture, ms: ${differences.map ((value) => value.toFixed (0)).join (' ')}`);
+  if (differences.length < 5)
+    return t.skip (`the machine is too busy: ${differences.length} of ${heard.length} claps count`);
   assert.ok (Math.abs (median (differences)) < 40);
 };

@@ -142,7 +142,7 @@ test ('a stream that begins again goes on, and one that ends has ended', async (
   await opened.close ();
 });
 
-test ('sound is heard with the picture', async () => {
+test ('sound is heard with the picture', async (t) => {
   const camera = spawn ('rangecast', ['camera', '--view', '0', '--rig', path.join (work, 'rig.yaml'), '--input', 'range', '--size', '160x120', '--learn', '5',
     '--to', '127.0.0.1:20010', '--microphone', 'audiotestsrc is-live=true wave=silence', '--audio-to', '127.0.0.1:20020'],
   { stdio: 'inherit', env: { ...process.env, ...CLAPS } });
@@ -151,7 +151,7 @@ test ('sound is heard with the picture', async () => {
   await until (() => listed ().some ((name) => fs.existsSync (path.join (folder, name.replace ('.rcnc', '.rtp')))));
   const opened = await open (undefined, withoutPolicy);
   await framesShown (opened, 10);
-  await assertInSync (opened);
+  await assertInSync (opened, t);
   camera.kill ('SIGINT');
   publisher.kill ('SIGINT');
   await opened.waitForFunction (() => window.events.includes ('ended'));

@@ -48,10 +48,10 @@ test ('a client that does not acknowledge frame sets is sent no more speech', as
   await server.stop ();
 });
 
-test ('speech is heard within 40 ms of when the picture of the same moment is seen, also where packets are lost', async () => {
+test ('speech is heard within 40 ms of when the picture of the same moment is seen, also where packets are lost', async (t) => {
   const server = await serveSpeech ('identity', 'drop-probability=0.05', '!'), page = await openPage (browser, `${server.address}/`, undefined, withoutPolicy);
   await framesShown (page, 20);
-  await assertInSync (page);
+  await assertInSync (page, t);
   await page.click ('>>> #sound');
   assert.equal (await page.evaluate (() => window.rangecastView.player.speech.context), null);
   await page.click ('>>> #sound'); // and on again
