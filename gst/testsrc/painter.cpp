@@ -27,8 +27,8 @@ AvatarPainter::start (const AvatarSettings &settings)
 void
 AvatarPainter::clear_loops ()
 {
-  for (Loop &loop : loops_)
-    loop = {};
+  for (auto &loop : loops_)
+    loop.clear ();
 }
 
 Status
@@ -78,62 +78,52 @@ seconds (GstClockTime time)
 
 } // namespace
 
+rangecast::ImageView<Rgbx>
+AvatarPainter::looped (SceneCamera camera, guint64 i)
+{
+  const int width = settings_.scene.width, height = settings_.scene.height;
+  return {loops_[int (camera)].data () + i * std::size_t (width) * std::size_t (height), width,
+      height, static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
+}
+
 Status
-AvatarPainter::make_loop (SceneCamera camera)
+AvatarPainter::draw_loop (
+    SceneCamera camera, double period_s, const std::function<bool ()> &goes_on)
 {
   constexpr std::size_t kMaxPixels = std::size_t{1} << 28; /* 1 GiB */
   const int width = settings_.scene.width, height = settings_.scene.height;
-  const std::size_t pixels = std::size_t (width) * std::size_t (height);
-  if (settings_.loop_frames > kMaxPixels / pixels)
-    return {StatusCode::kBadValue, "loop-frames " + std::to_string (settings_.loop_frames) +
-                                       " is more than " + std::to_string (kMaxPixels / pixels) +
-                                       " pictures of " + std::to_string (width) + "x" +
-                                       std::to_string (height) + ", which take 1 GiB per camera"};
+  const std::size_t pixels = std::size_t (width) * std::size_t (height), n = settings_.loop_frames;
+  auto &loop = loops_[int (camera)];
+  if (!loop.empty ())
+    return {};
+  if (n > kMaxPixels / pixels)
+    return {StatusCode::kBadValue, "loop-frames " + std::to_string (n) + " is more than " +
+                                       std::to_string (kMaxPixels / pixels) + " pictures of " +
+                                       std::to_string (width) + "x" + std::to_string (height) +
+                                       ", which take 1 GiB per camera"};
   try {
-    Loop &loop = loops_[int (camera)];
-    loop.drawn.assign (settings_.loop_frames, false);
-    loop.pictures.resize (settings_.loop_frames * pixels);
+    loop.resize (n * pixels);
   } catch (const std::bad_alloc &) {
     return {StatusCode::kNoSpace, "loop-frames: out of memory for that many frames"};
   }
-  return {};
-}
-
-/* Forwards, and back again without showing either end twice. */
-Status
-AvatarPainter::find_looped (SceneCamera camera, const FrameTime &time, double period_s,
-    rangecast::ImageView<const Rgbx> &found)
-{
-  Loop &loop = loops_[int (camera)];
-  if (loop.pictures.empty ())
-    if (Status s = make_loop (camera); !s.ok ())
-      return s;
-  const int width = settings_.scene.width, height = settings_.scene.height;
-  const guint64 n = settings_.loop_frames, at = n < 2 ? 0 : time.tick % (2 * n - 2),
-                i = at < n ? at : 2 * n - 2 - at;
-  const rangecast::ImageView<Rgbx> picture{
-      loop.pictures.data () + i * std::size_t (width) * std::size_t (height), width, height,
-      static_cast<std::ptrdiff_t> (sizeof (Rgbx)) * width};
-  if (!loop.drawn[i])
-    if (Status s = scene_->render (
-            MAX (settings_.view_id, 0), camera, double (i) * period_s, false, picture, {}, {});
+  for (std::size_t i = 0; i < n && goes_on (); i++)
+    if (Status s = scene_->render (MAX (settings_.view_id, 0), camera, double (i) * period_s, false,
+            looped (camera, i), {}, {});
         !s.ok ())
       return s;
-  loop.drawn[i] = true;
-  found = picture;
   return {};
 }
 
+/* Looped pictures come forwards, and back again without showing either end twice. */
 Status
 AvatarPainter::render (
-    SceneCamera camera, const FrameTime &time, double period_s, rangecast::ImageView<Rgbx> picture)
+    SceneCamera camera, const FrameTime &time, rangecast::ImageView<Rgbx> picture)
 {
   if (settings_.loop_frames == 0 || empty_at (time))
     return scene_->render (MAX (settings_.view_id, 0), camera, seconds (time.capture_time),
         empty_at (time), picture, {}, {});
-  rangecast::ImageView<const Rgbx> from;
-  if (Status s = find_looped (camera, time, period_s, from); !s.ok ())
-    return s;
+  const guint64 n = settings_.loop_frames, at = n < 2 ? 0 : time.tick % (2 * n - 2);
+  const auto from = looped (camera, at < n ? at : 2 * n - 2 - at);
   for (int y = 0; y < picture.height; y++)
     std::copy_n (from.row (y), picture.width, picture.row (y));
   return {};
@@ -149,8 +139,7 @@ AvatarPainter::draw_raw (
   const rangecast::ImageView<Rgbx> picture{
       static_cast<Rgbx *> (GST_VIDEO_FRAME_PLANE_DATA (&frame, 0)), settings_.scene.width,
       settings_.scene.height, GST_VIDEO_FRAME_PLANE_STRIDE (&frame, 0)};
-  const double period_s = double (GST_VIDEO_INFO_FPS_D (&video)) / GST_VIDEO_INFO_FPS_N (&video);
-  const Status status = render (camera, time, period_s, picture);
+  const Status status = render (camera, time, picture);
   gst_video_frame_unmap (&frame);
   return status;
 }

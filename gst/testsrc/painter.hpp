@@ -3,6 +3,7 @@
 
 #include <gst/video/video.h>
 
+#include <functional>
 #include <memory>
 #include <rangecast/scene/scene.hpp>
 #include <vector>
@@ -17,8 +18,11 @@ public:
   void start (const AvatarSettings &settings);
   /** Creates the scene, if its size has changed, and writes its rig file. */
   rangecast::Status set_size (int width, int height);
-  /** Draws looped pictures again, for a new frame rate. */
+  /** For a new frame rate. */
   void clear_loops ();
+  /** Draws all pictures that a camera repeats, while goes_on (); once only. */
+  rangecast::Status draw_loop (
+      rangecast::SceneCamera camera, double period_s, const std::function<bool ()> &goes_on);
 
   /** Fixed except for the format of raw video, which its pads' templates have. Transfer full. */
   [[nodiscard]] GstCaps *make_range_caps (int fps_n, int fps_d) const;
@@ -30,17 +34,9 @@ public:
   rangecast::Status draw_range (const FrameTime &time, GstBuffer *buffer);
 
 private:
-  /* The pictures that one camera repeats. */
-  struct Loop {
-    std::vector<rangecast::Rgbx> pictures; // one below the other; none before the first is shown
-    std::vector<bool> drawn;               // each when it is first shown
-  };
-
-  rangecast::Status render (rangecast::SceneCamera camera, const FrameTime &time, double period_s,
+  rangecast::Status render (rangecast::SceneCamera camera, const FrameTime &time,
       rangecast::ImageView<rangecast::Rgbx> picture);
-  rangecast::Status make_loop (rangecast::SceneCamera camera);
-  rangecast::Status find_looped (rangecast::SceneCamera camera, const FrameTime &time,
-      double period_s, rangecast::ImageView<const rangecast::Rgbx> &found);
+  rangecast::ImageView<rangecast::Rgbx> looped (rangecast::SceneCamera camera, guint64 i);
   [[nodiscard]] bool empty_at (const FrameTime &time) const
   {
     return time.index < settings_.empty_frames;
@@ -48,5 +44,5 @@ private:
 
   AvatarSettings settings_;
   std::unique_ptr<rangecast::Scene> scene_;
-  Loop loops_[3]; ///< by camera
+  std::vector<rangecast::Rgbx> loops_[3]; ///< by camera: pictures one below the other
 };
