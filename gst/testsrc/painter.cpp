@@ -28,7 +28,7 @@ void
 AvatarPainter::clear_loops ()
 {
   for (auto &loop : loops_)
-    loop.clear ();
+    loop = std::vector<Rgbx> ();
 }
 
 Status
@@ -106,11 +106,14 @@ AvatarPainter::draw_loop (
   } catch (const std::bad_alloc &) {
     return {StatusCode::kNoSpace, "loop-frames: out of memory for that many frames"};
   }
-  for (std::size_t i = 0; i < n && goes_on (); i++)
+  for (std::size_t i = 0; i < n && !loop.empty (); i++) {
     if (Status s = scene_->render (MAX (settings_.view_id, 0), camera, double (i) * period_s, false,
             looped (camera, i), {}, {});
         !s.ok ())
       return s;
+    if (!goes_on ())
+      loop.clear ();
+  }
   return {};
 }
 
@@ -119,7 +122,7 @@ Status
 AvatarPainter::render (
     SceneCamera camera, const FrameTime &time, rangecast::ImageView<Rgbx> picture)
 {
-  if (settings_.loop_frames == 0 || empty_at (time))
+  if (loops_[int (camera)].empty () || empty_at (time))
     return scene_->render (MAX (settings_.view_id, 0), camera, seconds (time.capture_time),
         empty_at (time), picture, {}, {});
   const guint64 n = settings_.loop_frames, at = n < 2 ? 0 : time.tick % (2 * n - 2);

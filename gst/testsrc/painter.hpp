@@ -18,9 +18,9 @@ public:
   void start (const AvatarSettings &settings);
   /** Creates the scene, if its size has changed, and writes its rig file. */
   rangecast::Status set_size (int width, int height);
-  /** For a new frame rate. */
+  /** Frees the looped pictures, which depend on the frame rate. */
   void clear_loops ();
-  /** Draws all pictures that a camera repeats, while goes_on (); once only. */
+  /** Draws a camera's looped pictures unless there are any; without all of them, there are none. */
   rangecast::Status draw_loop (
       rangecast::SceneCamera camera, double period_s, const std::function<bool ()> &goes_on);
 

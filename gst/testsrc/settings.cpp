@@ -40,7 +40,7 @@ avatar_properties ()
           "Number of frames at the start that show the room without the figure", 0u, G_MAXUINT,
           kMutableReady),
       P::number<&S::loop_frames> ("loop-frames", "Loop frames",
-          "Render this many frames once and replay them forwards and backwards to save CPU time; "
+          "Render this many frames before the first one and replay them forwards and backwards; "
           "left, right and third pads only, at most 1 GiB per camera (0 = render every frame)",
           0u, G_MAXUINT, kMutableReady),
       P::number<&S::num_buffers> ("num-buffers", "Number of buffers",

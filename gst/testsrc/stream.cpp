@@ -198,17 +198,17 @@ AvatarStream::negotiate (const AvatarPads &pads)
   for (const auto &pad : pads)
     if (flow == GST_FLOW_OK && gst_pad_is_linked (pad->pad ()))
       flow = negotiate_pad (*pad, format);
-  for (const auto &pad : pads) /* now, so that it costs nothing later */
+  if (flow == GST_FLOW_OK && new_rate && is_live_)
+    gst_element_post_message (element_, gst_message_new_latency (GST_OBJECT (element_)));
+  for (const auto &pad : pads) /* before the first frame, so that no frame waits for it */
     if (flow == GST_FLOW_OK && gst_pad_is_linked (pad->pad ()) &&
         pad->kind () != AvatarPadKind::kRange)
       flow = gst_range_flow_return (
           element_, painter_.draw_loop (static_cast<rangecast::SceneCamera> (pad->kind ()),
                         double (format.fps_d) / format.fps_n, [this] {
                           std::lock_guard guard (lock_);
-                          return running_;
+                          return running_ && !eos_wanted_;
                         }));
-  if (flow == GST_FLOW_OK && new_rate && is_live_)
-    gst_element_post_message (element_, gst_message_new_latency (GST_OBJECT (element_)));
   return flow;
 }
 

@@ -130,7 +130,7 @@ def run(args, host):
     for report_file in log.glob("*.json") if not args.print else ():  # of a run with more views
         report_file.unlink()
     rig, size, viewer_port = str(out / "rig.yaml"), "{}x{}".format(*args.size), args.base_port + args.views
-    threads = args.threads or max(1, (os.cpu_count() or 1) // args.views)
+    threads = args.threads or min(64, max(1, (os.cpu_count() or 1) // args.views))
 
     with Processes(args.print) as processes:
 

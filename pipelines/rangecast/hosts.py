@@ -79,7 +79,7 @@ def machine_vision(args):
     return words
 
 
-def add_source(launch, args):
+def add_source(launch, args, threads):
     """Adds the elements up to range images."""
     kind, _, value = args.input.partition("=")
     views = args.views or options.count_views(args.rig)
@@ -103,7 +103,7 @@ def add_source(launch, args):
                     "side-by-side=SOURCE, top-bottom=SOURCE, openni2, v4l2=DEPTH,COLOUR, a folder of recorded pairs")  # fmt: skip
         for side in ("left", "right"):
             launch.add(*recorded_side(args.input, args.view, side, args.fps))
-    return launch.add("stereodepth", "name=depth", f"rig={args.rig}", f"view-id={args.view}", *args.threads, *matching, *args.depth)
+    return launch.add("stereodepth", "name=depth", f"rig={args.rig}", f"view-id={args.view}", *threads, *matching, *args.depth)
 
 
 def build_camera(args):
@@ -118,9 +118,9 @@ def build_camera(args):
     fail_unless(not adaptive or (args.feedback_port and len(args.to) == 1 and not transport.is_multicast(args.to)),
                 "--encoder: adaptive-bitrate needs --feedback-port, and one receiver in --to")  # fmt: skip
     launch = Launch()
-    args.threads = [f"n-threads={args.threads}"] if args.threads else []
-    add_source(launch, args)
-    launch.add("!", "roiextract", f"background-frames={args.learn}", *args.threads, "!", *QUEUE, "leaky=downstream", "!", "neighbourcodeenc", *args.encoder)
+    threads = [f"n-threads={args.threads}"] if args.threads else []
+    add_source(launch, args, threads)
+    launch.add("!", "roiextract", f"background-frames={args.learn}", "!", *QUEUE, "leaky=downstream", "!", "neighbourcodeenc", *threads, *args.encoder)
     transport.send(args, launch, adaptive)
     fail_unless(bool(args.microphone) == bool(args.audio_to), "--microphone and --audio-to need each other")
     if args.microphone:

@@ -120,9 +120,10 @@ export class RangecastView extends HTMLElement {
       this.element ('stats').hidden = value === null;
     else if (name === 'src' || name === 'token')
       this.load ();
-    else if (name !== 'mode')
+    else if (name === 'mode')
+      this.draw ();
+    else
       this.setOrbit ();
-    this.draw ();
   }
 
   // ---- as of a media element ----

@@ -42,7 +42,7 @@ test_programs_of_the_guide_run () {
   block () { awk -v RS='```' -v first="^$1\n$2" '$0 ~ first { sub (/^[a-z]*/, ""); print }' "$source_dir/docs/guide/embed.md"; }
   block python 'import gi' >program.py
   block c '#include <gst' | sed 's/autovideosink/pngenc snapshot=true ! filesink location=person.png/' >program.c
-  $python program.py >views.txt || fail "$(cat views.txt)"
+  timeout 60 $python program.py >views.txt || fail "$(cat views.txt)"
   [ "$(awk '$2 > 5000 && $3 > 20' views.txt | wc -l)" = 4 ] || fail "$(cat views.txt)"
   # shellcheck disable=SC2046
   cc -Wall -Werror program.c -o program $(pkg-config --cflags --libs gstreamer-1.0)

@@ -68,7 +68,7 @@ test_elements_and_properties_in_options_are_words () {
   grep -qF "'location=a b'" words.txt || fail "$(cat words.txt)"
   refuses "out of range for property 'n-threads'" "${camera[@]}" --input range --encoder n-threads=1000
   rangecast "${camera[@]}" --print --threads 3 >words.txt
-  [ "$(grep -o 'n-threads=3' words.txt | wc -l)" = 2 ] || fail "$(cat words.txt)" # stereodepth and roiextract
+  [ "$(grep -o 'n-threads=3' words.txt | wc -l)" = 2 ] || fail "$(cat words.txt)" # stereodepth and neighbourcodeenc
 }
 
 test_options_that_need_each_other_say_so () {

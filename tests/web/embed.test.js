@@ -38,13 +38,13 @@ after (async () => {
   server?.close ();
 });
 
-// before: a script that the page begins with; errors: what the page threw
-const open = async (name, before = '') => {
+// script: which the page begins with; errors: what the page threw
+const open = async (name, script = '') => {
   const page = await browser.newPage (), errors = [];
   page.setDefaultTimeout (60000);
   page.on ('pageerror', (error) => errors.push (error.message));
   await page.setViewport ({ width: 640, height: 480 });
-  await page.evaluateOnNewDocument (before);
+  await page.evaluateOnNewDocument (script);
   await page.goto (`${address}/${name}`);
   return { page, errors };
 };
@@ -97,11 +97,12 @@ test ('two elements on a page play, seek and leave the document by themselves', 
   await page.close ();
 });
 
-test ('mode=strips shows the nearest surface, in WebGL as in software', async () => {
-  write ('modes.html', `<!doctype html><body><script type="module" src="./view.js"></script><style>rangecast-view { width: 400px; height: 300px; }</style>
+test ('mode=strips differs from blend, and is the same in WebGL and in software', async () => {
+  write ('modes.html', `<!doctype html><body><script>addEventListener ('framesetchange', ({ target }) => { target.drawn = true; }, true);</script>
+    <script type="module" src="./view.js"></script><style>rangecast-view { width: 400px; height: 300px; }</style>
     ${['webgl', 'software'].map ((renderer) => `<rangecast-view src="examples/scene.rcnc" azimuth="45" mode="strips" renderer="${renderer}"></rangecast-view>`)}`);
   const { page, errors } = await open ('modes.html');
-  await page.waitForFunction (() => [...document.querySelectorAll ('rangecast-view')].every ((view) => view.stats?.points > 0 && view.state !== 'loading'));
+  await page.waitForFunction (() => [...document.querySelectorAll ('rangecast-view')].every ((view) => view.drawn));
   const { strips, blended } = await page.evaluate (async () => {
     const views = [...document.querySelectorAll ('rangecast-view')];
     const pixels = () => Promise.all (views.map (async (view) => {

@@ -13,6 +13,7 @@ skip () { echo "skipped: $*"; exit 77; }
 work=$RANGECAST_BUILD/web-test
 mkdir -p "$work"
 packages=(puppeteer-core three vite ws iwer aframe)
+# aframe names three-bmfont-text by a git address.
 for package in "${packages[@]}"; do
   [ -d "$work/node_modules/$package" ] && continue
   command -v npm >/dev/null || skip "npm is missing, which installs ${packages[*]}"

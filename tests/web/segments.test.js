@@ -102,7 +102,7 @@ test ('a server that is away, and parts that are missing or damaged, are survive
   await framesShown (opened, await frameSets (opened) + 15);
   await until (async () => await message (opened) === '');
   const otherRig = fs.readFileSync (path.join (work, 'scene.rcnc'));
-  const damaged = [(old) => old.subarray (0, 3000), (old) => old, () => otherRig, ([first, ...rest]) => Buffer.from ([first + 16, ...rest])]; // also a wrong number, and another version
+  const damaged = [(old) => old.subarray (0, 3000), (old) => old, () => otherRig, (old) => old.fill (old[0] + 16, 0, 1)]; // also a wrong number, and another version
   const faults = [(response) => response.writeHead (404, CORS).end (), (response) => response.writeHead (200, CORS).end ('<html>not here</html>'),
     ...damaged.map ((change) => (response) => response.writeHead (200, CORS).end (change (fs.readFileSync (path.join (folder, listed ()[0])))))];
   const seen = [];

@@ -37,7 +37,8 @@ struct SurfacePicture {
                                         ///< which views are blended
   int width = 0, height = 0;            ///< of the whole output, pixels
   Roi part;                             ///< of it that the picture fills
-  Roi covered = {}; ///< of that: all pixels that may show something, and at least one around
+  Roi covered = {};                     ///< of that: all pixels that may show something, and a
+                                        ///< margin of at least one pixel
 
   /** Whether triangles seen from behind are left out: noise turns many a single rectangle over. */
   [[nodiscard]] bool culls () const { return mode == StripMode::kStrips && !back_faces; }

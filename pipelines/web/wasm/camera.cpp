@@ -206,8 +206,8 @@ RC_EXPORT (rc_draw_layer) void *rc_draw_layer (std::uint32_t index, std::uint32_
   return c.scene.layers[index].vertices.data ();
 }
 
-/** Draws the scene as striprender does in software.
- *  @param transparent  1: without background; @param strips  1: views are not blended
+/** Draws the scene as striprender does in software in mode blend.
+ *  @param transparent  1: without background; @param strips  1: the nearest surface, not blended
  *  @return R, G, B, A of the pixels, rows from the top */
 RC_EXPORT (rc_draw)
 const rangecast::Rgbx *
