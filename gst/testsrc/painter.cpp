@@ -102,18 +102,19 @@ AvatarPainter::draw_loop (
                                        std::to_string (width) + "x" + std::to_string (height) +
                                        ", which take 1 GiB per camera"};
   try {
-    loop.resize (n * pixels);
+    loop.reserve (n * pixels);
   } catch (const std::bad_alloc &) {
     return {StatusCode::kNoSpace, "loop-frames: out of memory for that many frames"};
   }
-  for (std::size_t i = 0; i < n && !loop.empty (); i++) {
+  for (std::size_t i = 0; i < n && goes_on (); i++) {
+    loop.resize ((i + 1) * pixels);
     if (Status s = scene_->render (MAX (settings_.view_id, 0), camera, double (i) * period_s, false,
             looped (camera, i), {}, {});
         !s.ok ())
       return s;
-    if (!goes_on ())
-      loop.clear ();
   }
+  if (loop.size () < n * pixels)
+    loop.clear ();
   return {};
 }
 

@@ -46,7 +46,7 @@ main (int argc, char **argv)
   FILE *file = argc == 3 ? fopen (argv[1], "rb") : NULL;
   int status = 1;
   if (!file || fseek (file, 0, SEEK_END) != 0) {
-    fprintf (stderr, "usage: points RECORDING.rcnc POINTS.ply\n");
+    fputs (argc == 3 ? "cannot read the recording\n" : "usage: points RECORDING PLY\n", stderr);
     return 2;
   }
   RangecastDecoder *decoder = rangecast_decoder_new (0);

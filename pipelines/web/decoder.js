@@ -21,7 +21,7 @@ class Stage {
   }
 
   post (message) { postMessage (message); }
-  say (text, kind = 'error') { this.post ({ type: 'say', text, kind }); }
+  say (text, kind = text ? 'error' : 'note') { this.post ({ type: 'say', text, kind }); }
 
   // decode (): an Outcome. Measures it; a failure of the core is said, and FAILED returned.
   decode (decode) {

@@ -43,8 +43,10 @@ export class Player extends EventTarget {
     });
   }
 
-  // source: address of a stream (ws:, wss:), of a playlist (.m3u8) or of a recording, or a File; time: s
+  // source: address of a stream (ws:, wss:), of a playlist (.m3u8) or of a recording, or a File; none: as stop (); time: s
   async open (source, { token, time = 0, paused = false } = {}) {
+    if (!source)
+      return this.stop ();
     try {
       source = typeof source === 'string' ? new URL (source, document.baseURI).href : source;
     } catch {
@@ -60,6 +62,7 @@ export class Player extends EventTarget {
     this.stopped = true;
     this.atEnd = false;
     this.setState ('empty');
+    this.say ({ text: '' });
   }
   toggle () { this.post ({ type: 'toggle' }); }
   play () { this.post ({ type: 'play' }); }

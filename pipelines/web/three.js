@@ -75,8 +75,7 @@ export class RangecastObject extends Mesh {
       // From above, so that no view counts as one behind the person, which would be reduced.
       this.player.setView ({ ...this.core.record ('rc_orbit'), elevation: 90, aspect: 1, fit: false });
     }, () => {});
-    if (source)
-      this.open (source, options);
+    this.open (source, options);
   }
   open (source, options) {
     this.failed = false;

@@ -169,8 +169,6 @@ export class RangecastView extends HTMLElement {
       return;
     const [source, options] = this.loading;
     this.loading = null;
-    if (!source)
-      return player.state !== 'empty' && player.stop ();
     player.open (source, { token: this.token, paused: this.getAttribute ('autoplay') === 'false', ...options }).catch (() => {});
   }
 

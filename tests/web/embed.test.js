@@ -91,6 +91,7 @@ test ('two elements on a page play, seek and leave the document by themselves', 
   await page.waitForFunction (() => !window.b.paused);
   await page.evaluate (() => { window.b.src = ''; });
   await page.waitForFunction (() => window.b.state === 'empty' && window.b.paused && !window.b.ended);
+  assert.equal (await page.evaluate (() => window.b.element ('message').hidden), true);
   await page.evaluate (() => { window.b.src = 'nowhere.rcnc'; });
   await has ('b', 'error');
   assert.deepEqual (errors, []);
