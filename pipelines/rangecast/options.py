@@ -219,7 +219,7 @@ SHARED = {
     "--fec-percent": dict(type=number(1, 100), metavar="N", help="redundant packets, from which receivers with --fec restore lost ones"),
     "--rtx": dict(action="store_true"),
     "--key": dict(type=key_file, metavar="FILE", help="encrypt all streams (SRTP) with the key in FILE: 60 hexadecimal digits"),
-    "--threads": dict(type=number(1, 64), metavar="N", help="threads of stereo matching and of coding (default: one per core)"),
+    "--threads": dict(type=number(1, 64), metavar="N", help="threads of stereo matching and of coding"),
     "--window": dict(action="store_true", help="show it in a window"),
     "--camera": dict(type=device, metavar="DEVICE", help="be a camera for other programs: a v4l2loopback device, or a pipe for raw YUY2"),
     "--multicast": dict(type=group, metavar="GROUP", help="receive from this multicast group"),
