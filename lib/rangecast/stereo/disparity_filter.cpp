@@ -8,22 +8,10 @@
 namespace rangecast {
 namespace {
 
-/* Radius and area of patches, pixels. */
-constexpr int kPatchRadius = 3, kPatchArea = 49;
-/* Difference between two images of a patch due to noise and interpolation, grey levels. */
-constexpr int kNoise = 4;
 constexpr int kSupport = 4;    /* of eight neighbours; at a straight edge there are five */
 constexpr int kSpeck = 100;    /* pixels; smaller surfaces are mostly wrong matches */
 constexpr int kSpeckStep = 32; /* 1/16 pixel */
 constexpr int kGap = 12;       /* pixels */
-
-/* Grey level at 1/16 pixel positions, interpolated linearly. */
-int
-grey_at (const std::uint8_t *row, int x16, int width)
-{
-  const int x = std::clamp (x16 >> 4, 0, width - 1), f = x16 & 15;
-  return (row[x] * (16 - f) + row[std::min (x + 1, width - 1)] * f + 8) >> 4;
-}
 
 /* Copies a tile with a border of one pixel. */
 void
@@ -54,92 +42,7 @@ count_support (const std::int16_t *__restrict d, const std::int16_t *__restrict 
   }
 }
 
-/* Differences of grey levels where there is a disparity, else 0; and where that is. */
-void
-subtract_row (const std::int16_t *__restrict d, const std::int16_t *__restrict left,
-    const std::int16_t *__restrict right, int min, int n, std::int16_t *__restrict valid,
-    std::int16_t *__restrict difference)
-{
-  for (int x = 0; x < n; x++) {
-    const auto is_valid = std::int16_t (d[x] >= min), all = std::int16_t (left[x] - right[x]);
-    valid[x] = is_valid;
-    difference[x] = std::int16_t (all & -is_valid);
-  }
-}
-
-/* Sums over the patches of a row: see compare_patches(). */
-struct PatchSums {
-  const std::int16_t *counts, *differences, *sizes, *contrasts;
-};
-
-void
-clear_unlike_of_row (const std::int16_t *__restrict from, const PatchSums &sums, std::int16_t none,
-    int n, std::int16_t *__restrict to)
-{
-  const std::int16_t *__restrict counts = sums.counts, *__restrict differences = sums.differences,
-                                 *__restrict sizes = sums.sizes,
-                                 *__restrict contrasts = sums.contrasts;
-  for (int x = 0; x < n; x++) {
-    const std::int16_t d = from[x]; /* not loaded by condition, so that vectors are */
-    const int unlike = kPatchArea * (sizes[x] - std::abs (int (differences[x])) / 2),
-              max = (contrasts[x] + kNoise * kPatchArea) * counts[x];
-    to[x] = unlike > max ? none : d;
-  }
-}
-
 } // namespace
-
-/* Sums over patches: number of pixels with disparity, signed and absolute difference between both
- * images, and contrast of the left one. */
-void
-DisparityFilter::compare_patches (const cv::Mat &left, const cv::Mat &right, int right_x, int min,
-    const cv::Rect &tile, const cv::Mat &disparity, Memory &m) const
-{
-  cut_grey (left, tile, 2 * kPatchRadius, m.grey);
-  differ_from_mean<kPatchRadius> (m.grey, m.contrast, m.sums, m.columns);
-  const int width = m.contrast.width (), height = m.contrast.height ();
-  for (Plane *plane : {&m.valid, &m.difference, &m.size})
-    plane->set_size (width, height);
-  const int x0 = tile.x - kPatchRadius, begin = std::max (0, -x0),
-            end = std::min (width, disparity.cols - x0);
-  for (int y = 0; y < height; y++) {
-    std::int16_t *valid = m.valid.row (y), *difference = m.difference.row (y),
-                 *size = m.size.row (y);
-    const int row = tile.y - kPatchRadius + y;
-    std::fill_n (valid, width, std::int16_t{0});
-    std::fill_n (difference, width, std::int16_t{0});
-    if (row >= 0 && row < disparity.rows) {
-      const auto d = disparity.ptr<std::int16_t> (row) + x0;
-      const std::int16_t *l = m.grey.row (y + kPatchRadius) + kPatchRadius;
-      look_up (d + begin, end - begin, right.ptr<std::uint8_t> (row), right.cols,
-          x0 + begin + right_x, size);
-      subtract_row (
-          d + begin, l + begin, size, min, end - begin, valid + begin, difference + begin);
-    }
-    for (int x = 0; x < width; x++)
-      size[x] = std::int16_t (std::abs (difference[x]));
-  }
-  sum_windows<kPatchRadius> (m.contrast, m.contrasts, m.columns);
-  sum_windows<kPatchRadius> (m.valid, m.counts, m.columns);
-  sum_windows<kPatchRadius> (m.difference, m.differences, m.columns);
-  sum_windows<kPatchRadius> (m.size, m.sizes, m.columns);
-}
-
-void
-DisparityFilter::clear_unlike (const cv::Mat &left, const cv::Mat &right, int right_x, int min,
-    const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to)
-{
-  memory_.reserve (tiles.workers ());
-  tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
-    Memory &m = memory_.of (worker);
-    compare_patches (left, right, right_x, min, tile, disparity, m);
-    for (int y = 0; y < tile.height; y++) {
-      clear_unlike_of_row (disparity.ptr<std::int16_t> (tile.y + y) + tile.x,
-          {m.counts.row (y), m.differences.row (y), m.sizes.row (y), m.contrasts.row (y)},
-          std::int16_t (min - 16), tile.width, to.ptr<std::int16_t> (tile.y + y) + tile.x);
-    }
-  });
-}
 
 void
 DisparityFilter::clear_hidden (int min, const Tiles &tiles, cv::Mat &disparity)
@@ -181,69 +84,21 @@ DisparityFilter::clear_flying (
   tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
     Memory &m = memory_.of (worker);
     const auto n = std::size_t (tile.width);
-    copy_with_border (disparity, tile, none, m.grey);
+    copy_with_border (disparity, tile, none, m.disparities);
     m.max.resize (n);
     for (int y = 0; y < tile.height; y++) {
-      const std::int16_t *d = m.grey.row (y + 1) + 1;
+      const std::int16_t *d = m.disparities.row (y + 1) + 1;
       for (std::size_t x = 0; x < n; x++)
         m.max[x] = std::uint16_t (std::max (8, std::max (d[x] + offset, 0) * kShare >> 16));
       m.support.assign (n, 0);
       for (int v = 0; v < 3; v++)
         for (int u = 0; u < 3; u++)
           count_support (
-              d, m.grey.row (y + v) + u, m.max.data (), min, tile.width, m.support.data ());
+              d, m.disparities.row (y + v) + u, m.max.data (), min, tile.width, m.support.data ());
       auto out = to.ptr<std::int16_t> (tile.y + y) + tile.x;
       for (std::size_t x = 0; x < n; x++)
         out[x] = m.support[x] > kSupport ? d[x] : none; /* the pixel itself counts, too */
     }
-  });
-}
-
-/* ---- doubles ---- */
-
-void
-DisparityFilter::clear_doubled_of_row (const std::uint8_t *left, const std::uint8_t *right,
-    int right_width, int right_x, int min, int width, Memory &m, std::int16_t *d)
-{
-  constexpr int kNarrow = 16, kWide = 48; /* pixels */
-  m.surfaces.clear ();
-  for (int x = 0; x < width;) {
-    const int begin = x++;
-    while (x < width && d[begin] >= min && d[x] >= min && std::abs (d[x] - d[x - 1]) <= 16)
-      x++;
-    if (d[begin] >= min && (x - begin <= kNarrow || x - begin >= kWide))
-      m.surfaces.push_back ({begin, x});
-  }
-  const auto there = [&] (int x) {
-    return std::size_t (std::clamp (x + right_x - ((d[x] + 8) >> 4), 0, right_width - 1));
-  };
-  std::vector<std::int16_t> &seen = m.nearest; /* at least this disparity, in a wide surface */
-  seen.assign (std::size_t (right_width), 32767);
-  for (const auto &[begin, end] : m.surfaces)
-    for (int x = begin; x < end && end - begin >= kWide; x++)
-      if (std::abs (left[x] - grey_at (right, 16 * (x + right_x) - d[x], right_width)) <= kNoise)
-        seen[there (x)] = std::min (seen[there (x)], d[x]);
-  for (const auto &[begin, end] : m.surfaces) {
-    if (end - begin > kNarrow)
-      continue;
-    int doubled = 0;
-    for (int x = begin; x < end; x++)
-      doubled += seen[there (x)] < d[x] - 32;
-    if (2 * doubled >= end - begin)
-      std::fill (d + begin, d + end, std::int16_t (min - 16));
-  }
-}
-
-void
-DisparityFilter::clear_doubled (const cv::Mat &left, const cv::Mat &right, int right_x, int min,
-    const Tiles &tiles, cv::Mat &disparity)
-{
-  memory_.reserve (tiles.workers ());
-  tiles.each ([&] (const cv::Rect &tile, std::size_t worker) {
-    for (int y = tile.y; y < tile.br ().y; y++)
-      clear_doubled_of_row (left.ptr<std::uint8_t> (y) + tile.x, right.ptr<std::uint8_t> (y),
-          right.cols, right_x + tile.x, min, tile.width, memory_.of (worker),
-          disparity.ptr<std::int16_t> (y) + tile.x);
   });
 }
 

@@ -196,8 +196,6 @@ DisparityFinder::filter (const cv::Mat &left)
   const int nearest = limited_ ? std::max (min, far_) : min; /* of interest */
   if (limited_)
     restore_background (grey, right_x);
-  filter_.clear_unlike (grey, window_[1], right_x, min, tiles_, core_, next_);
-  cv::swap (core_, next_);
   filter_.clear_hidden (min, tiles_, core_);
   filter_.clear_flying (offset, min, tiles_, core_, next_);
   cv::swap (core_, next_);
@@ -214,8 +212,6 @@ DisparityFinder::filter (const cv::Mat &left)
     silhouettes_.apply (rims, colour, tiles_, core_, next_);
     cv::swap (core_, next_);
   }
-  if (!limited_)
-    filter_.clear_doubled (grey, window_[1], right_x, min, tiles_, core_);
   refiner_.apply ({grey, scaled_, colour, right_x, std::max (min, far_)}, tiles_, core_);
   if (!limited_ && core_.cols == pair_.width && core_.rows == pair_.height)
     background_.remember (grey, core_, min, far_);

@@ -65,21 +65,6 @@ TEST (StereoFilters, floor_that_slants_away_has_no_rims)
   EXPECT_EQ (cv::countNonZero (cleared (inside) != disparity (inside)), 0);
 }
 
-TEST (StereoFilters, patch_that_looks_otherwise_is_cleared_and_a_darker_one_is_not)
-{
-  cv::Mat left (40, 80, CV_8U), right (40, 80, CV_8U);
-  cv::randu (left, 0, 255);
-  cv::randu (right, 0, 255);
-  for (int y = 0; y < 40; y++)
-    for (int x = 40; x < 80; x++) /* seen 10 pixels further left, and darker */
-      right.at<std::uint8_t> (y, x - 10) = std::uint8_t (left.at<std::uint8_t> (y, x) * 7 / 8);
-  cv::Mat disparity (40, 80, CV_16S, cv::Scalar (160));
-  cv::Mat cleared = disparity.clone ();
-  DisparityFilter ().clear_unlike (left, right, 0, 0, all_of (disparity), disparity, cleared);
-  EXPECT_LT (cv::countNonZero (cleared.colRange (15, 35) >= 0), 40 * 20 / 10);
-  EXPECT_GT (cv::countNonZero (cleared.colRange (45, 75) >= 0), 40 * 30 * 95 / 100);
-}
-
 TEST (StereoFilters, what_the_right_camera_cannot_see_goes)
 {
   cv::Mat disparity (1, 64, CV_16S, cv::Scalar (160));
@@ -88,35 +73,4 @@ TEST (StereoFilters, what_the_right_camera_cannot_see_goes)
   /* What stands 10 pixels of disparity before the wall hides the 10 pixels left of it. */
   for (int x = 0; x < 64; x++)
     EXPECT_EQ (disparity.at<std::int16_t> (0, x) == kNone, x >= 30 && x < 40) << x;
-}
-
-/* A wall with a bar at columns 40 to 43 and one at 102 to 105, of which the right camera sees the
- * first alone; the second was matched with that, and so lies 62 pixels nearer. */
-static cv::Mat
-wall_with_doubled_bar (cv::Mat &left, cv::Mat &right, bool same_colour)
-{
-  left = cv::Mat (1, 200, CV_8U, cv::Scalar (100));
-  right = left.clone ();
-  left.colRange (40, 44).setTo (same_colour ? 50 : 100);
-  left.colRange (102, 106).setTo (50);
-  right.colRange (20, 24).setTo (50);
-  cv::Mat disparity (1, 200, CV_16S, cv::Scalar (kNone));
-  disparity.colRange (20, 90).setTo (20 * 16);
-  disparity.colRange (102, 106).setTo (82 * 16);
-  return disparity;
-}
-
-TEST (StereoFilters, pattern_that_repeats_is_not_seen_twice)
-{
-  cv::Mat left, right, disparity = wall_with_doubled_bar (left, right, true);
-  DisparityFilter ().clear_doubled (left, right, 0, kMin, all_of (disparity), disparity);
-  EXPECT_EQ (cv::countNonZero (disparity.colRange (102, 106) == kNone), 4);
-  EXPECT_EQ (cv::countNonZero (disparity.colRange (20, 90) == 20 * 16), 70);
-}
-
-TEST (StereoFilters, thin_thing_before_a_wall_of_another_colour_stays)
-{
-  cv::Mat left, right, disparity = wall_with_doubled_bar (left, right, false);
-  DisparityFilter ().clear_doubled (left, right, 0, kMin, all_of (disparity), disparity);
-  EXPECT_EQ (cv::countNonZero (disparity.colRange (102, 106) == 82 * 16), 4);
 }
