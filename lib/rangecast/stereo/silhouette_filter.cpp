@@ -20,7 +20,9 @@ constexpr int kLike = 60;
 /* Required sum of weights, each at most kLike: four pixels of nearly the same colour. */
 constexpr int kEnough = 160;
 /* Samples of a row that are processed together. */
-constexpr int kLanes = 8;
+constexpr int kLanes = 8, kRadius = kLanes; /* pixels */
+/* Samples beside the image, so that windows stay inside. */
+constexpr int kPad = kRadius / 2 + 1;
 /* kSurfaceStep in 1/65536. */
 constexpr int kShare = int (65536 * kSurfaceStep);
 
@@ -116,9 +118,8 @@ SilhouetteFilter::sample (
     const Settings &settings, const cv::Mat &colour, const cv::Mat &disparity, int n_threads)
 {
   const bool sample_colour = !settings.same_image;
-  pad_ = settings.radius / 2 + 1; /* windows stay inside */
   const int cols = (disparity.cols + 1) / 2, rows = (disparity.rows + 1) / 2;
-  samples_.set_size (cols + 2 * pad_ + kLanes, rows + 2 * pad_);
+  samples_.set_size (cols + 2 * kPad + kLanes, rows + 2 * kPad);
   const auto width = std::size_t (samples_.width ());
   for (std::vector<std::uint8_t> &plane : colours_)
     if (const std::size_t n = width * std::size_t (samples_.height ()); plane.size () < n)
@@ -135,18 +136,18 @@ SilhouetteFilter::sample (
             std::fill_n (to[3], width, std::uint8_t{255});
           std::int16_t *depth = samples_.row (v);
           std::fill_n (depth, width, std::int16_t{0});
-          const int y = 2 * (v - pad_);
+          const int y = 2 * (v - kPad);
           if (y < 0 || y >= disparity.rows)
             continue;
           const auto from = colour.ptr<std::uint32_t> (y);
           const auto d = disparity.ptr<std::int16_t> (y);
           if (sample_colour)
-            std::fill_n (to[3] + pad_, cols, std::uint8_t{0});
+            std::fill_n (to[3] + kPad, cols, std::uint8_t{0});
           for_this_cpu ([&] {
             if (sample_colour)
-              take_every_second (from, cols, to, pad_);
+              take_every_second (from, cols, to, kPad);
             for (int x = 0; x < cols; x++)
-              depth[pad_ + x] = d[2 * x];
+              depth[kPad + x] = d[2 * x];
           });
         }
       });
@@ -156,33 +157,26 @@ SilhouetteFilter::sample (
  */
 template <typename Count>
 void
-SilhouetteFilter::for_window (
-    const cv::Vec4b &own, int x, int y, int radius, const Count &count) const
+SilhouetteFilter::for_window (const cv::Vec4b &own, int x, int y, const Count &count) const
 {
-  static constexpr std::uint8_t kInside[2 * kLanes] = {255, 255, 255, 255, 255, 255, 255, 255};
   const cv::v_uint8x16 r = cv::v_setall_u8 (own[0]), g = cv::v_setall_u8 (own[1]),
                        b = cv::v_setall_u8 (own[2]), max = cv::v_setall_u8 (kLike);
-  const int x0 = x / 2 - radius / 2 + pad_, y0 = y / 2 - radius / 2 + pad_;
+  const int x0 = x / 2 - kRadius / 2 + kPad, y0 = y / 2 - kRadius / 2 + kPad;
   const std::ptrdiff_t width = samples_.width ();
-  for (int u = 0; u < radius; u += kLanes) {
-    const std::uint8_t *inside = kInside + kLanes - std::min (kLanes, radius - u);
-    for (int v = 0; v < radius; v += 2) {
-      const std::ptrdiff_t at = (y0 + v) * width + x0 + u;
-      const auto load = [&] (int c) {
-        const std::uint8_t *from = colours_[c].data () + at;
-        return cv::v_load_halves (from, from + width);
-      };
-      /* Saturates at 255, which exceeds kLike. */
-      const cv::v_uint8x16 unlike = cv::v_absdiff (load (0), r) + cv::v_absdiff (load (1), g) +
-                                    cv::v_absdiff (load (2), b) + load (3);
-      const cv::v_uint8x16 mask =
-          cv::v_load_halves (inside, v + 1 < radius ? inside : kInside + kLanes);
-      cv::v_uint16x8 upper, lower;
-      cv::v_expand ((max - unlike) & mask, upper, lower);
-      const std::int16_t *depth = samples_.row (y0 + v) + x0 + u;
-      count (cv::v_reinterpret_as_s16 (upper), cv::v_load (depth));
-      count (cv::v_reinterpret_as_s16 (lower), cv::v_load (depth + width));
-    }
+  for (int v = 0; v < kRadius; v += 2) {
+    const std::ptrdiff_t at = (y0 + v) * width + x0;
+    const auto load = [&] (int c) {
+      const std::uint8_t *from = colours_[c].data () + at;
+      return cv::v_load_halves (from, from + width);
+    };
+    /* Saturates at 255, which exceeds kLike. */
+    const cv::v_uint8x16 unlike = cv::v_absdiff (load (0), r) + cv::v_absdiff (load (1), g) +
+                                  cv::v_absdiff (load (2), b) + load (3);
+    cv::v_uint16x8 upper, lower;
+    cv::v_expand (max - unlike, upper, lower);
+    const std::int16_t *depth = samples_.row (y0 + v) + x0;
+    count (cv::v_reinterpret_as_s16 (upper), cv::v_load (depth));
+    count (cv::v_reinterpret_as_s16 (lower), cv::v_load (depth + width));
   }
 }
 
@@ -197,7 +191,7 @@ SilhouetteFilter::vote (
                                      settings.only_beyond ? settings.nearest : d - max))),
                       high = cv::v_setall_s16 (static_cast<short> (std::min (d + max, 32767)));
   cv::v_int16x8 all = cv::v_setzero_s16 (), none = all, below = all, above = all;
-  for_window (own, x, y, settings.radius, [&] (const cv::v_int16x8 &w, const cv::v_int16x8 &depth) {
+  for_window (own, x, y, [&] (const cv::v_int16x8 &w, const cv::v_int16x8 &depth) {
     all = all + w;
     if constexpr (kCountNone)
       none = none + (w & (depth < valid));
@@ -220,7 +214,7 @@ SilhouetteFilter::likely (const Settings &settings, const cv::Vec4b &own, int x,
   const cv::v_int16x8 valid = cv::v_setall_s16 (static_cast<short> (settings.min)),
                       one = cv::v_setall_s16 (1);
   cv::v_int32x4 sum = cv::v_setzero_s32 (), weights = sum;
-  for_window (own, x, y, settings.radius, [&] (const cv::v_int16x8 &w, const cv::v_int16x8 &depth) {
+  for_window (own, x, y, [&] (const cv::v_int16x8 &w, const cv::v_int16x8 &depth) {
     const cv::v_int16x8 counting = w & (depth >= valid);
     sum = sum + cv::v_dotprod (counting, depth);
     weights = weights + cv::v_dotprod (counting, one);
@@ -255,7 +249,7 @@ void
 SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, const cv::Rect &tile,
     const cv::Mat &disparity, Memory &m, cv::Mat &to) const
 {
-  const int reach = settings.radius * 2 / 3, min = settings.min;
+  const int reach = kRadius * 2 / 3, min = settings.min;
   const auto none = static_cast<std::int16_t> (min - 16);
   const auto smaller = [] (std::int16_t a, std::int16_t b) { return std::min (a, b); };
   const auto greater = [] (std::int16_t a, std::int16_t b) { return std::max (a, b); };
@@ -279,7 +273,7 @@ SilhouetteFilter::apply_to (const Settings &settings, const cv::Mat &colour, con
       const int d = valid ? from[x] : likely (settings, own, at_x, at_y);
       if (d < std::max (min, settings.nearest))
         continue;
-      const int slant = valid ? slant_at (disparity, at_x, at_y, settings.radius / 2, min) : 0,
+      const int slant = valid ? slant_at (disparity, at_x, at_y, kRadius / 2, min) : 0,
                 max = std::max (16, (d + settings.offset) * kShare >> 16) + slant,
                 lowest = m.lowest.row (y)[x];
       if (valid && !settings.only_beyond && lowest >= std::max (min, d - max))

@@ -13,12 +13,11 @@ namespace rangecast {
 
 /** Removes the rim that block matching adds around foreground: pixels near a step to farther
  * pixels, or near pixels without disparity, that are more similar in colour to those than to pixels
- * of their own depth, or of their slanted surface, within `radius`. Sets missing disparities where
+ * of their own depth, or of their slanted surface, within 8 pixels. Sets missing disparities where
  * similar pixels around agree on one. Reuses its memory between images. */
 class SilhouetteFilter {
 public:
   struct Settings {
-    int radius = 8;   ///< pixels, 1 to 64: beyond, the sums would saturate
     int offset = 0;   ///< 1/16 pixel, to be added to disparities
     int min = 0;      ///< lowest valid disparity, 1/16 pixel; cleared ones become min - 16
     int nearest = -1; ///< farther pixels are not processed, but count as farther
@@ -26,7 +25,7 @@ public:
     bool only_beyond = false;
     /** With only_beyond: 1/16 pixel; skip pixels that have none this far around them. */
     int look_near = 0;
-    /** `radius` and `colour` are those of the last call, whose samples are used again. */
+    /** `colour` is that of the last call, whose samples are used again. */
     bool same_image = false;
   };
 
@@ -49,7 +48,7 @@ private:
   void sample (
       const Settings &settings, const cv::Mat &colour, const cv::Mat &disparity, int n_threads);
   template <typename Count>
-  void for_window (const cv::Vec4b &own, int x, int y, int radius, const Count &count) const;
+  void for_window (const cv::Vec4b &own, int x, int y, const Count &count) const;
   template <bool kCountNone>
   [[nodiscard]] Votes vote (
       const Settings &settings, const cv::Vec4b &own, int x, int y, int d, int max) const;
@@ -59,10 +58,9 @@ private:
   void apply_to (const Settings &settings, const cv::Mat &colour, const cv::Rect &tile,
       const cv::Mat &disparity, Memory &memory, cv::Mat &to) const;
 
-  /* Every second pixel of every second row, padded by pad_ samples without colour. */
+  /* Every second pixel of every second row, padded by samples without colour. */
   std::vector<std::uint8_t> colours_[4]; /* R, G, B, 255 = without colour */
   Plane samples_;                        /* disparities */
-  int pad_ = 0;
   WorkerMemory<Memory> memory_;
 };
 

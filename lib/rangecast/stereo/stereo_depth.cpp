@@ -156,29 +156,6 @@ StereoDepth::is_suspect (const RangeImage &image) const
   return seen < 0.95 * seen_share_ * disparity.rows * disparity.cols || crowd > 0.01 * seen;
 }
 
-/* Clears pixels that one pair assigns to the foreground, although their colour is that of the
- * background that the other pair has found: edges parallel to the baseline match anywhere along
- * themselves. */
-void
-StereoDepth::clear_rims_of_third (const Roi &roi)
-{
-  constexpr int kMin = 16; /* disparity, 1/16 pixel; 16 less is none */
-  const cv::Rect whole (0, 0, roi.width, roi.height);
-  tiles_.set ({&whole, 1}, n_threads_);
-  cv::Mat &disparity = finder_.disparity ();
-  before_fusion_.create (disparity.size (), CV_16U);
-  const cv::Mat from (disparity.size (), CV_16S, disparity.data, disparity.step);
-  cv::Mat to (disparity.size (), CV_16S, before_fusion_.data, before_fusion_.step);
-  constexpr int kRadius = 10; /* these rims are wider */
-  SilhouetteFilter::Settings rims = {.radius = kRadius, .min = kMin};
-  rims.nearest = static_cast<int> (finder_.disparity_at (rectifier_.range_view ().far_m));
-  rims.only_beyond = true;
-  rims.look_near = rims.nearest - 1;
-  rims_.apply (
-      rims, pictures_[0](cv::Rect (roi.x, roi.y, roi.width, roi.height)), tiles_, from, to);
-  cv::swap (disparity, before_fusion_);
-}
-
 void
 StereoDepth::find (const RangeImage &image, bool everywhere)
 {
@@ -189,7 +166,6 @@ StereoDepth::find (const RangeImage &image, bool everywhere)
     third_.find (image.roi, near_m, far_m);
     fuse_disparities (
         finder_.disparity (), third_.disparity (), third_.precision (), before_fusion_);
-    clear_rims_of_third (image.roi);
   }
   write_depth (image);
 }

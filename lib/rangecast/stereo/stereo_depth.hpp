@@ -78,7 +78,6 @@ private:
   void find (const RangeImage &image, bool everywhere);
   void write_depth (const RangeImage &image) const;
   void hold_still (const Roi &roi);
-  void clear_rims_of_third (const Roi &roi);
   void learn_range (const RangeImage &image);
   [[nodiscard]] bool is_suspect (const RangeImage &image) const;
 
@@ -87,8 +86,6 @@ private:
   Rectifier rectifier_;
   DisparityFinder finder_;
   ThirdPair third_;
-  SilhouetteFilter rims_; /* for the result of both pairs */
-  Tiles tiles_;
   bool with_third_ = false, has_third_ = false; /* configured; for this pair */
   std::vector<std::uint16_t> depths_;           /* by disparity */
   ChangedBlocks blocks_;
