@@ -52,8 +52,7 @@ StereoDepth::set (const View &view, int n_threads, bool with_third)
   view_ = view;
   n_threads_ = n_threads;
   blocks_.set ({view.width, view.height});
-  for (cv::Mat *m : {&found_, &shown_})
-    m->create (view.height, view.width, CV_16U);
+  temporal_.set ({view.width, view.height}, n_threads);
   reset ();
   pictures_[0].release ();
   map_depths (range, pair.focal_baseline);
@@ -181,38 +180,6 @@ StereoDepth::write_depth (const RangeImage &image) const
   }
 }
 
-/* Noise would move edges and surfaces in each image. Where nothing moves, the output is the median
- * of what this and the last image found and of the last output; changes by less than a pixel go
- * half the way. */
-void
-StereoDepth::hold_still (const Roi &roi)
-{
-  constexpr int kSlight = 16, kMinImages = 6; /* slow motion is seen late */
-  const cv::Rect now_at (roi.x, roi.y, roi.width, roi.height), both = now_at & held_;
-  held_ = now_at;
-  still_row_.resize (std::size_t (roi.width));
-  for (int y = 0; y < roi.height; y++) {
-    for (int x = 0; x < roi.width; x++)
-      still_row_[std::size_t (x)] = both.contains ({roi.x + x, roi.y + y}) &&
-                                    still_[0].images_at (roi.x + x, roi.y + y) >= kMinImages;
-    for_this_cpu ([&] {
-      const std::uint16_t *__restrict still = still_row_.data ();
-      auto *__restrict now = finder_.disparity ().ptr<std::uint16_t> (y),
-                       *__restrict found = found_.ptr<std::uint16_t> (roi.y + y) + roi.x,
-                       *__restrict shown = shown_.ptr<std::uint16_t> (roi.y + y) + roi.x;
-      for (int x = 0; x < roi.width; x++) {
-        const int d = now[x], before = found[x], last = shown[x],
-                  median = std::max (std::min (d, before), std::min (std::max (d, before), last)),
-                  step = median - last;
-        const bool slight = (median > 0) & (last > 0) & (std::abs (step) <= kSlight);
-        const int held = slight ? last + step / 2 : median;
-        found[x] = std::uint16_t (d);
-        now[x] = shown[x] = std::uint16_t (still[x] ? held : d);
-      }
-    });
-  }
-}
-
 Status
 StereoDepth::match (const RangeImage &image)
 {
@@ -235,7 +202,8 @@ StereoDepth::match (const RangeImage &image)
     if (!everywhere && is_suspect (image))
       find (image, true);
     learn_range (image);
-    hold_still (roi);
+    temporal_.apply (
+        pictures_[0], {roi.x, roi.y, roi.width, roi.height}, still_[0], finder_.disparity ());
     write_depth (image);
     blocks_.learn (image);
     return {};

@@ -8,6 +8,7 @@
 #include "disparity_finder.hpp"
 #include "moving_blocks.hpp"
 #include "rectification.hpp"
+#include "temporal_filter.hpp"
 #include "third_pair.hpp"
 
 namespace rangecast {
@@ -66,7 +67,7 @@ public:
     third_.reset ();
     near_now_m_ = far_now_m_ = seen_share_ = 0;
     last_roi_ = {};
-    held_ = {};
+    temporal_.reset ();
   }
 
   /** The disparities put out for the last image's ROI, 1/16 pixel with equal principal points,
@@ -77,7 +78,6 @@ private:
   void map_depths (const View &range, double focal_baseline);
   void find (const RangeImage &image, bool everywhere);
   void write_depth (const RangeImage &image) const;
-  void hold_still (const Roi &roi);
   void learn_range (const RangeImage &image);
   [[nodiscard]] bool is_suspect (const RangeImage &image) const;
 
@@ -93,9 +93,7 @@ private:
   cv::Mat matched_[2];  /* the same with less noise */
   StillAverage still_[2];
   cv::Mat rectified_[2], before_fusion_;
-  cv::Mat found_, shown_; /* CV_16U, of the view: disparities of the last image, and its output */
-  cv::Rect held_;         /* the ROI of that image */
-  std::vector<std::uint16_t> still_row_;  /* 1 = nothing moves there */
+  TemporalFilter temporal_;
   std::vector<int> histogram_;            /* of the last depths, by pixels of disparity */
   double near_now_m_ = 0, far_now_m_ = 0; /* where the ROI's surfaces were; 0 = not known */
   Roi last_roi_;                          /* last ROI that was not the whole image */
