@@ -125,7 +125,8 @@ test_interrupt_ends_the_stream_and_calibrates_and_terminate_leaves_nothing () {
     ! wait "$calibration" || fail "status 0: $(cat said.txt)"
     gone () { ! kill -0 "$child" 2>/dev/null; }
     until_true gone
-    [ $signal = TERM ] || grep -q "no board was found" said.txt || fail "$(cat said.txt)"
+    # whether an image came before the signal depends on the machine
+    [ $signal = TERM ] || grep -qE "no board was found|no images arrived" said.txt || fail "$(cat said.txt)"
   done
 }
 
