@@ -148,7 +148,7 @@ choose_background (const RowCosts &costs, const std::int16_t *__restrict back,
     const bool still = (seen[x] != kUnknown) & (change[x] <= kNoiseSum),
                fits = (behind != kUnknown) & (other[x] <= kNoiseSum + contrast[x] / 2),
                better = (d[x] < min) | (other[x] + kNoise * kArea < own[x]),
-               hidden = still & (seen[x] == kHidden), background = still | (fits & better);
+               hidden = still & (seen[x] == kHidden), background = fits & (still | better);
     const auto kept = static_cast<std::int16_t> (d[x] < min ? none : d[x]);
     const std::int16_t visible = background ? behind : kept;
     d[x] = hidden ? static_cast<std::int16_t> (none) : visible;
