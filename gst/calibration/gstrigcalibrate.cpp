@@ -349,7 +349,7 @@ static Status
 explain_no_images (const CameraInputs &cameras)
 {
   for (const auto &camera : cameras)
-    if (!camera->info || cameras.size () == 1)
+    if (!camera->info || cameras.size () == 1) /* one camera has nothing to match with */
       return {StatusCode::kNotFound,
           "pad " + calibration_camera (camera->pad).name + ": no images arrived"};
   return {StatusCode::kNotFound, "no images with matching times arrived on all pads: capture times "

@@ -329,6 +329,11 @@ GST_START_TEST (test_what_cannot_be_calibrated_is_one_error_at_eos)
     c.push_picture (0, 0, std::vector<std::uint8_t> (100));
     c.expect_error ("pad sink_0: a buffer is smaller than its caps require");
   }
+  {
+    Calibrate c (1); /* caps only */
+    c.end ();
+    c.expect_error ("pad sink_0: no images arrived");
+  }
   Calibrate c (1);
   GstPad *lonely = gst_element_request_pad_simple (c.element, "sink_%u");
   c.push_grey (0, 0);
