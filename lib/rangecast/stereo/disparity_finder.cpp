@@ -207,8 +207,6 @@ DisparityFinder::filter (const cv::Mat &left)
   if (limited_ && !background_.empty ()) {
     background_.extend (core_at_.tl (), min, far_, tiles_, core_);
     rims.only_beyond = true;
-    rims.same_image = true;
-    rims.look_near = min;
     silhouettes_.apply (rims, colour, tiles_, core_, next_);
     cv::swap (core_, next_);
   }

@@ -19,8 +19,8 @@ namespace {
 constexpr int kLike = 60;
 /* Required sum of weights, each at most kLike: four pixels of nearly the same colour. */
 constexpr int kEnough = 160;
-/* Samples of a row that are processed together. */
-constexpr int kLanes = 8, kRadius = kLanes; /* pixels */
+/* A window has kLanes x kLanes samples of every second pixel, so its radius is kRadius pixels. */
+constexpr int kLanes = 8, kRadius = kLanes;
 /* Samples beside the image, so that windows stay inside. */
 constexpr int kPad = kRadius / 2 + 1;
 /* kSurfaceStep in 1/65536. */
@@ -117,7 +117,7 @@ void
 SilhouetteFilter::sample (
     const Settings &settings, const cv::Mat &colour, const cv::Mat &disparity, int n_threads)
 {
-  const bool sample_colour = !settings.same_image;
+  const bool sample_colour = !settings.only_beyond;
   const int cols = (disparity.cols + 1) / 2, rows = (disparity.rows + 1) / 2;
   samples_.set_size (cols + 2 * kPad + kLanes, rows + 2 * kPad);
   const auto width = std::size_t (samples_.width ());
@@ -236,8 +236,7 @@ SilhouetteFilter::mark_row (const Settings &settings, const std::int16_t *__rest
     std::uint8_t *__restrict marks)
 {
   const int offset = settings.offset, min = settings.min, nearest = settings.nearest,
-            limit = std::max (min, nearest),
-            look_near = settings.only_beyond ? settings.look_near : INT16_MAX;
+            limit = std::max (min, nearest), look_near = settings.only_beyond ? min : INT16_MAX;
   for (int x = 0; x < n; x++) {
     const int d = disparity[x], tolerance = std::max (16, (d + offset) * kShare >> 16);
     const bool inside = (d < nearest) | (lowest[x] >= d - tolerance) | (lowest[x] > look_near);

@@ -21,12 +21,10 @@ public:
     int offset = 0;   ///< 1/16 pixel, to be added to disparities
     int min = 0;      ///< lowest valid disparity, 1/16 pixel; cleared ones become min - 16
     int nearest = -1; ///< farther pixels are not processed, but count as farther
-    /** Clear only pixels that are similar to pixels farther than `nearest`. */
+    /** Clear only pixels that are similar to pixels farther than `nearest`, and have pixels
+     * without disparity around them. `colour` is that of the last call, whose samples are used
+     * again. */
     bool only_beyond = false;
-    /** With only_beyond: 1/16 pixel; skip pixels that have none this far around them. */
-    int look_near = 0;
-    /** `colour` is that of the last call, whose samples are used again. */
-    bool same_image = false;
   };
 
   /** @param colour     CV_8UC4, of the disparities' size
