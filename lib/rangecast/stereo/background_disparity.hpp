@@ -25,9 +25,9 @@ public:
    * rest of the row. */
   void remember (const cv::Mat &grey, const cv::Mat &disparity, int min, int far);
 
-  /** Replaces disparities by the background's where that matches the images better, and removes
-   * them next to the background where there was none and the image has not changed: the right
-   * camera does not see these pixels.
+  /** Replaces disparities by the background's where that matches the images better, or matches
+   * them and the left image has not changed. Removes them next to the background where there was
+   * none and the image has not changed: the right camera does not see these pixels.
    *  @param left, right  the same rows; column `right_x` of `right` is column 0 of `left`
    *  @param at           position of `left` in the whole image
    *  @param none         written where `disparity` stays below `min`

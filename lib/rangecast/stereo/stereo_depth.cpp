@@ -50,7 +50,6 @@ StereoDepth::set (const View &view, int n_threads, bool with_third)
     if (Status s = third_.set (view, range, pair.focal_baseline, n_threads); !s.ok ())
       return s;
   view_ = view;
-  n_threads_ = n_threads;
   blocks_.set ({view.width, view.height});
   temporal_.set ({view.width, view.height}, n_threads);
   reset ();

@@ -82,7 +82,6 @@ private:
   [[nodiscard]] bool is_suspect (const RangeImage &image) const;
 
   View view_;
-  int n_threads_ = 0;
   Rectifier rectifier_;
   DisparityFinder finder_;
   ThirdPair third_;

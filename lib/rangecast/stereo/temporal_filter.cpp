@@ -15,6 +15,7 @@ namespace {
 
 constexpr int kBlock = BlockGrid::kBlock;
 constexpr int kAround = 4, kWindow = kBlock + 2 * kAround; /* pixels that are compared */
+constexpr int kMaxRounds = 16;                             /* of the search */
 constexpr int kMinImages = 6; /* until a block is still: slow motion is seen late */
 constexpr int kSlight = 16;   /* change on one surface, 1/16 pixel */
 constexpr int kLike = 20;     /* grey levels of a pixel and the one from which it came */
@@ -25,8 +26,8 @@ is_slight (int a, int b)
   return (a > 0) & (b > 0) & (std::abs (a - b) <= kSlight);
 }
 
-/* What to put out for a disparity.
- * @param before, shown  found and put out before, in the same place */
+/* What to output for a disparity.
+ * @param before, shown  matched and output in the previous image, in the same place */
 int
 steadied (int now, int before, int shown, bool moves)
 {
@@ -82,41 +83,43 @@ TemporalFilter::find_motion (int bx, int by, const cv::Rect &window) const
   int least = difference (window, best, INT_MAX);
   const auto attempt = [&] (const cv::Point &motion) {
     const int sum = difference (window, motion, least);
-    const bool is_better = sum < least;
-    least = std::min (sum, least);
-    best = is_better ? motion : best;
-    return is_better;
+    if (sum >= least)
+      return false;
+    least = sum;
+    best = motion;
+    return true;
   };
   if (bx > 0)
     attempt (now_.motions[grid_.at (bx - 1, by)]);
   attempt (before_.motions[grid_.at (bx, by)]);
   if (bx + 1 < grid_.columns && by + 1 < grid_.rows)
     attempt (before_.motions[grid_.at (bx + 1, by + 1)]);
+  int rounds = 0; /* along a plain gradient, a change of light looks like motion without end */
   for (const int step : {2, 1})
-    for (bool is_better = true; is_better;) {
-      const cv::Point at = best;
-      is_better = attempt ({at.x - step, at.y}) || attempt ({at.x + step, at.y});
-      const cv::Point beside = best;
-      is_better |= attempt ({beside.x, at.y - step}) || attempt ({beside.x, at.y + step});
+    for (bool is_better = true; is_better && rounds < kMaxRounds; rounds++) {
+      const cv::Point from = best;
+      is_better = attempt ({from.x - step, from.y}) || attempt ({from.x + step, from.y});
+      const int x = best.x;
+      is_better |= attempt ({x, from.y - step}) || attempt ({x, from.y + step});
     }
   return best;
 }
 
-/* Whether most disparities changed by the same.
+/* Whether disparities changed by about the same; jumps to other surfaces are not counted.
  * @param[out] change  the mean, 1/16 pixel */
 bool
 TemporalFilter::follows (const cv::Rect &window, const cv::Point &motion, int &change) const
 {
   constexpr int kEnough = 16, kMax = 24, kMeanError = 4; /* pixels; 1/16 pixel */
   int n = 0, sum = 0, errors = 0;
-  const auto for_changes = [&] (const auto &work) {
+  const auto for_changes = [&] (const auto &add) {
     for (int y = window.y; y < window.br ().y; y++) {
       const std::uint16_t *now = now_.found.ptr<std::uint16_t> (y) + window.x,
                           *then =
                               before_.shown.ptr<std::uint16_t> (y + motion.y) + window.x + motion.x;
       for (int x = 0; x < window.width; x++) {
         const int step = now[x] - then[x];
-        work (step, (now[x] > 0) & (then[x] > 0) & (step <= kMax) & (step >= -kMax));
+        add (step, (now[x] > 0) & (then[x] > 0) & (step <= kMax) & (step >= -kMax));
       }
     }
   };
@@ -129,16 +132,16 @@ TemporalFilter::follows (const cv::Rect &window, const cv::Point &motion, int &c
 }
 
 void
-TemporalFilter::steady_block (int bx, int by, const cv::Rect &both, bool moves)
+TemporalFilter::steady_block (int bx, int by, const cv::Rect &both, bool moves, cv::Mat &disparity)
 {
   const cv::Rect part = cv::Rect (bx * kBlock, by * kBlock, kBlock, kBlock) & both;
   cv::Point &motion = now_.motions[grid_.at (bx, by)];
-  motion = {};
   int change = 0;
   if (moves) {
     const cv::Rect window = cv::Rect (part.x - kAround, part.y - kAround, kWindow, kWindow) & both;
-    if (cv::countNonZero (now_.found (window)) > 0)
-      motion = find_motion (bx, by, window);
+    if (cv::countNonZero (now_.found (window)) == 0)
+      return;
+    motion = find_motion (bx, by, window);
     if (!follows (window, motion, change))
       return;
   }
@@ -148,7 +151,7 @@ TemporalFilter::steady_block (int bx, int by, const cv::Rect &both, bool moves)
     const auto now = now_.found.ptr<std::uint16_t> (y),
                before = before_.found.ptr<std::uint16_t> (y + motion.y),
                shown = before_.shown.ptr<std::uint16_t> (y + motion.y);
-    auto to = now_.shown.ptr<std::uint16_t> (y);
+    const auto to = disparity.ptr<std::uint16_t> (y - now_.roi.y) - now_.roi.x;
     for (int x = part.x; x < part.br ().x; x++) {
       const int u = x + motion.x;
       if (!moves || std::abs (grey[x] - grey_before[u]) <= kLike)
@@ -163,22 +166,22 @@ TemporalFilter::apply (
     const cv::Mat &left, const cv::Rect &roi, const StillAverage &still, cv::Mat &disparity)
 {
   std::swap (now_, before_);
+  now_.roi = {}; /* in case of an exception */
+  std::ranges::fill (now_.motions, cv::Point ());
   cv::Mat grey = now_.grey (roi);
   cv::cvtColor (left (roi), grey, cv::COLOR_RGBA2GRAY);
   disparity.copyTo (now_.found (roi));
-  disparity.copyTo (now_.shown (roi));
-  const cv::Rect both = roi & before_.roi, blocks = grid_.touched (both);
   now_.roi = roi;
-  if (both.empty ())
-    return;
-  in_parallel (std::size_t (blocks.height), n_threads_, [&] (std::size_t row) {
+  const cv::Rect both = roi & before_.roi, blocks = grid_.touched (both);
+  in_parallel (both.empty () ? 0 : std::size_t (blocks.height), n_threads_, [&] (std::size_t row) {
     for_this_cpu ([&] {
       const int by = blocks.y + int (row);
       for (int bx = blocks.x; bx < blocks.br ().x; bx++)
-        steady_block (bx, by, both, still.images_at (bx * kBlock, by * kBlock) < kMinImages);
+        steady_block (
+            bx, by, both, still.images_at (bx * kBlock, by * kBlock) < kMinImages, disparity);
     });
   });
-  now_.shown (roi).copyTo (disparity);
+  disparity.copyTo (now_.shown (roi));
 }
 
 } // namespace rangecast

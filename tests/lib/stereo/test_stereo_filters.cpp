@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What stereo matching is filtered with, held against the plainest code that does the same. */
+/* What stereo matching is filtered with. */
 #include "../test-support.hpp"
 
-#include <algorithm>
-#include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <rangecast/stereo/disparity_filter.hpp>
 #include <rangecast/stereo/silhouette_filter.hpp>

@@ -11,7 +11,7 @@ using namespace rangecast;
 namespace {
 
 constexpr int kWidth = 96, kHeight = 64;
-const cv::Rect kRoi (8, 5, 80, 52); /* begins and ends within blocks */
+const cv::Rect kRoi (9, 5, 78, 52); /* begins and ends within blocks */
 
 /* A picture of which each image shows a part, `motion` further to the left and above; and
  * disparities that rise to the right, and from image to image where it moves. */
@@ -48,11 +48,19 @@ public:
     return to;
   }
 
+  /* Of the filters; the film goes back to its first image. */
+  void reset ()
+  {
+    still_.reset ();
+    filter_.reset ();
+    images_ = 0;
+  }
+
   cv::Mat picture_;
 
 private:
-  const cv::Point motion_;
-  const int rise_; /* 1/16 pixel */
+  cv::Point motion_;
+  int rise_; /* 1/16 pixel */
   cv::Mat big_;
   StillAverage still_;
   TemporalFilter filter_;
@@ -109,7 +117,7 @@ TEST (TemporalFilter, hole_of_one_image_is_filled_and_what_appears_in_one_is_not
     disparity (cv::Rect (50, 20, 14, 9)).setTo (0); /* nothing there, whatever moves */
     if (i == 4) {
       disparity (cv::Rect (20, 18, 6, 5)).setTo (0);
-      truth.at<std::uint16_t> (24, 57) = disparity.at<std::uint16_t> (24, 57) = 420;
+      disparity.at<std::uint16_t> (24, 57) = 420;
     }
     filtered = film.filter (disparity);
   }
@@ -117,24 +125,28 @@ TEST (TemporalFilter, hole_of_one_image_is_filled_and_what_appears_in_one_is_not
       cv::norm (filtered (cv::Rect (20, 18, 6, 5)), truth (cv::Rect (20, 18, 6, 5)), cv::NORM_INF),
       2);
   EXPECT_EQ (filtered.at<std::uint16_t> (24, 57), 0);
-  for (int i = 0; i < 2; i++) /* it stays, and so is shown; the hole stays, and so do not */
-    film.filter (disparity = film.next ());
-  EXPECT_EQ (cv::countNonZero (film.filter (film.next ()) == 0), 0);
+  for (int i = 0; i < 2; i++) /* two images without the hole: now the pixels are shown */
+    filtered = film.filter (film.next ());
+  EXPECT_EQ (cv::countNonZero (filtered == 0), 0);
 }
 
-TEST (TemporalFilter, disparities_that_jump_are_put_out_as_found)
+TEST (TemporalFilter, disparities_that_do_not_follow_the_picture_are_output_as_found)
 {
   Film film;
   for (int i = 0; i < 6; i++) {
     cv::Mat disparity = film.next ();
-    disparity += i % 2 * 60;
-    EXPECT_EQ (cv::countNonZero (film.filter (disparity) != disparity), 0) << i;
+    for (int y = 0; y < disparity.rows; y += 2) /* by less than a pixel, in rows that do not move */
+      disparity.row (y) += 12;
+    /* a block may be found in a wrong place, by chance */
+    EXPECT_LT (cv::countNonZero (film.filter (disparity) (kInner) != disparity (kInner)),
+        kInner.area () / 20)
+        << i;
   }
 }
 
 TEST (TemporalFilter, picture_that_is_another_one_leaves_disparities_alone)
 {
-  Film film, other (1, {-30, 20});
+  Film film;
   cv::RNG random (3);
   for (int i = 0; i < 4; i++) {
     cv::Mat disparity = with_noise (film.next (), random);
@@ -145,13 +157,40 @@ TEST (TemporalFilter, picture_that_is_another_one_leaves_disparities_alone)
   }
 }
 
-TEST (TemporalFilter, threads_do_not_matter)
+TEST (TemporalFilter, threads_and_what_was_before_a_reset_do_not_matter)
 {
   Film one (1), three (3);
   cv::RNG random (7);
-  for (int i = 0; i < 5; i++) {
-    three.next ();
+  for (int i = 0; i < 12; i++) {
+    if (i == 6) {
+      one = Film (1);
+      three.reset ();
+    }
     const cv::Mat disparity = with_noise (one.next (), random);
-    EXPECT_EQ (cv::countNonZero (one.filter (disparity) != three.filter (disparity)), 0);
+    three.next ();
+    EXPECT_EQ (cv::countNonZero (one.filter (disparity) != three.filter (disparity)), 0) << i;
+  }
+}
+
+/* For the sanitizers: regions that move, up to the image's edges, and sizes that are no blocks. */
+TEST (TemporalFilter, any_region_of_any_image)
+{
+  cv::RNG random (11);
+  TemporalFilter filter;
+  for (const cv::Size size : {cv::Size (1, 1), cv::Size (13, 9), cv::Size (75, 43)}) {
+    StillAverage still;
+    filter.set (size, 2);
+    for (int i = 0; i < 20; i++) {
+      cv::Mat picture (size, CV_8UC4), disparity;
+      random.fill (picture, cv::RNG::UNIFORM, 0, 255);
+      const int x = random.uniform (0, size.width), y = random.uniform (0, size.height);
+      const cv::Rect roi (
+          x, y, random.uniform (1, size.width - x + 1), random.uniform (1, size.height - y + 1));
+      disparity.create (roi.size (), CV_16U);
+      random.fill (disparity, cv::RNG::UNIFORM, 100, 110);
+      still.add (picture, cv::Rect ({}, size));
+      filter.apply (picture, roi, still, disparity);
+      EXPECT_TRUE (cv::checkRange (disparity, true, nullptr, 1, 200)) << size << roi;
+    }
   }
 }
