@@ -105,13 +105,14 @@ TemporalFilter::find_motion (int bx, int by, const cv::Rect &window) const
   return best;
 }
 
-/* Whether disparities changed by about the same; jumps to other surfaces are not counted.
+/* Whether at least half of the disparities changed, by about the same, and did not come, go or
+ * jump.
  * @param[out] change  the mean, 1/16 pixel */
 bool
 TemporalFilter::follows (const cv::Rect &window, const cv::Point &motion, int &change) const
 {
   constexpr int kEnough = 16, kMax = 24, kMeanError = 4; /* pixels; 1/16 pixel */
-  int n = 0, sum = 0, errors = 0;
+  int all = 0, n = 0, sum = 0, errors = 0;
   const auto for_changes = [&] (const auto &add) {
     for (int y = window.y; y < window.br ().y; y++) {
       const std::uint16_t *now = now_.found.ptr<std::uint16_t> (y) + window.x,
@@ -119,12 +120,14 @@ TemporalFilter::follows (const cv::Rect &window, const cv::Point &motion, int &c
                               before_.shown.ptr<std::uint16_t> (y + motion.y) + window.x + motion.x;
       for (int x = 0; x < window.width; x++) {
         const int step = now[x] - then[x];
-        add (step, (now[x] > 0) & (then[x] > 0) & (step <= kMax) & (step >= -kMax));
+        const int counts = (now[x] > 0) & (then[x] > 0) & (step <= kMax) & (step >= -kMax);
+        all += (now[x] | then[x]) > 0;
+        add (step, counts);
       }
     }
   };
   for_changes ([&] (int step, int counts) { n += counts, sum += counts * step; });
-  if (n < kEnough)
+  if (n < kEnough || 2 * n < all)
     return false;
   change = static_cast<int> (std::lround (float (sum) / float (n)));
   for_changes ([&] (int step, int counts) { errors += counts * std::abs (step - change); });

@@ -114,7 +114,7 @@ TEST (TemporalFilter, hole_of_one_image_is_filled_and_what_appears_in_one_is_not
   for (int i = 0; i < 5; i++) {
     truth = film.next ();
     disparity = truth.clone ();
-    disparity (cv::Rect (50, 20, 14, 9)).setTo (0); /* nothing there, whatever moves */
+    disparity (cv::Rect (38 + 3 * i, 16 + i, 14, 9)).setTo (0); /* a hole that stays */
     if (i == 4) {
       disparity (cv::Rect (20, 18, 6, 5)).setTo (0);
       disparity.at<std::uint16_t> (24, 57) = 420;
