@@ -77,7 +77,7 @@ Playback::redraw_if_paused ()
     return;
   redraw_ = seeking_;
   if (!seeking_)
-    start ({position (), true});
+    seek (position (), true); /* which may be beyond the end if paused as the file starts over */
 }
 
 void
