@@ -36,7 +36,6 @@ public:
   {
     to.width = width_;
     to.height = height_;
-    to.steep_step = steep_;
     const auto size = static_cast<std::size_t> (width_) * static_cast<std::size_t> (height_);
     to.colour.resize (size);
     to.weight.resize (size);

@@ -26,7 +26,6 @@ enum BlendFlags : std::uint8_t {
 /** What blending needs of each pixel of one view; width x height of its ROI. */
 struct BlendPlanes {
   int width = 0, height = 0;
-  double steep_step = 0; ///< from one pixel to the next at kSteepSlope; share of the depth
   /** Colour, smoothed where it equals that of a neighbour, as if the neighbour code had copied it;
    * x holds BlendFlags. */
   std::vector<Rgbx> colour;

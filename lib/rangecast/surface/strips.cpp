@@ -359,61 +359,6 @@ private:
   {
     for (int x = 0; x < width_;)
       x = depth_[x] == kInvalidDepth ? x + 1 : band (x);
-    for (int x = 0; planes_ && x + 1 < width_; x++)
-      if (depth_[x] != kInvalidDepth) {
-        bridge_right (x);
-        bridge_down (x);
-      }
-  }
-
-  /* Whether a depth is in front of the surface of a pixel of this row. */
-  [[nodiscard]] bool is_hiding (int depth, int x) const
-  {
-    return depth != kInvalidDepth && depth < depth_[x] && !is_level (depth_[x], depth);
-  }
-
-  /* Whether the depths on both sides of an occluder are of one surface. */
-  [[nodiscard]] bool is_level (int a, int b) const
-  {
-    return std::min (a, b) != kInvalidDepth &&
-           std::abs (a - b) <= planes_->steep_step * std::min (a, b);
-  }
-
-  void bridge (int left, int right, int top, int bottom)
-  {
-    begin_piece (strip_vertex (left, top, kBehind, kCentre));
-    for (const int x : {left, right})
-      for (const int y : {top, bottom})
-        to_.push_back (strip_vertex (x, y, kBehind, kCentre));
-    result_.triangles += 2;
-  }
-
-  /* Bridges what nearer pixels of this row hide of a surface that is joined to the row below on
-   * both sides of them. */
-  void bridge_right (int x)
-  {
-    if (row_ + 1 >= height_ || joins_pixel_right (x, row_) || !joins_pixel_below (x))
-      return;
-    const int last = std::min (width_ - 1, x + 1 + kMaxHiddenLength);
-    int n = x + 1;
-    while (n <= last && is_hiding (depth_[n], x))
-      n++;
-    if (n > x + 1 && n <= last && is_level (depth_[x], depth_[n]) && joins_pixel_below (n))
-      bridge (x, n, row_, row_ + 1);
-  }
-
-  /* The same with nearer pixels of two columns. */
-  void bridge_down (int x)
-  {
-    if (row_ + 1 >= height_ || !joins_pixel_right (x, row_) || joins_pixel_below (x))
-      return;
-    const int last = std::min (height_ - 1, row_ + 1 + kMaxHiddenLength);
-    int y = row_ + 1;
-    while (y <= last && is_hiding (image_.depth.at (x, y), x))
-      y++;
-    if (y > row_ + 1 && y <= last && is_level (depth_[x], image_.depth.at (x, y)) &&
-        joins_pixel_right (x, y))
-      bridge (x, x + 1, row_, y);
   }
 
   void pixels_of_row ()
@@ -467,20 +412,19 @@ make_vertices (const ConstRangeImage &image, const BlendPlanes *planes,
 {
   std::array<std::int16_t, 8> offsets; /* by StripPlace */
   for (int i = 0; i < 8; i++)
-    offsets[static_cast<std::size_t> (i)] = static_cast<std::int16_t> (
-        planes && i == kBehind ? 0 : std::clamp (i - int (kCentre), -reach, reach));
+    offsets[static_cast<std::size_t> (i)] =
+        static_cast<std::int16_t> (std::clamp (i - int (kCentre), -reach, reach));
   to.resize (strips.size ());
   for (std::size_t i = 0; i < strips.size (); i++) {
     const StripVertex v = strips[i];
     const int x = static_cast<int> (v & 8191), y = static_cast<int> (v >> 13 & 8191);
-    const std::uint32_t across = v >> 26 & 7, down = v >> 29;
     const std::size_t at =
         static_cast<std::size_t> (y) * static_cast<std::size_t> (image.depth.width) +
         static_cast<std::size_t> (x);
     Rgbx colour = planes ? planes->colour[at] : image.colour.at (x, y);
-    colour.x = !planes ? 255 : across == kBehind ? 0 : planes->weight[at];
-    to[i] = {static_cast<std::int16_t> (4 * x + offsets[across]),
-        static_cast<std::int16_t> (4 * y + offsets[down]), image.depth.at (x, y), 0, colour};
+    colour.x = planes ? planes->weight[at] : 255;
+    to[i] = {static_cast<std::int16_t> (4 * x + offsets[v >> 26 & 7]),
+        static_cast<std::int16_t> (4 * y + offsets[v >> 29]), image.depth.at (x, y), 0, colour};
   }
 }
 

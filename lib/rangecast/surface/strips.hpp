@@ -47,7 +47,6 @@ using StripVertex = std::uint32_t;
 enum StripPlace : std::uint32_t {
   kFarBefore = 0, ///< three quarters: an end of a band, so that it meets what another camera saw
   kBefore = 1,    ///< half a pixel left or up: the edge of the pixel
-  kBehind = 2,    ///< horizontal, mode kBlend: the pixel's own place, on what lies behind others
   kCentre = 3,
   kAfter = 5, ///< half a pixel right or down
   kFarAfter = 6,
@@ -55,8 +54,6 @@ enum StripPlace : std::uint32_t {
 };
 /** Greatest number of pixels in a row that one piece replaces. */
 inline constexpr int kMaxPieceLength = 32;
-/** Greatest number of pixels, in a row or a column, behind which a hidden surface is bridged. */
-inline constexpr int kMaxHiddenLength = 8;
 /** Greatest side of an image that is drawn, pixels. */
 inline constexpr int kMaxStripSide = 8192;
 
@@ -90,8 +87,7 @@ struct StripResult {
  *  The bands above and below a row leave out the same ones, so that no crack opens there. Between
  *  pixels that stay no step is larger than depth_step allows.
  *
- *  kBlend: as kStrips, with the planes' colours, and surfaces that end where the planes say. What
- * at most kMaxHiddenLength nearer pixels hide of a surface is bridged behind them (kBehind).
+ *  kBlend: as kStrips, with the planes' colours, and surfaces that end where the planes say.
  *
  *  kRectangles: four vertices a pixel, joined likewise. kPoints: one vertex a pixel.
  *  @param image      at most kMaxStripSide wide and high; larger parts are not drawn

@@ -156,23 +156,3 @@ TEST (BlendPlanes, images_of_any_size_are_taken)
     EXPECT_EQ (result.points, std::uint64_t (width * height));
   }
 }
-
-/* A bar of four columns before a wall: the wall goes on behind it. */
-TEST (BlendPlanes, surface_goes_on_behind_a_narrow_thing)
-{
-  Scene scene (1);
-  scene.fill (0, [] (int x, int) { return x >= 30 && x < 34 ? 7000 : 8000; });
-  const BlendPlanes planes = scene.planes (0);
-  const auto bridged = [&] (const BlendPlanes &of) {
-    std::vector<StripVertex> vertices;
-    StripResult result;
-    build_strips (scene.views ()[0].image, {}, vertices, result, &of);
-    int n = 0;
-    for (const StripVertex v : vertices)
-      n += (v >> 26 & 7) == kBehind && (v & 8191) == 29;
-    return n;
-  };
-  EXPECT_GT (bridged (planes), kHeight);
-  scene.fill (0, [] (int x, int) { return x >= 20 && x < 40 ? 7000 : 8000; });
-  EXPECT_EQ (bridged (scene.planes (0)), 0); /* too wide */
-}
