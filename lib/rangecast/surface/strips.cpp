@@ -414,6 +414,18 @@ make_vertices (const ConstRangeImage &image, const BlendPlanes *planes,
   for (int i = 0; i < 8; i++)
     offsets[static_cast<std::size_t> (i)] =
         static_cast<std::int16_t> (std::clamp (i - int (kCentre), -reach, reach));
+  const auto depth_at = [&] (int x, int y, std::size_t at) {
+    const int here = image.depth.at (x, y);
+    if (!planes)
+      return static_cast<std::uint16_t> (here);
+    const Rgbx *flags = &planes->colour[at];
+    int sum = here, n = 1;
+    if (x > 0 && (flags[0].x & flags[-1].x & kJoinsRight))
+      sum += image.depth.at (x - 1, y) + image.depth.at (x + 1, y), n += 2;
+    if (y > 0 && (flags[0].x & flags[-image.depth.width].x & kJoinsBelow))
+      sum += image.depth.at (x, y - 1) + image.depth.at (x, y + 1), n += 2;
+    return static_cast<std::uint16_t> ((sum + n / 2) / n);
+  };
   to.resize (strips.size ());
   for (std::size_t i = 0; i < strips.size (); i++) {
     const StripVertex v = strips[i];
@@ -424,7 +436,7 @@ make_vertices (const ConstRangeImage &image, const BlendPlanes *planes,
     Rgbx colour = planes ? planes->colour[at] : image.colour.at (x, y);
     colour.x = planes ? planes->weight[at] : 255;
     to[i] = {static_cast<std::int16_t> (4 * x + offsets[v >> 26 & 7]),
-        static_cast<std::int16_t> (4 * y + offsets[v >> 29]), image.depth.at (x, y), 0, colour};
+        static_cast<std::int16_t> (4 * y + offsets[v >> 29]), depth_at (x, y, at), 0, colour};
   }
 }
 

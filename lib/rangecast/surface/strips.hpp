@@ -106,7 +106,9 @@ struct SurfaceVertex {
 };
 
 /** Makes vertices of those that build_strips() made.
- *  @param planes   of the image, or nullptr: all weights are 1
+ *  @param planes   of the image, or nullptr: all weights are 1. With planes, a depth is the mean
+ * with those of both neighbours in its row and column that are of one surface with it: slopes stay,
+ * noise and steps lessen
  *  @param reach    quarters of a pixel that a vertex may lie beside its own, at most
  *  @param[out] to  replaced; keeps its memory */
 void make_vertices (const ConstRangeImage &image, const BlendPlanes *planes,

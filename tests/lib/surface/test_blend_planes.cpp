@@ -156,3 +156,24 @@ TEST (BlendPlanes, images_of_any_size_are_taken)
     EXPECT_EQ (result.points, std::uint64_t (width * height));
   }
 }
+
+/* A slanted wall, every fifth pixel of it too far, and a nearer one from column 32 on. */
+TEST (BlendPlanes, depths_of_one_surface_are_smoothed_but_not_slopes_and_steps)
+{
+  Scene scene (1);
+  const auto clean = [] (int x, int y) { return (x < 32 ? 8000 : 7000) + 10 * x + 4 * y; };
+  scene.fill (0, [&] (int x, int y) { return clean (x, y) + ((x + 2 * y) % 5 == 0 ? 20 : 0); });
+  const BlendPlanes planes = scene.planes (0);
+  const ConstRangeImage image = scene.views ()[0].image;
+  std::vector<StripVertex> strips;
+  StripResult result;
+  build_strips (image, {}, strips, result, &planes);
+  std::vector<SurfaceVertex> vertices;
+  make_vertices (image, &planes, strips, 2, vertices);
+  for (std::size_t i = 0; i < strips.size (); i++) {
+    const int x = static_cast<int> (strips[i] & 8191),
+              y = static_cast<int> (strips[i] >> 13 & 8191);
+    const bool inside = x % 32 > 0 && x % 32 < 31 && y > 0 && y < kHeight - 1;
+    ASSERT_NEAR (vertices[i].depth, clean (x, y) + (inside ? 4 : 10), inside ? 0.5 : 10);
+  }
+}
