@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "surface_scene.hpp"
 
+#include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "../base/parallel.hpp"
@@ -30,24 +32,27 @@ SurfaceScene::set_rig (const Rig &rig)
   return same;
 }
 
-/* The views, by number of their image, that look against the viewer or past them while another one
- * looks as the viewer does. */
-std::uint64_t
-SurfaceScene::views_against (
+/* Half a pixel where a view looks as the viewer does, within 30 degrees. From the side it would
+ * cover what lies next to it: a quarter. kReduced: the view looks against the viewer or past them
+ * (84 degrees) while another one looks within 60 degrees. */
+SurfaceScene::Reaches
+SurfaceScene::reaches_for (
     std::span<const RangeImage> images, const SurfaceSettings &settings, const Orbit &orbit) const
 {
-  constexpr double kAgainst = 0.1, kAlong = 0.5; /* cosine between both directions */
+  Reaches reaches;
+  reaches.fill (4);
   if (settings.strips.mode != StripMode::kBlend)
-    return 0;
+    return reaches;
   const auto matrix = orbit_matrices (frame_, orbit, 1, false).clip_from_world;
-  std::uint64_t against = 0;
   bool any_along = false;
   for (std::size_t i = 0; i < images.size (); i++) {
-    const double along = view_alignment (matrix, *rig_->find (images[i].view_id));
-    against |= std::uint64_t (along < kAgainst) << i;
-    any_along = any_along || along > kAlong;
+    const double along = view_alignment (matrix, *rig_->find (images[i].view_id)); /* cosine */
+    reaches[i] = along > 0.866 ? 2 : along < 0.1 ? kReduced : 1;
+    any_along = any_along || along > 0.5;
   }
-  return any_along ? against : 0;
+  if (!any_along)
+    std::fill_n (reaches.begin (), images.size (), 2);
+  return reaches;
 }
 
 void
@@ -56,16 +61,13 @@ SurfaceScene::build_view (std::size_t which, const SurfaceSettings &settings)
   ViewMemory &memory = memory_[which];
   const ConstRangeImage &image = views_[which].image;
   const bool blends = settings.strips.mode == StripMode::kBlend;
-  const bool is_reduced = reduced_ >> which & 1;
-  /* Beyond the last pixels, quarters of a pixel. */
-  const int reach = is_reduced ? 1 : blends ? 2 : 4;
   results_[which] = {};
   if (blends)
     make_blend_planes ({views_.data (), count_}, which, settings.strips.depth_step, memory.planes);
   const BlendPlanes *planes = blends ? &memory.planes : nullptr;
   build_strips (image, settings.strips, memory.strips, results_[which], planes);
-  make_vertices (image, planes, memory.strips, reach, memory.vertices);
-  if (is_reduced)
+  make_vertices (image, planes, memory.strips, std::abs (reaches_[which]), memory.vertices);
+  if (reaches_[which] == kReduced)
     results_[which].points = memory.reduced.points ();
 }
 
@@ -73,16 +75,16 @@ void
 SurfaceScene::build (std::span<const RangeImage> images, const SurfaceSettings &settings,
     const Orbit &orbit, bool same_frame_set)
 {
-  const std::uint64_t reduced = views_against (images, settings, orbit);
-  const bool built = same_frame_set && reduced == reduced_ && complete_ &&
+  const Reaches reaches = reaches_for (images, settings, orbit);
+  const bool built = same_frame_set && reaches == reaches_ && complete_ &&
                      built_with_ == settings &&
                      std::ranges::equal (images, layers (), {}, &RangeImage::view_id,
                          [] (const SurfaceLayer &layer) { return layer.image.view_id; });
   complete_ = false; /* what follows may throw */
   count_ = images.size ();
-  reduced_ = reduced;
+  reaches_ = reaches;
   for (std::size_t i = 0; i < images.size (); i++) {
-    const bool is_reduced = reduced >> i & 1;
+    const bool is_reduced = reaches[i] == kReduced;
     if (built && is_reduced)
       continue;
     const View *view = rig_->find (images[i].view_id);

@@ -65,7 +65,11 @@ private:
     BlendPlanes planes;
     ReducedView reduced;
   };
-  std::uint64_t views_against (std::span<const RangeImage> images, const SurfaceSettings &settings,
+  /* By number of the image: quarters of a pixel by which surfaces reach beyond their last pixels.
+   */
+  using Reaches = std::array<int, kMaxViews>;
+  static constexpr int kReduced = -1; /* reach 1, and the image is halved */
+  Reaches reaches_for (std::span<const RangeImage> images, const SurfaceSettings &settings,
       const Orbit &orbit) const;
   void build_view (std::size_t which, const SurfaceSettings &settings);
 
@@ -79,8 +83,8 @@ private:
   std::size_t count_ = 0; /* of the layers */
   std::vector<Vec3> hull_;
   SurfaceSettings built_with_;
-  std::uint64_t reduced_ = 0; /* bit i: number i of the images */
-  bool complete_ = false;     /* the last build() did not throw, and the rig is still the same */
+  Reaches reaches_{};
+  bool complete_ = false; /* the last build() did not throw, and the rig is still the same */
   std::uint64_t serial_ = 1;
 };
 
