@@ -39,7 +39,7 @@ inline constexpr double kMergeColour = 1.5;       ///< levels
 inline constexpr double kMergeCopyDepth = 0.004;
 inline constexpr double kMergeCopyColour = 12;
 
-/** A vertex by the pixel whose depth and colour it has, and by where about that pixel it lies. Bits
+/** A vertex by the pixel that it belongs to, and by where about that pixel it lies. Bits
  *  0-12: column, 13-25: row (both of the ROI), 26-28: horizontal, 29-31: vertical StripPlace. */
 using StripVertex = std::uint32_t;
 
@@ -102,13 +102,14 @@ struct SurfaceVertex {
   std::int16_t x, y;    ///< quarters of a pixel; (0, 0) is the centre of the ROI's first pixel
   std::uint16_t depth;  ///< depth units
   std::uint16_t unused; ///< 0
-  Rgbx colour;          ///< x is the square root of the weight, 255 = 1; 0: the minimum weight
+  Rgbx colour;          ///< x is the square root of the weight, 255 = 1
 };
 
 /** Makes vertices of those that build_strips() made.
- *  @param planes   of the image, or nullptr: all weights are 1. With planes, a depth is the mean
- * with those of both neighbours in its row and column that are of one surface with it: slopes stay,
- * noise and steps lessen
+ *
+ *  With planes, a depth is the mean with those of both neighbours in its row and its column, where
+ *  they are of one surface with it: slopes and steps stay, noise lessens.
+ *  @param planes   of the image, or nullptr: all weights are 1
  *  @param reach    quarters of a pixel that a vertex may lie beside its own, at most
  *  @param[out] to  replaced; keeps its memory */
 void make_vertices (const ConstRangeImage &image, const BlendPlanes *planes,
