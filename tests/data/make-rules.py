@@ -92,7 +92,7 @@ def coded(profile: int) -> Stream:
     # Only two of the steps are 1.
     for steps in ((1, 1, 2), (1, 2, 1), (2, 1, 1)):
         stream.add([stream.compact(profile, (0, 0, 4, 4), 6, steps, roi=roi)])
-    # Other bits, the other scale, and depths that are cut to the last code.
+    # Other bits, and depths that are cut to the last code.
     stream.bits = 6, 4
     for number in (6, 7):
         distance = 1 if number == 7 else None
@@ -408,7 +408,7 @@ def references() -> Stream:
     stream.add([key(3002)])
     stream.add([stream.slice((0, 0, 0, 0), 3003, b"", roi=(0, 0, 0, 0), flags=flags)])
     stream.add([later(3004, 1)])
-    # Other bits and scale.
+    # Other bits.
     stream.add([key(4000)])
     for stream.bits in ((11, 6), (10, 7), (10, 6)):
         stream.add([later(4001, 1)])
