@@ -261,14 +261,6 @@ fixate_output (GstCaps *caps, const GstCaps *input)
   return gst_caps_fixate (caps);
 }
 
-/* gst-launch-1.0 reads multiview-flags without a type as a string, which no element interprets */
-bool
-has_flags_as_text (const GstCaps *output)
-{
-  const GstStructure *s = gst_caps_get_structure (output, 0);
-  return gst_structure_has_field_typed (s, "multiview-flags", G_TYPE_STRING);
-}
-
 /* rangealign may correct poses at any time: a fit outlasts that. */
 bool
 handle_input_caps (GstStripRender *self, GstCaps *caps)
@@ -333,7 +325,8 @@ gst_strip_render_negotiated_src_caps (GstAggregator *aggregator, GstCaps *caps)
   auto self = GST_STRIP_RENDER (aggregator);
   GstStripRenderPrivate *priv = self->priv;
   GST_INFO_OBJECT (self, "from %" GST_PTR_FORMAT " to %" GST_PTR_FORMAT, priv->input, caps);
-  if (has_flags_as_text (caps)) {
+  const GstStructure *s = gst_caps_get_structure (caps, 0);
+  if (gst_structure_has_field_typed (s, "multiview-flags", G_TYPE_STRING)) {
     GST_ELEMENT_ERROR (self, STREAM, FORMAT,
         ("multiview-flags in the caps is a string; write (GstVideoMultiviewFlagsSet) before its "
          "value"),
