@@ -52,7 +52,7 @@ strip_properties ()
           0, 1, kControllable),
       P::number<&S::blend_range_m> ("blend-range", "Blend range",
           "Depth behind the nearest surface in metres within which views are blended with "
-          "mode=blend",
+          "mode=blend, divided by the sine of the angle between the view's ray and the viewer's",
           0, 1, kControllable),
       P::number<&S::background_shade> ("background-shade", "Background shade",
           "Vertical gradient of an opaque background, as a fraction of its colour (0 = none)", 0, 1,

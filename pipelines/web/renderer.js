@@ -5,7 +5,7 @@
 // rangecast::Shader
 const COVERING = 0, VERTEX = 1, FRAGMENT = 2, FINISH = 3, SUM = 4;
 // Floats of rc_camera_picture: those of the picture, and of each layer.
-export const HEAD = 18, LAYER = 29;
+export const HEAD = 18, LAYER = 31;
 const VERTEX_BYTES = 12; // of rangecast::SurfaceVertex
 
 class Program {
@@ -281,18 +281,17 @@ export class WebGlRenderer {
     this.prepare (this.sumTarget, width, height);
     gl.enable (gl.DEPTH_TEST);
     gl.enable (gl.SCISSOR_TEST);
-    const cells = this.drawCells (picture, width, height, columns, rows);
+    this.drawCells (picture, width, height, columns, rows);
     gl.viewport (0, 0, width, height);
     gl.depthFunc (gl.ALWAYS);
-    this.addUp (picture, cells, count);
+    this.addUp (picture, count);
     gl.disable (gl.DEPTH_TEST);
     gl.bindFramebuffer (gl.FRAMEBUFFER, framebuffer);
     this.finishPicture (picture, height);
   }
 
-  // Returns what leads from a pixel of the picture to each cell.
   drawCells (picture, width, height, columns, rows) {
-    const gl = this.gl, cells = new Int32Array (16), [x, y, coveredColumns, coveredRows] = picture.subarray (8, 12);
+    const gl = this.gl, [x, y, coveredColumns, coveredRows] = picture.subarray (8, 12);
     gl.bindFramebuffer (gl.FRAMEBUFFER, this.cellTarget.framebuffer);
     gl.scissor (0, 0, columns, rows);
     gl.clearColor (0, 0, 0, 0);
@@ -300,10 +299,6 @@ export class WebGlRenderer {
     gl.depthFunc (gl.LESS);
     gl.frontFace (picture[16] ? gl.CW : gl.CCW);
     this.blend.use ();
-    this.layers.forEach ((_, i) => {
-      const at = HEAD + LAYER * i + 18;
-      cells.set (picture.subarray (at + 1, at + 3), 2 * picture[at]);
-    });
     this.eachLayer (picture, (layer) => {
       const [, right, down] = layer.subarray (18, 21);
       gl.viewport (right, down, width, height);
@@ -315,17 +310,22 @@ export class WebGlRenderer {
       gl.uniform1f (this.blend.at ('u_unit'), layer[28]);
     });
     gl.frontFace (gl.CCW);
-    return cells;
   }
 
-  addUp (picture, cells, count) {
-    const gl = this.gl;
+  addUp (picture, count) {
+    const gl = this.gl, cells = new Int32Array (16), cotangents = new Float32Array (16); // x, y of each cell
+    this.layers.forEach ((_, i) => {
+      const layer = picture.subarray (HEAD + LAYER * i), cell = layer[18];
+      cells.set (layer.subarray (19, 21), 2 * cell);
+      cotangents.set (layer.subarray (29, 31), 2 * cell);
+    });
     gl.bindFramebuffer (gl.FRAMEBUFFER, this.sumTarget.framebuffer);
     gl.scissor (...picture.subarray (8, 12));
     const program = this.sums[count - 1] ??= this.program (COVERING, SUM + count - 1);
     program.use ();
     this.bindTextures (program, this.cellTarget, 'u_colours');
     gl.uniform2iv (program.at ('u_cells'), cells.subarray (0, 2 * count));
+    gl.uniform2fv (program.at ('u_cotangents'), cotangents.subarray (0, 2 * count));
     gl.uniform3fv (program.at ('u_shift'), picture.subarray (12, 15));
     this.cover ();
     this.unbindTextures ();

@@ -128,6 +128,10 @@ private:
                  ? std::clamp<std::size_t> (layers_.size (), 1, kMaxBlendCells)
                  : 1;
     choose_cells (m_.alignments_, cells_, m_.cell_of_);
+    range_ =
+        depth_shift (picture_.clip_from_world, picture_.clip_from_world, picture_.blend_range_m).g;
+    for (std::size_t i = 0; i < layers_.size (); i++)
+      cotangents_[m_.cell_of_[i]] = view_cotangent (picture_.clip_from_world, *layers_[i].view);
     m_.chunks_.clear ();
     std::size_t first = 0;
     const std::size_t shared = is_points_ ? 0 : 2; /* vertices with the triangles before */
@@ -371,7 +375,6 @@ private:
     using F = typename L::F;
     using I = typename L::I;
     using U = typename L::U;
-    const auto range = static_cast<float> (picture_.blend_range_m);
     const std::size_t row = static_cast<std::size_t> (y + 1) * stride_;
     for (int x = 0; x < covered_.width; x += L::kLanes) {
       F nearest{};
@@ -380,7 +383,7 @@ private:
           const F &here = L::at (&band.nearness[cell * size + line + std::size_t (x)]);
           nearest = here > nearest ? here : nearest;
         }
-      const F farthest = nearest / (1 + range * nearest);
+      const F distance = 1 / nearest;
       F red{}, green{}, blue{}, sum{};
       for (std::size_t cell = 0; cell < cells_ && L::any (nearest > 0); cell++)
         if (used >> cell & 1) {
@@ -389,7 +392,12 @@ private:
           const U &c = L::at (&band.colours[at]);
           const F root = floats<L> (c >> 24) * (1 / 255.f), square = root * root;
           F weight = square * square;
-          L::keep_where (weight, (here > 0) & (here >= farthest));
+          F cotangent = cotangents_[cell].share * distance - cotangents_[cell].offset;
+          cotangent = cotangent > 0 ? cotangent : F{};
+          F range = 1 + cotangent * cotangent;
+          L::make_root (range);
+          range *= range_;
+          L::keep_where (weight, (here > 0) & (here * (1 + range * nearest) >= nearest));
           red += weight * floats<L> (c & 255);
           green += weight * floats<L> (c >> 8 & 255);
           blue += weight * floats<L> (c >> 16 & 255);
@@ -596,6 +604,8 @@ private:
   const std::size_t stride_;
   const bool mirrors_, is_points_;
   std::size_t cells_ = 1;
+  float range_ = 0; /* of w, where both rays cross at right angles */
+  std::array<ViewCotangent, kMaxBlendCells> cotangents_; /* by cell */
 };
 
 void

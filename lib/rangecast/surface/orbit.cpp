@@ -378,6 +378,18 @@ view_alignment (const Mat4 &clip_from_world, const View &view)
   return dot (forward, {r[2], r[5], r[8]}) / norm (forward);
 }
 
+ViewCotangent
+view_cotangent (const Mat4 &clip_from_world, const View &view)
+{
+  constexpr double kMinAside_m = 1e-3;
+  const Vec3 row = row_of (clip_from_world, 3);
+  const double scale = norm (row);
+  const Vec3 way = view.world_from_view.translation - viewer_position (clip_from_world);
+  const double along = dot (way, row) / scale,
+               aside = std::max (norm (way - (along / scale) * row), kMinAside_m);
+  return {static_cast<float> (1 / (scale * aside)), static_cast<float> (along / aside)};
+}
+
 bool
 mirrors (const Mat4 &clip_from_world)
 {

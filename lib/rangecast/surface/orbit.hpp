@@ -128,6 +128,14 @@ Vec3 viewer_position (const Mat4 &clip_from_world);
 /** Cosine of the angle between the directions in which the viewer and a view look. */
 double view_alignment (const Mat4 &clip_from_world, const View &view);
 
+/** Where a view's camera is beside the viewer: the rays of both meet on the viewer's axis at w at
+ * an angle whose cotangent is share * w - offset. The blend range is divided by that angle's sine:
+ * a surface that is drawn too near or too far is displaced in the picture by that sine. */
+struct ViewCotangent {
+  float share = 0, offset = 0;
+};
+ViewCotangent view_cotangent (const Mat4 &clip_from_world, const View &view);
+
 /** Whether a clip matrix of pixels mirrors. If it does not, triangles that are counter-clockwise in
  *  their view's picture (y down) are so for OpenGL, too. */
 bool mirrors (const Mat4 &clip_from_world);

@@ -82,6 +82,7 @@ precision highp sampler2D;
 uniform sampler2D u_colours;
 uniform sampler2D u_depths;
 uniform ivec2 u_cells[CELLS]; /* from a pixel of the picture to that of a cell */
+uniform vec2 u_cotangents[CELLS]; /* share, offset of ViewCotangent */
 uniform vec3 u_shift; /* a, b, g of DepthShift */
 out vec4 fragment; /* and the fourth root of the mean weight */
 void main ()
@@ -93,10 +94,11 @@ void main ()
     nearest = min (nearest, depths[i]);
   }
   float distance = u_shift.y / (2.0 * nearest - 1.0 - u_shift.x);
-  float farthest = 0.5 + 0.5 * (u_shift.x + u_shift.y / (distance + u_shift.z));
   vec4 sum = vec4 (0.0);
   for (int i = 0; i < CELLS; i++) {
-    if (depths[i] < 1.0 && depths[i] <= farthest) {
+    float cotangent = max (u_cotangents[i].x * distance - u_cotangents[i].y, 0.0);
+    float farthest = distance + u_shift.z * sqrt (1.0 + cotangent * cotangent);
+    if (depths[i] < 1.0 && depths[i] <= 0.5 + 0.5 * (u_shift.x + u_shift.y / farthest)) {
       vec4 texel = texelFetch (u_colours, at + u_cells[i], 0);
       sum += weight_of (texel.a) * vec4 (texel.rgb, 1.0);
     }

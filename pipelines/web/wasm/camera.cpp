@@ -99,7 +99,8 @@ write (std::vector<float> &to, std::initializer_list<double> values)
 /** An array of floats: background R, G, B, A; the atlas: cells, width, height, 0; the part of the
  *  framebuffer that may be covered (x, y, width, height); depth shift a, b, g; reach; whether it
  *  mirrors; number of layers. For each layer: its place (matrix 16, behind 2), number of its cell,
- *  what leads to it from a pixel of the picture (x, y), lens (4), viewer (3), unit
+ *  what leads to it from a pixel of the picture (x, y), lens (4), viewer (3), unit,
+ *  cotangent (share, offset)
  *  @param max_side  of a texture, pixels */
 void
 write_picture (std::vector<float> &to, const Scene &scene, StripMode mode,
@@ -138,7 +139,8 @@ write_picture (std::vector<float> &to, const Scene &scene, StripMode mode,
                    double (atlas.from_picture[cell][1])});
     to.insert (to.end (), std::begin (angles.lens), std::end (angles.lens));
     to.insert (to.end (), std::begin (angles.viewer), std::end (angles.viewer));
-    write (to, {angles.unit});
+    const auto cotangent = rangecast::view_cotangent (clip_from_world, view);
+    write (to, {angles.unit, cotangent.share, cotangent.offset});
   }
 }
 

@@ -82,6 +82,18 @@ GST_START_TEST (test_surface_beyond_the_blend_range_is_hidden)
 }
 GST_END_TEST;
 
+/* What lies too deep is seen in the right place by a camera that is where the viewer is. */
+GST_START_TEST (test_view_of_the_viewers_own_position_is_blended_at_any_depth)
+{
+  const Rig rig = two_of_nine ();
+  GstHarness *h = render_harness (rig, "azimuth=0");
+  fail_unless_cmp (middle (render (h, walls_apart (rig, 0.1)))[0], >, 200);
+  gst_harness_set (h, "striprender", "azimuth", 40.0, nullptr); /* now the other one is */
+  fail_unless_cmp (middle (render (h, walls_apart (rig, 0.1)))[0], <, 1);
+  gst_harness_teardown (h);
+}
+GST_END_TEST;
+
 /* A white disc on nothing. */
 static GstBuffer *
 disc (const Rig &rig)
@@ -191,6 +203,7 @@ stripblend_suite (void)
   tcase_add_test (tc, test_midway_between_two_views_weights_follow_the_slant);
   tcase_add_test (tc, test_view_of_the_viewers_own_direction_counts_most);
   tcase_add_test (tc, test_surface_beyond_the_blend_range_is_hidden);
+  tcase_add_test (tc, test_view_of_the_viewers_own_position_is_blended_at_any_depth);
   tcase_add_test (tc, test_outlines_are_antialiased_and_have_no_dark_rims);
   tcase_add_test (tc, test_inside_shows_through_large_gaps_only);
   tcase_add_test (tc, test_draws_in_a_locale_with_a_decimal_comma);

@@ -104,6 +104,25 @@ TEST (ViewMatrices, shifted_depth_is_that_of_a_point_so_much_farther)
   EXPECT_NEAR (shift.a + shift.b / (w + shift.g), expected.z / expected.w, 1e-5);
 }
 
+TEST (ViewMatrices, cotangent_is_that_of_the_angle_at_which_both_rays_meet)
+{
+  const View viewer = camera ();
+  Mat4 m = picture_of (viewer).clip_from_world;
+  const Vec3 eye = viewer_position (m), forward{m[3], m[7], m[11]}, up{m[1], m[5], m[9]};
+  const Vec3 side = cross (forward, up), aside = (1 / norm (side)) * side,
+             along = (1 / norm (forward)) * forward;
+  View view = viewer;
+  view.world_from_view.translation = eye + 0.2 * aside + 0.1 * along;
+  for (float &value : m) /* as an application's matrix may be */
+    value *= 2;
+  const auto cotangent = view_cotangent (m, view);
+  for (const double distance : {0.1, 0.5, 1.0}) {
+    const Vec3 p = eye + distance * along;
+    const double w = clip (m, p.x, p.y, p.z, 1).w;
+    EXPECT_NEAR (cotangent.share * w - cotangent.offset, (distance - 0.1) / 0.2, 1e-4);
+  }
+}
+
 TEST (CoveredPart, holds_every_point_and_little_more)
 {
   const View view = camera ();
