@@ -7,7 +7,7 @@ set -uo pipefail
 cd "$(dirname "$0")/.."
 build=${RANGECAST_BUILD_TSAN:-build-tsan}
 tests=("$@")
-[ ${#tests[@]} -gt 0 ] || tests=(rangemux rangemuxclock rangemuxfaults rangemuxmany rangemuxrecordings rangedemux rangedemuxpads statistics
+[ ${#tests[@]} -gt 0 ] || tests=(rangemux rangemuxclock rangemuxfaults rangemuxmany rangemuxrecordings rangedemux statistics
   rtpneighbourcodeguard adaptiverate stereodepth roiextract neighbourcodeenc neighbourcoderate
   neighbourcodedec temporal rangecombine cylinderfilter rangealign rangesplit rtploss avatarstream
   avatartestsrc neighbourcodeparse neighbourcodeseek rangewebsink rangewebsinkclients rangewebsinkstream)
