@@ -284,7 +284,7 @@ def panoptic(documents, args):
         return None
     found = {}
     hd = [one for one in cameras if one.get("type") == "hd"] or cameras
-    for one in [one for one in cameras if str(one["name"]) in args.cameras] if args.cameras else hd:
+    for one in [one for one in cameras if str(one["name"]) in args.pair] if args.pair else hd:
         name = str(one["name"])
         found[name] = Camera(need(one["resolution"], 2, "resolution"), pinhole(one["K"], f"{name}: K"), lens(one["distCoef"], "opencv", f"{name}: distCoef"),
                              Pose(rotation(one["R"], f"{name}: R"), metres(one["t"], 1 if args.unit else 0.01, f"{name}: t")))  # fmt: skip

@@ -28,8 +28,8 @@ def add_call(parser):
     parser.add_argument("--port", type=options.number(0, 65535), default=8080, metavar="PORT", help="TCP port of that link (default 8080; 0: any)")
     parser.add_argument("--certificate", type=options.existing_file, metavar="PEM",
                         help="the server's certificate: without --signal with its private key; with it needed only if the system does not trust it")  # fmt: skip
-    parser.add_argument("--stun", metavar="HOST:PORT", help="STUN server, for ends behind routers (NAT)")
-    parser.add_argument("--turn", metavar="USER:PASSWORD@HOST:PORT", help="TURN server, where there is no direct way between both ends")
+    parser.add_argument("--stun-server", metavar="HOST:PORT", help="STUN server, for ends behind routers (NAT)")
+    parser.add_argument("--turn-server", metavar="USER:PASSWORD@HOST:PORT", help="TURN server, where there is no direct way between both ends")
     options.add(parser, "--rig")
     options.add(parser, "--microphone", default="autoaudiosrc", help="a source in gst-launch-1.0 syntax (default autoaudiosrc; none: no microphone)")
     options.add(parser, "--speaker")
@@ -48,7 +48,7 @@ def build_call(args, link, ports):
     launch.add("capssetter", "replace=true", f"caps={caps}", "!", *VALVE, "!", caps, "!", "webrtc.sink_0")
     launch.add("webrtcbin", "name=webrtc", "bundle-policy=max-bundle", f"latency={args.jitter}", "rtpbin::do-lost=true")
     launch.add("rtpbin::ntp-time-source=clock-time", "rtpbin::rtcp-sync-send-time=false")
-    launch.add(*([f"stun-server=stun://{args.stun}"] if args.stun else []), *([f"turn-server=turn://{args.turn}"] if args.turn else []))
+    launch.add(*([f"stun-server=stun://{args.stun_server}"] if args.stun_server else []), *([f"turn-server=turn://{args.turn_server}"] if args.turn_server else []))
     launch.option("--clock", "system", "--signal", link)
     if args.certificate:
         launch.option("--certificate", args.certificate)

@@ -118,7 +118,7 @@ def add_convert(parser):
     parser.add_argument("files", nargs="+", metavar="FILE", help="input files, then the file or folder to write")
     parser.add_argument("--rgbd", action="store_true", help="the input is colour and depth")
     pair = parser.add_argument_group("geometry")
-    options.add(pair, "--rig", "--near", "--far", "--turn")
+    options.add(pair, "--rig", "--near", "--far", "--azimuth")
     options.add(pair, "--view", default=0)
     pair.add_argument("--focal-length", type=float, metavar="PX", help="focal length of rectified images, or of the depth images (not the colour ones), in pixels")
     pair.add_argument("--baseline", type=options.metres, metavar="M", help="distance of the cameras, metres")
@@ -178,7 +178,7 @@ def convert_recording(args, file, out):
 
 
 def draw(args, out, snapshot=False):
-    words = ["striprender", f"azimuth={args.turn}", "!", size_caps(args.output_size, media="video/x-raw"), *"! videoconvert ! pngenc".split()]
+    words = ["striprender", f"azimuth={args.azimuth}", "!", size_caps(args.output_size, media="video/x-raw"), *"! videoconvert ! pngenc".split()]
     return words + (["snapshot=true"] if snapshot else []) + ["!", "filesink", f"location={out}"]
 
 

@@ -209,7 +209,7 @@ SHARED = {
     "--orbit": dict(type=degrees, metavar="DEG", default="0", help="orbit, degrees per second (default %(default)s)"),
     "--near": dict(type=metres, metavar="M", help="nearest depth, metres"),
     "--far": dict(type=metres, metavar="M", help="farthest depth, metres"),
-    "--turn": dict(type=degrees, metavar="DEG", default="20", help="azimuth of the rendered view from the camera's (default 20)"),
+    "--azimuth": dict(type=degrees, metavar="DEG", default="20", help="azimuth of the rendered view from the camera's (default 20)"),
     "--base-port": dict(type=number(1024, 65000), metavar="PORT"),
     "--listen": dict(type=port, metavar="PORT", required=True, help="UDP port of the stream"),
     "--to": dict(type=addresses, metavar="HOST:PORT[,...]", required=True, help="where viewers listen, or a multicast group"),

@@ -29,7 +29,7 @@ def positive(text):
 
 def add_import(parser):
     parser.add_argument("files", nargs="+", type=options.existing_file, metavar="FILE", help="the calibration")
-    parser.add_argument("--cameras", type=pair_of_names, metavar="LEFT,RIGHT", help="which of several cameras, e.g. cam2,cam3")
+    parser.add_argument("--pair", type=pair_of_names, metavar="LEFT,RIGHT", help="which of several cameras, e.g. cam2,cam3")
     options.add(parser, "--out", help="rig file to write: .yaml")
     parser.add_argument("--append", action="store_true", help="add the view to the rig file")
     options.add(parser, "--view", default=0)
@@ -51,12 +51,12 @@ def pair_of_names(text):
 def choose(cameras, args):
     """Left and right, of one size."""
     names = list(cameras)
-    for name in args.cameras or []:
+    for name in args.pair or []:
         fail_unless(name in cameras, f"has no camera {name}, only {', '.join(names)}")
     fail_unless(len(names) > 1, ONE_CAMERA)
-    chosen = args.cameras or names[:2]
-    if len(names) > 2 and not args.cameras:
-        print(f"rangecast import: took cameras {' and '.join(chosen)} of {', '.join(names)}; --cameras chooses others", file=sys.stderr)
+    chosen = args.pair or names[:2]
+    if len(names) > 2 and not args.pair:
+        print(f"rangecast import: took cameras {' and '.join(chosen)} of {', '.join(names)}; --pair chooses others", file=sys.stderr)
     left, right = pair = [cameras[name] for name in chosen]
     for one in pair:
         fail_unless(one.size or args.size, "the files have no image size: give --size WIDTHxHEIGHT")
@@ -119,8 +119,8 @@ def import_rig(args):
     checked = subprocess.run(["rig-check", file.name], capture_output=True, text=True, check=False)  # says what stereodepth would say
     if checked.returncode != 0:
         os.unlink(file.name)
-        right, left = reversed(args.cameras or list(cameras)[:2])
-        cure = f": --cameras {right},{left} swaps them" if "swapped" in checked.stderr else ""
+        right, left = reversed(args.pair or list(cameras)[:2])
+        cure = f": --pair {right},{left} swaps them" if "swapped" in checked.stderr else ""
         raise Fail(f"{args.files[-1]}: " + checked.stderr.strip().removeprefix("rig-check: ").removeprefix(f"{file.name}: ") + cure)
     sys.stderr.write(checked.stderr.replace("rig-check:", "rangecast import:"))
     os.chmod(file.name, 0o644)

@@ -16,7 +16,7 @@ def add_webcam(parser):
     source = parser.add_mutually_exclusive_group()
     source.add_argument("--device", default="/dev/video0", metavar="FILE", help="the camera (default /dev/video0): packs both images into one")
     options.add(source, "--source", help="another source of packed images, in gst-launch-1.0 syntax")
-    source.add_argument("--camera", metavar="WHAT", help=f"a depth camera instead: {DEPTH_CAMERAS}")
+    source.add_argument("--depth-camera", metavar="WHAT", help=f"a depth camera instead: {DEPTH_CAMERAS}")
     parser.add_argument("--packing", choices=("side-by-side", "top-bottom"), default="side-by-side", help="default side-by-side")
     options.add(parser, "--size", default=None, help="size of the packed images (default 1280x480), or of V4L2's depth and colour (640x480)")
     options.add(parser, "--fps", default=30)
@@ -33,10 +33,10 @@ def add_webcam(parser):
 def build_webcam(args):
     fail_unless(args.png or args.print or has_display(), "no display: neither DISPLAY nor WAYLAND_DISPLAY is set; use --png FILE")
     fail_unless(args.learn or args.settle is None, "--settle needs --learn")
-    args.size = args.size or ((640, 480) if args.camera else (1280, 480))
+    args.size = args.size or ((640, 480) if args.depth_camera else (1280, 480))
     launch = Launch()
-    if args.camera:
-        add_depth_camera(launch, args.camera, args, args.rig and options.existing_file(args.rig), 0)
+    if args.depth_camera:
+        add_depth_camera(launch, args.depth_camera, args, args.rig and options.existing_file(args.rig), 0)
     else:
         add_stereo_camera(launch, args)
     settle = args.settle if args.settle is not None else 0 if args.source else 10 * args.fps

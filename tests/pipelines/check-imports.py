@@ -122,8 +122,8 @@ def opencv():
     run("named.yml")
     expect("width and height by name", np.array(yaml.safe_load(Path("rig.yaml").read_text().split("---")[1])["views"][0]["image_size"]), SIZE)
     Path("swapped.json").write_text(json.dumps(nested | {"stereo": {"R": ROTATION.T.tolist(), "T": (-ROTATION.T @ T).tolist()}}))
-    refused("swapped", "swapped: --cameras right,left swaps them", "swapped.json")
-    check("swapped back", (K2, FIVE2, K1, FIVE1, ROTATION, T), "swapped.json", "--cameras", "right,left")
+    refused("swapped", "swapped: --pair right,left swaps them", "swapped.json")
+    check("swapped back", (K2, FIVE2, K1, FIVE1, ROTATION, T), "swapped.json", "--pair", "right,left")
     refused("no size", "give --size WIDTHxHEIGHT", "lists.json")
     refused("another size", "outside of an image", "lists.json", "--size", "640x480")
     expect("a larger size", run("lists.json", "--size", "2600x1462")[1].count("far from the centre"), 2)
@@ -159,12 +159,12 @@ def kalibr():
     chain = {"cam0": cam(K2, FIVE2), "cam1": cam(K1, FIVE1, T_cn_cnm1=step.tolist()), "cam2": cam(K2, FIVE2, T_cn_cnm1=step.tolist())}
     Path("camchain.yaml").write_text(yaml.dump(chain))
     check("Kalibr", (K2, FIVE2[:4], K1, FIVE1[:4], ROTATION, T), "camchain.yaml")
-    check("Kalibr, second pair", (K1, FIVE1[:4], K2, FIVE2[:4], ROTATION, T), "camchain.yaml", "--cameras", "cam1,cam2")
+    check("Kalibr, second pair", (K1, FIVE1[:4], K2, FIVE2[:4], ROTATION, T), "camchain.yaml", "--pair", "cam1,cam2")
     both = step @ step
-    check("Kalibr, over two steps", (K2, FIVE2[:4], K2, FIVE2[:4], both[:3, :3], both[:3, 3]), "camchain.yaml", "--cameras", "cam0,cam2")
-    run("camchain.yaml", "--cameras", "cam0,cam1")
-    run("camchain.yaml", "--cameras", "cam2,cam1", "--view", "1", "--append")  # swapped, so that rig.yaml must not change
-    run("camchain.yaml", "--cameras", "cam1,cam2", "--view", "1", "--append")
+    check("Kalibr, over two steps", (K2, FIVE2[:4], K2, FIVE2[:4], both[:3, :3], both[:3, 3]), "camchain.yaml", "--pair", "cam0,cam2")
+    run("camchain.yaml", "--pair", "cam0,cam1")
+    run("camchain.yaml", "--pair", "cam2,cam1", "--view", "1", "--append")  # swapped, so that rig.yaml must not change
+    run("camchain.yaml", "--pair", "cam1,cam2", "--view", "1", "--append")
     views = [view["world_from_view"] for view in yaml.safe_load(Path("rig.yaml").read_text().split("---")[1])["views"]]
     first, second = ((np.array(pose["rotation"]).reshape(3, 3), np.array(pose["translation"])) for pose in views)
     expect("Kalibr, views of one world", first[0].T @ second[0], ROTATION.T)
@@ -178,8 +178,8 @@ def kalibr():
     rounded = {"cam0": chain["cam0"], "cam1": chain["cam1"] | {"T_cn_cnm1": np.round(step, 4).tolist()}}
     Path("rounded.yaml").write_text(yaml.dump(rounded))
     check("rounded rotation", (K2, FIVE2[:4], K1, FIVE1[:4], cv2.Rodrigues(cv2.Rodrigues(np.round(ROTATION, 4))[0])[0], np.round(T, 4)), "rounded.yaml")
-    refused("Kalibr, swapped", "swapped", "camchain.yaml", "--cameras", "cam1,cam0")
-    refused("Kalibr, no such camera", "has no camera cam7, only cam0, cam1, cam2", "camchain.yaml", "--cameras", "cam0,cam7")
+    refused("Kalibr, swapped", "swapped", "camchain.yaml", "--pair", "cam1,cam0")
+    refused("Kalibr, no such camera", "has no camera cam7, only cam0, cam1, cam2", "camchain.yaml", "--pair", "cam0,cam7")
     for names in ({"distortion_model": "equidistant"}, {"camera_model": "omni"}, {"camera_model": "ds"}):
         Path("camchain.yaml").write_text(yaml.dump({**chain, "cam1": chain["cam1"] | names}))
         refused(f"Kalibr {names}", "is not supported", "camchain.yaml")
@@ -233,7 +233,7 @@ def kitti():
     Path("matrices.txt").write_text("".join(line("", p[camera])[2:] for camera in (0, 1)))
     check("KITTI without names", (K1, NO, K1, NO, np.eye(3), np.array([-0.5371, 0, 0])), "matrices.txt", "--size", "1280x720")
     between = np.linalg.solve(K1, p[3][:, 3]) - np.linalg.solve(K1, p[2][:, 3])
-    check("KITTI colour", (K1, NO, K1, NO, np.eye(3), between), "calib.txt", "--size", "1280x720", "--cameras", "2,3")
+    check("KITTI colour", (K1, NO, K1, NO, np.eye(3), between), "calib.txt", "--size", "1280x720", "--pair", "2,3")
 
 
 def zed():

@@ -172,20 +172,20 @@ test_openni_recording_shows_the_head_with_intrinsics_unit_and_mirroring_of_the_c
   record_head
   local source_dir=$source_dir/tests/pipelines
   python3 "$source_dir/write-oni.py" head.oni 160x120 10 53.1301 depth.raw colour.raw --tenth-mm
-  rangecast webcam --camera openni2=head.oni --print >string.txt
+  rangecast webcam --depth-camera openni2=head.oni --print >string.txt
   grep -q 'depth-scale=0.0001 focal-length=160.00' string.txt || fail "$(cat string.txt)"
-  rangecast webcam --camera openni2=head.oni --png head.png
+  rangecast webcam --depth-camera openni2=head.oni --png head.png
   expect_file head.png 50000
   python3 "$source_dir/write-oni.py" mirrored.oni 160x120 10 60 depth.raw colour.raw --mirror
   rangecast camera --input openni2=mirrored.oni --view 1 --rig rig.yaml --to 127.0.0.1:5000 --depth far=2 --print >string.txt
   [ "$(grep -c 'videoflip video-direction=horiz' string.txt)$(grep -c 'rig=rig.yaml view-id=1 depth-scale=0.001 far=2' string.txt)" = 21 ] ||
     fail "$(cat string.txt)"
   python3 "$source_dir/write-oni.py" wide.oni 160x120 10 60 depth.raw colour.raw --wide-colour
-  expect_error "colour is 320x120 but depth 160x120" rangecast webcam --camera openni2=wide.oni --png none.png
-  expect_error "no OpenNI 2 camera or recording none.oni" rangecast webcam --camera openni2=none.oni --png none.png
-  rangecast webcam --camera openni2=1d27/0609@1/2 --print 2>&1 >string.txt | grep -q 'are left out' || fail "no warning"
+  expect_error "colour is 320x120 but depth 160x120" rangecast webcam --depth-camera openni2=wide.oni --png none.png
+  expect_error "no OpenNI 2 camera or recording none.oni" rangecast webcam --depth-camera openni2=none.oni --png none.png
+  rangecast webcam --depth-camera openni2=1d27/0609@1/2 --print 2>&1 >string.txt | grep -q 'are left out' || fail "no warning"
   grep -q 'openni2src location=1d27/0609@1/2' string.txt || fail "$(cat string.txt)"
-  expect_error "'kinect' is none of: openni2" rangecast webcam --camera kinect --png none.png
+  expect_error "'kinect' is none of: openni2" rangecast webcam --depth-camera kinect --png none.png
 }
 
 # Frame i is a plane at 1 m + i cm with the grey 20 i; the first three have no colour. Each source counts from its own first frame.
@@ -235,15 +235,15 @@ done
 EOF
   chmod +x tools/v4l2-ctl
   local camera="v4l2=/dev/video2,videotestsrc is-live=true ! video/x-raw,width=160,height=120,framerate=10/1"
-  PATH=$PWD/tools:$PATH rangecast webcam --camera "$camera" --rig rig.yaml --size 160x120 --fps 10 --depth depth-scale=0.0001 --png head.png
+  PATH=$PWD/tools:$PATH rangecast webcam --depth-camera "$camera" --rig rig.yaml --size 160x120 --fps 10 --depth depth-scale=0.0001 --png head.png
   expect_file head.png 30000
   local wrong
   for wrong in SIZE=320/240 PIXELS=YUYV STRIDE=3200; do
     PATH=$PWD/tools:$PATH expect_error "/dev/video2 has no 160x120 of Z16 without padding" \
-      env "$wrong" rangecast webcam --camera "$camera" --rig rig.yaml --size 160x120 --png none.png
+      env "$wrong" rangecast webcam --depth-camera "$camera" --rig rig.yaml --size 160x120 --png none.png
   done
-  expect_error "v4l2 needs --rig" rangecast webcam --camera "$camera" --png none.png
-  rangecast webcam --camera v4l2=/dev/video2,/dev/video4 --rig rig.yaml --png none.png --print >string.txt
+  expect_error "v4l2 needs --rig" rangecast webcam --depth-camera "$camera" --png none.png
+  rangecast webcam --depth-camera v4l2=/dev/video2,/dev/video4 --rig rig.yaml --png none.png --print >string.txt
   grep -q '^v4l2-ctl -d /dev/video2 .*--stream-to=- | rangecast-run .*fdsrc' string.txt || fail "$(cat string.txt)"
   grep -q 'colour-view-id=1' string.txt || fail "$(cat string.txt)"
 }
