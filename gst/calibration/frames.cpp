@@ -106,22 +106,26 @@ MappedImages::open (CalibrationImages &set, std::size_t i)
   }
 }
 
-PadFronts::PadFronts (const CameraInputs &cameras, bool live)
+CameraHeads::CameraHeads (const CameraInputs &cameras, GstClockTime tolerance, bool live)
+    : list (cameras.size ())
 {
   for (std::size_t i = 0; i < cameras.size (); i++) {
-    GstAggregatorPad *pad = cameras[i]->aggregator_pad ();
-    if (GstBuffer *buffer = gst_aggregator_pad_peek_buffer (pad))
-      list.push_back ({i, buffer, gstrange::capture_time_of (pad, buffer, live),
-          gstrange::running_time_of (pad, buffer)});
-    else
-      (gst_aggregator_pad_is_eos (pad) ? ended : missing)++;
+    PadStream &head = list[i];
+    head.pad = cameras[i]->aggregator_pad ();
+    head.peek (tolerance);
+    head.required = head.head == MatchStream::Head::kFrame;
+    if (head.buffer)
+      head.time = gstrange::capture_time_of (head.pad, head.buffer, live);
+    if (head.head == MatchStream::Head::kGap)
+      head.end = gstrange::gap_end (head.time, head.buffer, tolerance);
+    order.push_back (&head);
   }
 }
 
-PadFronts::~PadFronts ()
+CameraHeads::~CameraHeads ()
 {
-  for (const Front &front : list)
-    gst_buffer_unref (front.buffer);
+  for (PadStream &head : list)
+    head.release ();
 }
 
 GstClockTime
@@ -135,37 +139,8 @@ max_capture_skew (const CameraInputs &cameras)
   return gstrange::pairing_tolerance (shortest);
 }
 
-bool
-drop_unmatched (const CameraInputs &cameras, const PadFronts &fronts, GstClockTime tolerance,
-    GstDebugCategory *category, guint64 &dropped)
-{
-  GstClockTime latest = 0;
-  for (const auto &front : fronts.list)
-    if (!gstrange::is_gap (front.buffer))
-      latest = std::max (latest, front.capture);
-  const bool starting =
-      std::ranges::any_of (cameras, [] (const auto &camera) { return !camera->info; });
-  bool any = false;
-  for (const auto &front : fronts.list) {
-    const bool gap = gstrange::is_gap (front.buffer);
-    if (!gap && !starting && latest - front.capture <= tolerance)
-      continue;
-    GstAggregatorPad *pad = cameras[front.camera]->aggregator_pad ();
-    if (!gap && starting)
-      GST_CAT_DEBUG_OBJECT (category, pad, "dropping image: another camera has no caps yet");
-    else if (!gap)
-      GST_CAT_DEBUG_OBJECT (category, pad,
-          "dropping image: captured %.1f ms before the newest, tolerance %.1f ms",
-          double (latest - front.capture) / GST_MSECOND, double (tolerance) / GST_MSECOND);
-    gst_aggregator_pad_drop_buffer (pad);
-    dropped += !gap;
-    any = true;
-  }
-  return any;
-}
-
 std::shared_ptr<CalibrationImages>
-pop_images (const CameraInputs &cameras, const PadFronts &fronts, guint64 number)
+pop_images (const CameraInputs &cameras, const CameraHeads &heads, guint64 number)
 {
   auto set = std::make_shared<CalibrationImages> ();
   set->cameras = cameras;
@@ -178,11 +153,13 @@ pop_images (const CameraInputs &cameras, const PadFronts &fronts, guint64 number
     set->described.push_back (std::move (described));
     set->infos.push_back (*camera->info);
   }
-  for (const auto &front : fronts.list) {
-    set->buffers[front.camera] =
-        gst_aggregator_pad_pop_buffer (cameras[front.camera]->aggregator_pad ());
-    set->capture = std::max (set->capture, front.capture);
-    set->running = std::min (set->running, front.running); /* NONE is the maximum */
+  for (std::size_t i = 0; i < cameras.size (); i++) {
+    const PadStream &head = heads.list[i];
+    if (!head.in_set)
+      continue;
+    set->buffers[i] = gst_aggregator_pad_pop_buffer (head.pad);
+    set->capture = std::max (set->capture, head.time);
+    set->running = std::min (set->running, head.running); /* NONE is the maximum */
   }
   if (!GST_CLOCK_TIME_IS_VALID (set->running))
     set->capture = number * 2 * GST_SECOND; /* unknown: so far apart that no motion is inferred */

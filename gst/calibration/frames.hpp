@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include "common/matcher.hpp"
 #include "common/videoframereader.hpp"
 
 #include <memory>
@@ -76,35 +77,22 @@ private:
   std::vector<CameraInput *> open_;
 };
 
-/** The oldest image of every pad. */
-class PadFronts {
-public:
-  struct Front {
-    std::size_t camera;
-    GstBuffer *buffer; /* reference */
-    GstClockTime capture, running;
-  };
+/** What waits at every pad, by camera; times are of capture. An image that waits is required: its
+ *  set has it, or it is dropped. */
+struct CameraHeads {
+  CameraHeads (const CameraInputs &cameras, GstClockTime tolerance, bool live);
+  ~CameraHeads ();
+  CameraHeads (const CameraHeads &) = delete;
+  CameraHeads &operator= (const CameraHeads &) = delete;
 
-  PadFronts (const CameraInputs &cameras, bool live);
-  ~PadFronts ();
-  PadFronts (const PadFronts &) = delete;
-  PadFronts &operator= (const PadFronts &) = delete;
-
-  std::vector<Front> list;
-  int missing = 0, ended = 0; ///< pads without an image that wait for one; that are at EOS
+  std::vector<PadStream> list;
+  std::vector<MatchStream *> order; ///< for match_streams()
 };
 
 /** Maximum difference of the capture times of one set, ns: half a frame of the fastest camera, or
  *  5 ms. */
 GstClockTime max_capture_skew (const CameraInputs &cameras);
 
-/** Drops GAPs, images that are older than the newest by more than the tolerance, and all images
- *  while a camera has no caps yet. Each dropped image is logged.
- *  @param[out] dropped  number of dropped images
- *  @return whether anything was dropped */
-bool drop_unmatched (const CameraInputs &cameras, const PadFronts &fronts, GstClockTime tolerance,
-    GstDebugCategory *category, guint64 &dropped);
-
-/** Takes the front images off their pads. */
+/** Takes the images of a set off their pads. */
 std::shared_ptr<CalibrationImages> pop_images (
-    const CameraInputs &cameras, const PadFronts &fronts, guint64 number);
+    const CameraInputs &cameras, const CameraHeads &heads, guint64 number);

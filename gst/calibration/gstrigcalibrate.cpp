@@ -397,19 +397,27 @@ gst_rig_calibrate_aggregate (GstAggregator *aggregator, gboolean timeout)
   if (std::ranges::any_of (cameras, [] (const auto &camera) { return camera->refused; }))
     return GST_FLOW_ERROR;
   const bool live = gst_aggregator_get_latency (aggregator) != GST_CLOCK_TIME_NONE;
-  const PadFronts fronts (cameras, live);
-  if (fronts.list.empty () && fronts.missing == 0 && fronts.ended > 0)
-    return finish (self, cameras);
-  if (fronts.list.empty () || (fronts.missing > 0 && !timeout))
-    return GST_AGGREGATOR_FLOW_NEED_DATA;
   const GstClockTime tolerance = max_capture_skew (cameras);
-  guint64 dropped = 0;
-  if (drop_unmatched (cameras, fronts, tolerance, GST_CAT_DEFAULT, dropped)) {
-    std::lock_guard guard (priv->lock);
-    priv->dropped += dropped;
-    return GST_AGGREGATOR_FLOW_NEED_DATA; /* aggregate is called again with the next buffers */
-  }
-  return examine_set (self, pop_images (cameras, fronts, priv->sets++), live);
+  CameraHeads heads (cameras, tolerance, live);
+  MatchStream *unmatched = nullptr;
+  const MatchStep step = match_streams (heads.order, tolerance, timeout, unmatched);
+  if (step == MatchStep::kWait || cameras.empty ())
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  if (step == MatchStep::kEnd)
+    return finish (self, cameras);
+  const bool starting =
+      std::ranges::any_of (cameras, [] (const auto &camera) { return !camera->info; });
+  if (step == MatchStep::kSet && !starting)
+    return examine_set (self, pop_images (cameras, heads, priv->sets++), live);
+  for (const PadStream &head : heads.list)
+    if (step == MatchStep::kSet ? head.in_set : &head == unmatched) {
+      GST_DEBUG_OBJECT (head.pad, "dropping %" GST_PTR_FORMAT ": %s", head.buffer,
+          starting ? "another camera has no caps yet" : "it matches no image of another camera");
+      gst_aggregator_pad_drop_buffer (head.pad);
+      std::lock_guard guard (priv->lock);
+      priv->dropped += head.required;
+    }
+  return GST_AGGREGATOR_FLOW_NEED_DATA; /* aggregate is called again with the next buffers */
 }
 
 /* A late camera is waited for until `latency` after the oldest image that waits arrived, not after
@@ -420,13 +428,15 @@ gst_rig_calibrate_get_next_time (GstAggregator *aggregator)
   GstRigCalibratePrivate *priv = GST_RIG_CALIBRATE (aggregator)->priv;
   GstClockTime oldest = GST_CLOCK_TIME_NONE;
   const CameraInputs cameras = current_cameras (GST_RIG_CALIBRATE (aggregator));
-  for (const auto &camera : cameras)
-    if (!gst_aggregator_pad_has_buffer (camera->aggregator_pad ()))
+  for (const auto &camera : cameras) {
+    GstBuffer *buffer = gst_aggregator_pad_peek_buffer (camera->aggregator_pad ());
+    if (buffer)
+      oldest = std::min (oldest, gstrange::running_time_of (camera->aggregator_pad (), buffer));
+    else
       GST_LOG_OBJECT (camera->pad, "waiting for %s",
           gst_pad_has_current_caps (GST_PAD (camera->pad)) ? "an image" : "caps and an image");
-  const PadFronts fronts (cameras, true);
-  for (const PadFronts::Front &front : fronts.list)
-    oldest = std::min (oldest, front.running);
+    gst_clear_buffer (&buffer);
+  }
   if (oldest != priv->waiting) {
     priv->waiting = oldest;
     priv->waiting_since = gst_element_get_current_running_time (GST_ELEMENT (aggregator));
