@@ -2,7 +2,6 @@
 #include "seek.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <vector>
 
 using rangecast::AccessUnitPlace;
@@ -94,9 +93,8 @@ NeighbourCodeSeek::interrupt ()
   times_.seek ();
 }
 
-/* Finds the key access unit for a seek, and adds it to the index of the base class, which has only
- * what was played. @return its time; none if the file has no times */
-GstClockTime
+/* Finds the key access unit for a seek, and its time; none if the file has no times. */
+std::optional<std::pair<AccessUnitPlace, GstClockTime>>
 NeighbourCodeSeek::find_place (GstBaseParse *base, GstClockTime time, GstSeekFlags flags)
 {
   std::optional<guint64> first;
@@ -105,14 +103,12 @@ NeighbourCodeSeek::find_place (GstBaseParse *base, GstClockTime time, GstSeekFla
     first = times_.first_ns ();
   }
   if (!first)
-    return GST_CLOCK_TIME_NONE;
+    return std::nullopt;
   const guint64 pts = *first + std::min (time, rangecast::kNoTime - 1 - *first);
   const auto chosen = choose (file_of (base).locate (pts), pts, flags);
   if (!chosen)
-    return GST_CLOCK_TIME_NONE;
-  const GstClockTime found = chosen->header.pts_ns - std::min (chosen->header.pts_ns, *first);
-  gst_base_parse_add_index_entry (base, chosen->offset, found, TRUE, TRUE);
-  return found;
+    return std::nullopt;
+  return {{*chosen, chosen->header.pts_ns - std::min (chosen->header.pts_ns, *first)}};
 }
 
 GstEvent *
@@ -133,13 +129,18 @@ NeighbourCodeSeek::handle_seek (GstBaseParse *base, GstEvent *event)
   if (!is_pulling (base) || format != GST_FORMAT_TIME || start_type != GST_SEEK_TYPE_SET ||
       start < 0)
     return event;
-  const GstClockTime found = find_place (base, GstClockTime (start), flags);
-  if (!GST_CLOCK_TIME_IS_VALID (found))
-    return event;
   const auto end = stop_type == GST_SEEK_TYPE_NONE ? base->segment.stop : GstClockTime (stop);
-  if (flags & GST_SEEK_FLAG_KEY_UNIT && found <= end)
-    start = gint64 (found);
-  /* The base class uses its index only for accurate seeks. */
+  auto found = find_place (base, GstClockTime (start), flags);
+  const bool snaps = flags & GST_SEEK_FLAG_KEY_UNIT && found && found->second <= end;
+  if (found && found->second > end)
+    found = find_place (base, GstClockTime (start), GST_SEEK_FLAG_NONE);
+  if (!found)
+    return event;
+  if (snaps)
+    start = gint64 (found->second);
+  /* The base class uses its index only for accurate seeks; by a time between two entries it finds
+   * access units that are no key (GStreamer 1.22). */
+  gst_base_parse_add_index_entry (base, found->first.offset, GstClockTime (start), TRUE, TRUE);
   flags = GstSeekFlags (flags | GST_SEEK_FLAG_ACCURATE);
   GstEvent *result = gst_event_new_seek (rate, format, flags, start_type, start, stop_type, stop);
   gst_event_set_seqnum (result, gst_event_get_seqnum (event));

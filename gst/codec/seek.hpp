@@ -4,7 +4,9 @@
 #include <gst/base/base.h>
 
 #include <mutex>
+#include <optional>
 #include <rangecast/neighbourcode/bitstream/byte_stream.hpp>
+#include <utility>
 
 /** Seeking by time in a file, and the times of its stream. Any thread: the lock is never held while
  *  pulling, pushing, querying or posting. */
@@ -25,7 +27,8 @@ public:
   GstEvent *handle_seek (GstBaseParse *base, GstEvent *event);
 
 private:
-  GstClockTime find_place (GstBaseParse *base, GstClockTime time, GstSeekFlags flags);
+  std::optional<std::pair<rangecast::AccessUnitPlace, GstClockTime>> find_place (
+      GstBaseParse *base, GstClockTime time, GstSeekFlags flags);
 
   std::mutex lock_; /* guards what follows */
   rangecast::StreamTimes times_;
