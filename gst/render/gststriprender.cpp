@@ -308,15 +308,23 @@ gst_strip_render_update_src_caps (GstAggregator *aggregator, GstCaps *wanted, Gs
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   auto self = GST_STRIP_RENDER (aggregator);
   GstCaps *output = caps_of_backend (self, wanted);
-  if (gst_caps_is_empty (output)) {
-    gst_caps_unref (output);
-    GST_ELEMENT_ERROR (self, RESOURCE, NOT_FOUND,
-        ("backend=opengl: striprender was built without OpenGL; use auto or software"), (nullptr));
-    return GST_FLOW_NOT_NEGOTIATED;
-  }
+  const bool built = !gst_caps_is_empty (output);
   *caps = output_caps (output, wanted);
   gst_caps_unref (output);
-  return GST_FLOW_OK;
+  if (!gst_caps_is_empty (*caps))
+    return GST_FLOW_OK;
+  gst_clear_caps (caps);
+  const RenderBackendChoice choice = settings_of (self->priv).backend;
+  const char *reason =
+      !built ? "striprender was built without OpenGL; use backend=auto"
+      : choice == RenderBackendChoice::kOpenGl
+          ? "backend=opengl outputs OpenGL memory; add gldownload, or use backend=auto"
+      : choice == RenderBackendChoice::kSoftware
+          ? "backend=software outputs system memory; add glupload, or use backend=auto"
+          : "frame rates end at 1000/1";
+  GST_ELEMENT_ERROR (self, CORE, NEGOTIATION, ("Downstream accepts no output: %s", reason),
+      ("downstream: %" GST_PTR_FORMAT, wanted));
+  return GST_FLOW_NOT_NEGOTIATED;
 }
 
 static gboolean

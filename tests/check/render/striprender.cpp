@@ -319,6 +319,31 @@ GST_START_TEST (test_opengl_is_left_as_it_was)
 }
 GST_END_TEST;
 
+GST_START_TEST (test_backend_that_does_not_fit_downstream_is_an_error_that_says_how)
+{
+  const std::pair<const char *, const char *> cases[] = {
+      {"backend=opengl ! video/x-raw", "add gldownload"},
+      {"backend=software ! video/x-raw(memory:GLMemory)", "add glupload"},
+      {"! video/x-raw,framerate=5000/1", "1000/1"}};
+  for (const auto &[output, cure] : cases) {
+    const auto line =
+        std::string ("avatartestsrc num-buffers=1 ! striprender ") + output + " ! fakesink";
+    GstElement *pipeline = gst_parse_launch (line.c_str (), nullptr);
+    GstBus *bus = gst_element_get_bus (pipeline);
+    gst_element_set_state (pipeline, GST_STATE_PAUSED);
+    GstMessage *message = gst_bus_timed_pop_filtered (bus, GST_CLOCK_TIME_NONE, GST_MESSAGE_ERROR);
+    GError *error = nullptr;
+    gst_message_parse_error (message, &error, nullptr);
+    fail_unless (strstr (error->message, cure), "%s: %s", output, error->message);
+    g_error_free (error);
+    gst_message_unref (message);
+    gst_element_set_state (pipeline, GST_STATE_NULL);
+    gst_object_unref (bus);
+    gst_object_unref (pipeline);
+  }
+}
+GST_END_TEST;
+
 /* Mesa's variables make an OpenGL that is too old. */
 GST_START_TEST (test_old_opengl_is_one_error_that_says_so)
 {
@@ -425,6 +450,7 @@ striprender_suite ()
   tcase_add_test (tc, test_gap_before_the_first_frame_set_passes_with_its_segment);
   tcase_add_test (tc, test_gap_and_eos_and_flush_pass_and_it_goes_on);
   tcase_add_test (tc, test_opengl_is_left_as_it_was);
+  tcase_add_test (tc, test_backend_that_does_not_fit_downstream_is_an_error_that_says_how);
   tcase_add_test (tc, test_old_opengl_is_one_error_that_says_so);
   tcase_add_test (tc, test_pictures_larger_than_opengl_has_are_one_error);
   tcase_add_test (tc, test_view_that_the_rig_lacks_is_one_error);
