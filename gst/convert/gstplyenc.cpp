@@ -77,38 +77,6 @@ gst_ply_enc_set_caps (GstBaseTransform *base, GstCaps *in, GstCaps *out)
   return gst_range_flow_return (GST_ELEMENT (self), status) == GST_FLOW_OK;
 }
 
-/* Writes the file into a new buffer. */
-static rangecast::Status
-write_file (GstPlyEnc *self, GstBuffer *input, GstBuffer *&output)
-{
-  const gstrange::RangeFrameMap frame (input, GST_MAP_READ);
-  if (!frame.status ().ok ())
-    return frame.status ();
-  if (self->priv->is_glb) {
-    auto file = std::make_unique<std::vector<guint8>> ();
-    const auto status = rangecast::write_glb (frame.views (), self->priv->info.rig, *file);
-    if (!status.ok ())
-      return status;
-    std::vector<guint8> &bytes = *file;
-    output = gst_buffer_new_wrapped_full (GstMemoryFlags (0), bytes.data (), bytes.size (), 0,
-        bytes.size (), file.release (),
-        [] (gpointer vector) { delete static_cast<std::vector<guint8> *> (vector); });
-    return status;
-  }
-  const rangecast::PointCloudWriter writer (settings_of (self->priv));
-  std::size_t points = 0;
-  for (const auto &view : frame.views ())
-    points += rangecast::count_points (view);
-  GST_LOG_OBJECT (self, "%zu points, %zu bytes", points, writer.size (points));
-  output = gst_buffer_new_allocate (nullptr, writer.size (points), nullptr);
-  GstMapInfo map;
-  gst_buffer_map (output, &map, GST_MAP_WRITE);
-  const rangecast::Status status =
-      writer.write (frame.views (), self->priv->info.rig, {map.data, map.size});
-  gst_buffer_unmap (output, &map);
-  return status;
-}
-
 /* Whether downstream, a filesink for example, puts all buffers into one file. */
 static bool
 is_one_file (GstBaseTransform *base)
@@ -125,6 +93,40 @@ is_one_file (GstBaseTransform *base)
   }
   gst_query_unref (query);
   return bytes;
+}
+
+/* Writes the file into a new buffer. */
+static rangecast::Status
+write_file (GstPlyEnc *self, GstBuffer *input, GstBuffer *&output)
+{
+  const gstrange::RangeFrameMap frame (input, GST_MAP_READ);
+  if (!frame.status ().ok ())
+    return frame.status ();
+  std::size_t points = 0;
+  for (const auto &view : frame.views ())
+    points += rangecast::count_points (view);
+  if (points == 0 && is_one_file (GST_BASE_TRANSFORM (self)))
+    return {rangecast::StatusCode::kBadData, "the frame set has no points, nor would the file"};
+  if (self->priv->is_glb) {
+    auto file = std::make_unique<std::vector<guint8>> ();
+    const auto status = rangecast::write_glb (frame.views (), self->priv->info.rig, *file);
+    if (!status.ok ())
+      return status;
+    std::vector<guint8> &bytes = *file;
+    output = gst_buffer_new_wrapped_full (GstMemoryFlags (0), bytes.data (), bytes.size (), 0,
+        bytes.size (), file.release (),
+        [] (gpointer vector) { delete static_cast<std::vector<guint8> *> (vector); });
+    return status;
+  }
+  const rangecast::PointCloudWriter writer (settings_of (self->priv));
+  GST_LOG_OBJECT (self, "%zu points, %zu bytes", points, writer.size (points));
+  output = gst_buffer_new_allocate (nullptr, writer.size (points), nullptr);
+  GstMapInfo map;
+  gst_buffer_map (output, &map, GST_MAP_WRITE);
+  const rangecast::Status status =
+      writer.write (frame.views (), self->priv->info.rig, {map.data, map.size});
+  gst_buffer_unmap (output, &map);
+  return status;
 }
 
 /* Writes the file, too: the buffer's size depends on the number of points. */

@@ -158,7 +158,8 @@ FILMS = {
 
 
 def convert_recording(args, file, out):
-    unused = [args.rig, args.near, args.far, args.focal_length, args.baseline, args.learn, args.fps, args.size, args.depth, args.person]
+    unused = [args.rig, args.near, args.far, args.focal_length, args.baseline, args.learn, args.fps, args.size, args.depth, args.person,
+              args.view, args.azimuth != "20"]  # fmt: skip
     fail_unless(not any(unused), "a recording has its geometry: leave the options of cameras and videos out")
     options.recording(file)
     suffix = Path(out).suffix.lower()

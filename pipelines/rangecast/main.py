@@ -24,7 +24,7 @@ COMMANDS = {
     "parent": (add_parent, "the parent: combines the views of all camera hosts by capture time and sends them to viewers"),
     "view": (add_view, "a viewer: renders a stream in a window or to a video"),
     "record": (add_record, "record a stream, or the built-in figure"),
-    "play": (add_play, "play a recording in a window or to a video"),
+    "play": (add_play, "play a recording in a window"),
     "webcam": (add_webcam, "a USB stereo camera to an avatar in a window"),
     "calibrate": (add_calibrate, "calibrate cameras from images of a board"),
     "import": (add_import, "a stereo pair's calibration in another format to a rig file\n\n" + IMPORT_HELP),
@@ -42,7 +42,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def make_parser():
-    parser = Parser(prog="rangecast", description="Live 3D avatars. Each command builds a GStreamer launch string and runs it.",
+    parser = Parser(prog="rangecast", description="Live 3D avatars. Most commands build a GStreamer launch string and run it.",
                                      epilog="rangecast COMMAND --help lists the options of a command.")  # fmt: skip
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", dest="command")
@@ -51,7 +51,7 @@ def make_parser():
                                       allow_abbrev=False)  # fmt: skip
         command.set_defaults(run=lambda args, launch: launch.run())
         add(command)
-        if not command.get_default("main"):  # those that run a pipeline
+        if not command.get_default("main") and command.get_default("print") is None:  # those that only run a pipeline
             command.add_argument("--print", action="store_true", help="print the launch string, for a shell, instead of running it")
     return parser
 

@@ -55,7 +55,7 @@ class Processes:
 
     def start(self, name, launch, log=None, **options):
         if self.print_only:
-            print(launch.text())
+            print(launch.text() + (" &" if name != "viewer" else ""))
             return None
         if log:
             options |= {"stdout": open(log, "w"), "stderr": subprocess.STDOUT}  # noqa: SIM115

@@ -28,7 +28,7 @@ def add_publish(parser):
     parser.add_argument("--record", type=options.output_file, metavar="FILE", help="write the whole stream to a recording, too")
     options.add(parser, "--source", help="publish what ends with coded frame sets, e.g. '... ! neighbourcodeenc'")
     options.add_receiver(parser, listen_required=False)
-    parser.set_defaults(build=build_publish, run=run_publish, pipes=None)
+    parser.set_defaults(build=build_publish, run=run_publish, print=False)
 
 
 def build_publish(args):
@@ -40,14 +40,13 @@ def build_publish(args):
         transport.receive_in_sync(args, launch)
     else:
         launch.add(*(args.source or [*transport.LIVE_FIGURE, f"key-interval={1000 * args.segment}"]))
-    if not args.print:
-        fail_unless(Path(args.folder).is_dir() and os.access(args.folder, os.W_OK), f"no folder '{args.folder}' that can be written")
-        args.lock = lock(args.folder)
-        if args.record:
-            fail_unless(not Path(args.folder).samefile(Path(args.record).parent), "--record: use another folder than that of the segments")
-            keep_existing(args.record)
-        args.pipes = os.pipe(), os.pipe()
-    frames, audio = [f"fdsink fd={write}" for _, write in args.pipes] if args.pipes else ["filesink location=live.rcnc", "filesink location=live.rtp"]
+    fail_unless(Path(args.folder).is_dir() and os.access(args.folder, os.W_OK), f"no folder '{args.folder}' that can be written")
+    args.lock = lock(args.folder)
+    if args.record:
+        fail_unless(not Path(args.folder).samefile(Path(args.record).parent), "--record: use another folder than that of the segments")
+        keep_existing(args.record)
+    args.pipes = os.pipe(), os.pipe()
+    frames, audio = [f"fdsink fd={write}" for _, write in args.pipes]
     launch.add(*["!", "queue"] * bool(args.audio_port), "!", *frames.split(), "async=false")
     if args.audio_port:
         launch.add("sync=true", "ts-offset=200000000")  # so that a segment's audio has arrived when the segment ends
