@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: LGPL-2.1-or-later
-# Makes README's image and film: the whole system, live, with cameras of 640x480, at a rate that two slow cores keep up. usage: docs/make-readme-images.sh [FOLDER
+# Makes README's image and film: the whole system, live, with cameras of 640x480, at a rate that two slow cores can keep up with. usage: docs/make-readme-images.sh [FOLDER
 # [MODEL.glb]], by default docs/images and the dressed head of the test data; without that, the built-in figure. Wants ffmpeg (Debian
 # package ffmpeg).
 set -euo pipefail

@@ -109,17 +109,21 @@ MappedImages::open (CalibrationImages &set, std::size_t i)
 CameraHeads::CameraHeads (const CameraInputs &cameras, GstClockTime tolerance, bool live)
     : list (cameras.size ())
 {
+  GstClockTime shift = 0; /* from running to capture time */
   for (std::size_t i = 0; i < cameras.size (); i++) {
     PadStream &head = list[i];
     head.pad = cameras[i]->aggregator_pad ();
     head.peek (tolerance);
-    head.required = head.head == MatchStream::Head::kFrame;
-    if (head.buffer)
+    if (head.head == MatchStream::Head::kFrame) {
+      head.required = true;
       head.time = gstrange::capture_time_of (head.pad, head.buffer, live);
-    if (head.head == MatchStream::Head::kGap)
-      head.end = gstrange::gap_end (head.time, head.buffer, tolerance);
+      shift = GST_CLOCK_TIME_IS_VALID (head.running) ? head.time - head.running : shift;
+    }
     order.push_back (&head);
   }
+  for (PadStream &head : list)
+    if (head.head == MatchStream::Head::kGap)
+      head.end += shift;
 }
 
 CameraHeads::~CameraHeads ()

@@ -412,7 +412,9 @@ gst_rig_calibrate_aggregate (GstAggregator *aggregator, gboolean timeout)
   for (const PadStream &head : heads.list)
     if (step == MatchStep::kSet ? head.in_set : &head == unmatched) {
       GST_DEBUG_OBJECT (head.pad, "dropping %" GST_PTR_FORMAT ": %s", head.buffer,
-          starting ? "another camera has no caps yet" : "it matches no image of another camera");
+          starting        ? "another camera has no caps yet"
+          : head.required ? "it matches no image of another camera"
+                          : "its time has passed");
       gst_aggregator_pad_drop_buffer (head.pad);
       std::lock_guard guard (priv->lock);
       priv->dropped += head.required;

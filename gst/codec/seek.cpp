@@ -138,8 +138,8 @@ NeighbourCodeSeek::handle_seek (GstBaseParse *base, GstEvent *event)
     return event;
   if (snaps)
     start = gint64 (found->second);
-  /* The base class uses its index only for accurate seeks; by a time between two entries it finds
-   * access units that are no key (GStreamer 1.22). */
+  /* The base class uses its index only for accurate seeks; by a time between two entries it may
+   * find one that is no key, or of another time (GStreamer 1.22). */
   gst_base_parse_add_index_entry (base, found->first.offset, GstClockTime (start), TRUE, TRUE);
   flags = GstSeekFlags (flags | GST_SEEK_FLAG_ACCURATE);
   GstEvent *result = gst_event_new_seek (rate, format, flags, start_type, start, stop_type, stop);

@@ -106,7 +106,8 @@ write_file (GstPlyEnc *self, GstBuffer *input, GstBuffer *&output)
   for (const auto &view : frame.views ())
     points += rangecast::count_points (view);
   if (points == 0 && is_one_file (GST_BASE_TRANSFORM (self)))
-    return {rangecast::StatusCode::kBadData, "the frame set has no points, nor would the file"};
+    return {
+        rangecast::StatusCode::kBadData, "the frame set has no points: the file would be empty"};
   if (self->priv->is_glb) {
     auto file = std::make_unique<std::vector<guint8>> ();
     const auto status = rangecast::write_glb (frame.views (), self->priv->info.rig, *file);

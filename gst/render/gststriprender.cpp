@@ -308,20 +308,18 @@ gst_strip_render_update_src_caps (GstAggregator *aggregator, GstCaps *wanted, Gs
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   auto self = GST_STRIP_RENDER (aggregator);
   GstCaps *output = caps_of_backend (self, wanted);
-  const bool built = !gst_caps_is_empty (output);
+  const bool built = !gst_caps_is_empty (output), fits = gst_caps_can_intersect (output, wanted);
   *caps = output_caps (output, wanted);
   gst_caps_unref (output);
   if (!gst_caps_is_empty (*caps))
     return GST_FLOW_OK;
   gst_clear_caps (caps);
-  const RenderBackendChoice choice = settings_of (self->priv).backend;
+  const bool by_gl = settings_of (self->priv).backend == RenderBackendChoice::kOpenGl;
   const char *reason =
-      !built ? "striprender was built without OpenGL; use backend=auto"
-      : choice == RenderBackendChoice::kOpenGl
-          ? "backend=opengl outputs OpenGL memory; add gldownload, or use backend=auto"
-      : choice == RenderBackendChoice::kSoftware
-          ? "backend=software outputs system memory; add glupload, or use backend=auto"
-          : "frame rates end at 1000/1";
+      !built  ? "striprender was built without OpenGL; use backend=auto"
+      : fits  ? "frame rates above 1000/1 are not supported"
+      : by_gl ? "backend=opengl outputs OpenGL memory; add gldownload, or use backend=auto"
+              : "backend=software outputs system memory; add glupload, or use backend=auto";
   GST_ELEMENT_ERROR (self, CORE, NEGOTIATION, ("Downstream accepts no output: %s", reason),
       ("downstream: %" GST_PTR_FORMAT, wanted));
   return GST_FLOW_NOT_NEGOTIATED;

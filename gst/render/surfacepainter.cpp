@@ -254,10 +254,10 @@ SurfacePainter::add_up () const
   gst_gl_shader_use (shader);
   std::array<rangecast::ViewCotangent, rangecast::kMaxBlendCells> cotangents;
   for (std::size_t i = 0; i < layers_.size (); i++)
-    cotangents[atlas_.cell_of[i]] =
-        rangecast::view_cotangent (picture_.clip_from_world, *layers_[i].view);
+    cotangents[atlas_.cell_of[i]] = rangecast::view_cotangent (picture_.clip_from_world,
+        *layers_[i].view, atlas_.cell_of[i], atlas_.cells, layers_.size ());
   gst_gl_shader_set_uniform_2fv (
-      shader, "u_cotangents", guint (atlas_.cells), &cotangents[0].share);
+      shader, "u_cotangents", guint (atlas_.cells), &cotangents[0].per_w);
   gst_gl_shader_set_uniform_2iv (
       shader, "u_cells", guint (atlas_.cells), atlas_.from_picture[0].data ());
   cover (shader, cells_, "u_colours");

@@ -118,8 +118,8 @@ def add_convert(parser):
     parser.add_argument("files", nargs="+", metavar="FILE", help="input files, then the file or folder to write")
     parser.add_argument("--rgbd", action="store_true", help="the input is colour and depth")
     pair = parser.add_argument_group("geometry")
-    options.add(pair, "--rig", "--near", "--far", "--azimuth")
-    options.add(pair, "--view", default=0)
+    options.add(pair, "--rig", "--near", "--far")
+    options.add(pair, "--azimuth", "--view", default=None)
     pair.add_argument("--focal-length", type=float, metavar="PX", help="focal length of rectified images, or of the depth images (not the colour ones), in pixels")
     pair.add_argument("--baseline", type=options.metres, metavar="M", help="distance of the cameras, metres")
     pair.add_argument("--depth-scale", type=options.metres, metavar="M", default="0.001", help="metres per unit of a depth image (default 0.001)")
@@ -159,7 +159,7 @@ FILMS = {
 
 def convert_recording(args, file, out):
     unused = [args.rig, args.near, args.far, args.focal_length, args.baseline, args.learn, args.fps, args.size, args.depth, args.person,
-              args.view, args.azimuth != "20"]  # fmt: skip
+              args.azimuth, args.view is not None]  # fmt: skip
     fail_unless(not any(unused), "a recording has its geometry: leave the options of cameras and videos out")
     options.recording(file)
     suffix = Path(out).suffix.lower()
@@ -179,7 +179,7 @@ def convert_recording(args, file, out):
 
 
 def draw(args, out, snapshot=False):
-    words = ["striprender", f"azimuth={args.azimuth}", "!", size_caps(args.output_size, media="video/x-raw"), *"! videoconvert ! pngenc".split()]
+    words = ["striprender", f"azimuth={args.azimuth or 20}", "!", size_caps(args.output_size, media="video/x-raw"), *"! videoconvert ! pngenc".split()]
     return words + (["snapshot=true"] if snapshot else []) + ["!", "filesink", f"location={out}"]
 
 
@@ -187,7 +187,7 @@ def convert_pair(args, left, right, out):
     calibration = [f"{name}={value}" for name, value in (("near", args.near), ("far", args.far)) if value]
     if args.rig:
         fail_unless(not (args.focal_length or args.baseline), "--rig holds --focal-length and --baseline: leave them out")
-        calibration += [f"rig={args.rig}", f"view-id={args.view}"]
+        calibration += [f"rig={args.rig}", f"view-id={args.view or 0}"]
     else:
         fail_unless(args.focal_length and args.baseline and len(calibration) == 2, "needs --rig, or --focal-length, --baseline, --near and --far")
         calibration += [f"focal-length={args.focal_length}", f"baseline={args.baseline}"]

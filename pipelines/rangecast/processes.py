@@ -45,6 +45,8 @@ class Processes:
 
     def __exit__(self, *_):
         self.held = True
+        if self.print_only:
+            print("wait")
         for how in (signal.SIGTERM, signal.SIGKILL):
             end = time.monotonic() + PATIENCE_S
             for process in self.running.values():
@@ -55,7 +57,7 @@ class Processes:
 
     def start(self, name, launch, log=None, **options):
         if self.print_only:
-            print(launch.text() + (" &" if name != "viewer" else ""))
+            print(launch.text() + " &")
             return None
         if log:
             options |= {"stdout": open(log, "w"), "stderr": subprocess.STDOUT}  # noqa: SIM115

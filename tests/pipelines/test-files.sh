@@ -29,6 +29,8 @@ test_recording_becomes_points_film_and_numbers () {
   rangecast convert recording.rcnc one.glb
   gst-launch-1.0 -q avatartestsrc location=one.glb num-buffers=1 ! fakesink # reads it with tinygltf
   expect_error "recording.rcnc' is what is converted" rangecast convert recording.rcnc ./recording.rcnc
+  expect_error "leave the options of cameras" rangecast convert recording.rcnc one.ply --view 0
+  expect_error "has no points" gst-launch-1.0 -q avatartestsrc num-buffers=1 empty-frames=1 range-person-only=true ! plyenc ! filesink location=none.ply
   expect_error "needs a name that ends in .ply or .glb or .webm or .mp4" rangecast convert recording.rcnc one.png
   local film
   for film in film.webm film.mp4; do

@@ -142,6 +142,7 @@ test_commands_without_a_pipeline_do_not_print_one () {
   make_rig
   refuses "unrecognized arguments: --print" check --print
   refuses "unrecognized arguments: --print" import rig.yaml --out new.yaml --print
+  refuses "unrecognized arguments: --print" publish . --print
 }
 
 test_only_hosts_that_adapt_ask_for_transport_wide_feedback () {

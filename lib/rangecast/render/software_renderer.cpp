@@ -131,7 +131,8 @@ private:
     range_ =
         depth_shift (picture_.clip_from_world, picture_.clip_from_world, picture_.blend_range_m).g;
     for (std::size_t i = 0; i < layers_.size (); i++)
-      cotangents_[m_.cell_of_[i]] = view_cotangent (picture_.clip_from_world, *layers_[i].view);
+      cotangents_[m_.cell_of_[i]] = view_cotangent (
+          picture_.clip_from_world, *layers_[i].view, m_.cell_of_[i], cells_, layers_.size ());
     m_.chunks_.clear ();
     std::size_t first = 0;
     const std::size_t shared = is_points_ ? 0 : 2; /* vertices with the triangles before */
@@ -392,7 +393,7 @@ private:
           const U &c = L::at (&band.colours[at]);
           const F root = floats<L> (c >> 24) * (1 / 255.f), square = root * root;
           F weight = square * square;
-          F cotangent = cotangents_[cell].share * distance - cotangents_[cell].offset;
+          F cotangent = cotangents_[cell].per_w * distance - cotangents_[cell].offset;
           cotangent = cotangent > 0 ? cotangent : F{};
           F range = 1 + cotangent * cotangent;
           L::make_root (range);

@@ -379,14 +379,19 @@ view_alignment (const Mat4 &clip_from_world, const View &view)
 }
 
 ViewCotangent
-view_cotangent (const Mat4 &clip_from_world, const View &view)
+view_cotangent (const Mat4 &clip_from_world, const View &view, std::size_t cell, std::size_t cells,
+    std::size_t layers)
 {
-  constexpr double kMinAside_m = 1e-3;
+  if (cell + 1 == cells && layers > cells)
+    return {};
+  /* Off the viewer's axis rays meet at an angle also if the camera is on it, nearer or farther. */
+  constexpr double kMinAside_m = 1e-3, kOffAxis = 0.2;
   const Vec3 row = row_of (clip_from_world, 3);
   const double scale = norm (row);
   const Vec3 way = view.world_from_view.translation - viewer_position (clip_from_world);
   const double along = dot (way, row) / scale,
-               aside = std::max (norm (way - (along / scale) * row), kMinAside_m);
+               aside = std::max (
+                   {norm (way - (along / scale) * row), kMinAside_m, kOffAxis * std::abs (along)});
   return {static_cast<float> (1 / (scale * aside)), static_cast<float> (along / aside)};
 }
 

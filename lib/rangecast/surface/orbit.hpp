@@ -129,12 +129,15 @@ Vec3 viewer_position (const Mat4 &clip_from_world);
 double view_alignment (const Mat4 &clip_from_world, const View &view);
 
 /** Where a view's camera is beside the viewer: the rays of both meet on the viewer's axis at w at
- * an angle whose cotangent is share * w - offset. The blend range is divided by that angle's sine:
- * a surface that is drawn too near or too far is displaced in the picture by that sine. */
+ * an angle whose cotangent is per_w * w - offset. The blend range is divided by that angle's sine:
+ * a surface that is drawn too near or too far is displaced in the picture by that sine. From a
+ * right angle on it counts as 1. */
 struct ViewCotangent {
-  float share = 0, offset = 0;
+  float per_w = 0, offset = 0;
 };
-ViewCotangent view_cotangent (const Mat4 &clip_from_world, const View &view);
+/** {} if the cell, the last one, has several layers. @param layers  number of all */
+ViewCotangent view_cotangent (const Mat4 &clip_from_world, const View &view, std::size_t cell,
+    std::size_t cells, std::size_t layers);
 
 /** Whether a clip matrix of pixels mirrors. If it does not, triangles that are counter-clockwise in
  *  their view's picture (y down) are so for OpenGL, too. */

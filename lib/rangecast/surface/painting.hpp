@@ -18,7 +18,8 @@ namespace rangecast {
  *  between the two's directions; not in mode kBlend. More than stereo's noise, less than a nose:
  *  with 4, 12, 40 and 100 mm PSNR is 42.9, 43.4, 43.3 and 43.3 dB. */
 inline constexpr double kViewGap_m = 0.012;
-/** Mode kBlend: metres behind the nearest surface within which views are blended. */
+/** Mode kBlend: metres behind the nearest surface within which views are blended, divided by the
+ * sine of ViewCotangent. */
 inline constexpr double kBlendRange_m = 0.02;
 /** The background, sRGB, 0xRRGGBB. */
 inline constexpr unsigned kBackgroundColour = 0x20242a;

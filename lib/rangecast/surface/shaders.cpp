@@ -82,7 +82,7 @@ precision highp sampler2D;
 uniform sampler2D u_colours;
 uniform sampler2D u_depths;
 uniform ivec2 u_cells[CELLS]; /* from a pixel of the picture to that of a cell */
-uniform vec2 u_cotangents[CELLS]; /* share, offset of ViewCotangent */
+uniform vec2 u_cotangents[CELLS]; /* per_w, offset of ViewCotangent */
 uniform vec3 u_shift; /* a, b, g of DepthShift */
 out vec4 fragment; /* and the fourth root of the mean weight */
 void main ()

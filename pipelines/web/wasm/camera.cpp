@@ -100,7 +100,7 @@ write (std::vector<float> &to, std::initializer_list<double> values)
  *  framebuffer that may be covered (x, y, width, height); depth shift a, b, g; reach; whether it
  *  mirrors; number of layers. For each layer: its place (matrix 16, behind 2), number of its cell,
  *  what leads to it from a pixel of the picture (x, y), lens (4), viewer (3), unit,
- *  cotangent (share, offset)
+ *  cotangent (per_w, offset)
  *  @param max_side  of a texture, pixels */
 void
 write_picture (std::vector<float> &to, const Scene &scene, StripMode mode,
@@ -139,8 +139,9 @@ write_picture (std::vector<float> &to, const Scene &scene, StripMode mode,
                    double (atlas.from_picture[cell][1])});
     to.insert (to.end (), std::begin (angles.lens), std::end (angles.lens));
     to.insert (to.end (), std::begin (angles.viewer), std::end (angles.viewer));
-    const auto cotangent = rangecast::view_cotangent (clip_from_world, view);
-    write (to, {angles.unit, cotangent.share, cotangent.offset});
+    const auto cotangent =
+        rangecast::view_cotangent (clip_from_world, view, cell, atlas.cells, scene.layers.size ());
+    write (to, {angles.unit, cotangent.per_w, cotangent.offset});
   }
 }
 

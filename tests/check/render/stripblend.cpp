@@ -82,7 +82,7 @@ GST_START_TEST (test_surface_beyond_the_blend_range_is_hidden)
 }
 GST_END_TEST;
 
-/* What lies too deep is seen in the right place by a camera that is where the viewer is. */
+/* It shows things in place however wrong their depth is. */
 GST_START_TEST (test_view_of_the_viewers_own_position_is_blended_at_any_depth)
 {
   const Rig rig = two_of_nine ();

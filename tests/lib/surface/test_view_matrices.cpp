@@ -115,11 +115,11 @@ TEST (ViewMatrices, cotangent_is_that_of_the_angle_at_which_both_rays_meet)
   view.world_from_view.translation = eye + 0.2 * aside + 0.1 * along;
   for (float &value : m) /* as an application's matrix may be */
     value *= 2;
-  const auto cotangent = view_cotangent (m, view);
+  const auto cotangent = view_cotangent (m, view, 0, 1, 1);
   for (const double distance : {0.1, 0.5, 1.0}) {
     const Vec3 p = eye + distance * along;
     const double w = clip (m, p.x, p.y, p.z, 1).w;
-    EXPECT_NEAR (cotangent.share * w - cotangent.offset, (distance - 0.1) / 0.2, 1e-4);
+    EXPECT_NEAR (cotangent.per_w * w - cotangent.offset, (distance - 0.1) / 0.2, 1e-4);
   }
 }
 
