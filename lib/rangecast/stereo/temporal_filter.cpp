@@ -15,6 +15,7 @@ namespace {
 
 constexpr int kBlock = BlockGrid::kBlock;
 constexpr int kAround = 4, kWindow = kBlock + 2 * kAround; /* pixels that are compared */
+constexpr int kSame = kWindow * kWindow;                   /* difference(): 2 grey levels each */
 constexpr int kMaxRounds = 16;                             /* of the search */
 constexpr int kMinImages = 6; /* until a block is still: slow motion is seen late */
 constexpr int kSlight = 16;   /* change on one surface, 1/16 pixel */
@@ -76,6 +77,18 @@ TemporalFilter::difference (const cv::Rect &window, const cv::Point &motion, int
   return sum;
 }
 
+bool
+TemporalFilter::has_disparity (const cv::Rect &window) const
+{
+  int any = 0; /* cv::countNonZero() costs as much as the search, for so few pixels */
+  for (int y = window.y; y < window.br ().y; y++) {
+    const auto found = now_.found.ptr<std::uint16_t> (y) + window.x;
+    for (int x = 0; x < window.width; x++)
+      any |= found[x];
+  }
+  return any > 0;
+}
+
 cv::Point
 TemporalFilter::find_motion (int bx, int by, const cv::Rect &window) const
 {
@@ -96,7 +109,7 @@ TemporalFilter::find_motion (int bx, int by, const cv::Rect &window) const
     attempt (before_.motions[grid_.at (bx + 1, by + 1)]);
   int rounds = 0; /* along a plain gradient, a change of light looks like motion without end */
   for (const int step : {2, 1})
-    for (bool is_better = true; is_better && rounds < kMaxRounds; rounds++) {
+    for (bool is_better = true; is_better && least > kSame && rounds < kMaxRounds; rounds++) {
       const cv::Point from = best;
       is_better = attempt ({from.x - step, from.y}) || attempt ({from.x + step, from.y});
       const int x = best.x;
@@ -142,7 +155,7 @@ TemporalFilter::steady_block (int bx, int by, const cv::Rect &both, bool moves, 
   int change = 0;
   if (moves) {
     const cv::Rect window = cv::Rect (part.x - kAround, part.y - kAround, kWindow, kWindow) & both;
-    if (cv::countNonZero (now_.found (window)) == 0)
+    if (!has_disparity (window))
       return;
     motion = find_motion (bx, by, window);
     if (!follows (window, motion, change))

@@ -43,6 +43,7 @@ private:
     std::vector<cv::Point> motions; /* of blocks: from here to the image before */
   };
   void steady_block (int bx, int by, const cv::Rect &both, bool moves, cv::Mat &disparity);
+  [[nodiscard]] bool has_disparity (const cv::Rect &window) const;
   [[nodiscard]] int difference (const cv::Rect &window, const cv::Point &motion, int most) const;
   [[nodiscard]] cv::Point find_motion (int bx, int by, const cv::Rect &window) const;
   [[nodiscard]] bool follows (const cv::Rect &window, const cv::Point &motion, int &change) const;
