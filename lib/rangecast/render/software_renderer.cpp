@@ -63,7 +63,12 @@ count ()
 Vec4
 channels (const Rgbx &c)
 {
-  return Vec4{float (c.r), float (c.g), float (c.b), float (c.x)};
+  using Bytes = std::uint8_t __attribute__ ((vector_size (16)));
+  using Ints = std::int32_t __attribute__ ((vector_size (16)));
+  const Bytes from = (Bytes)Ints{std::bit_cast<std::int32_t> (c)};
+  return __builtin_convertvector((Ints)__builtin_shufflevector (from, Bytes{}, 0, 16, 17, 18, 1, 19,
+                                     20, 21, 2, 22, 23, 24, 3, 25, 26, 27),
+      Vec4);
 }
 
 /* A value that changes evenly over a triangle. */
@@ -76,7 +81,6 @@ template <typename T> struct Plane {
 /* One call of SoftwareRenderer::draw(). */
 class Drawing {
 public:
-  using Vertex = SoftwareRenderer::Vertex;
   using Chunk = SoftwareRenderer::Chunk;
   using Band = SoftwareRenderer::Band;
 
@@ -140,10 +144,13 @@ private:
       const std::size_t size = layers_[i].vertices.size ();
       for (std::size_t at = 0; at + shared < size; at += kChunkVertices) {
         m_.chunks_.push_back ({i, at, first, std::min (kChunkVertices + shared, size - at), 0, 0});
-        first += m_.chunks_.back ().vertices;
+        /* no two chunks share a vector */
+        first += (m_.chunks_.back ().vertices + kMaxLanes - 1) / kMaxLanes * kMaxLanes;
       }
     }
-    m_.vertices_.resize (first);
+    for (auto *values : {&m_.vertices_.x, &m_.vertices_.y, &m_.vertices_.nearness})
+      values->resize (first + kMaxLanes); /* triangles of the last one look beyond it */
+    m_.vertices_.colours.resize (first);
     m_.sizes_.resize (is_points_ ? first : 0);
     const std::size_t pixels = stride_ * static_cast<std::size_t> (covered_.height + 2);
     m_.sums_.resize (pixels);
@@ -168,7 +175,7 @@ private:
                 left = half_width - static_cast<float> (covered_.x),
                 up = half_height - static_cast<float> (covered_.y);
     const SurfaceVertex *from = &layer.vertices[chunk.from];
-    Vertex *to = &m_.vertices_[chunk.first];
+    SoftwareRenderer::Vertices &to = m_.vertices_;
     float top = 1e9f, bottom = -1e9f;
     for (std::size_t begin = 0; begin < chunk.vertices; begin += L::kLanes) {
       const int n = static_cast<int> (std::min<std::size_t> (L::kLanes, chunk.vertices - begin));
@@ -208,11 +215,13 @@ private:
       const F reach = x * x + y * y;
       /* not before the near plane, and not so far aside that sixteenths get lost */
       L::keep_where (nearness, (row (2) >= -w) & (w > 0) & (reach < 1e9f));
+      L::at (&to.x[chunk.first + begin]) = x;
+      L::at (&to.y[chunk.first + begin]) = y;
+      L::at (&to.nearness[chunk.first + begin]) = nearness;
       for (int l = 0; l < n; l++) {
         const std::size_t i = begin + static_cast<std::size_t> (l);
-        Rgbx colour = from[i].colour;
+        Rgbx &colour = to.colours[chunk.first + i] = from[i].colour;
         colour.x = static_cast<std::uint8_t> (root[l] + 0.5f);
-        to[i] = {x[l], y[l], nearness[l], colour};
         if (nearness[l] <= 0)
           continue;
         float around = 0;
@@ -251,16 +260,24 @@ private:
       if (!(used >> cell & 1))
         std::fill_n (target.nearness, size, 0.f);
       used |= 1u << cell;
-      const Vertex *vertices = &m_.vertices_[chunk.first];
       if (is_points_)
         for (std::size_t i = 0; i < chunk.vertices; i++)
-          draw_point (target, vertices[i], m_.sizes_[chunk.first + i]);
-      else /* chunks begin at even numbers of a strip */
-        for (std::size_t i = 0; i + 2 < chunk.vertices; i++)
-          draw_triangle<L> (target, vertices + i, i % 2 != 0);
+          draw_point (target, vertex (chunk.first + i), m_.sizes_[chunk.first + i]);
+      else
+        draw_strip<L> (target, chunk);
     }
     for (int y = top; y < end; y++)
       add_up<L> (y, static_cast<std::size_t> (y - top) * stride_, used, band, size);
+  }
+
+  struct Vertex {
+    float x, y, nearness;
+    Rgbx colour;
+  };
+  [[nodiscard]] Vertex vertex (std::size_t i) const
+  {
+    const SoftwareRenderer::Vertices &v = m_.vertices_;
+    return {v.x[i], v.y[i], v.nearness[i], v.colours[i]};
   }
 
   void draw_point (const Target &to, const Vertex &v, float size) const
@@ -283,75 +300,107 @@ private:
       }
   }
 
+  /* Pixels around a triangle whose centres may lie in it; `last` and `bottom` are included. */
+  struct Box {
+    int first, top, last, bottom;
+  };
+
+  /* Draws a chunk's triangles that are to be seen and have pixels. */
+  template <typename L> void draw_strip (const Target &to, const Chunk &chunk)
+  {
+    using F = typename L::F;
+    using I = typename L::I;
+    const auto least = [] (const F (&v)[3]) -> F {
+      const F both = v[0] < v[1] ? v[0] : v[1];
+      return both < v[2] ? both : v[2];
+    };
+    const auto most = [] (const F (&v)[3]) -> F {
+      const F both = v[0] > v[1] ? v[0] : v[1];
+      return both > v[2] ? both : v[2];
+    };
+    /* begin at the first centre within the limit, end at the last one: centres are at halves of a
+     * pixel, vertices at sixteenths */
+    const auto begin = [] (const F &edge, float limit) -> I {
+      const F inside = edge - 0.5f > limit ? edge - 0.5f : F{} + limit;
+      return __builtin_convertvector(inside + 15 / 16.f, I);
+    };
+    const auto end = [] (const F &edge, float limit) -> I {
+      const F inside = edge - 0.5f < limit ? edge - 0.5f : F{} + limit;
+      return inside < 0 ? I{} - 1 : __builtin_convertvector(inside, I);
+    };
+    const I lanes = count<L> (), is_odd = (lanes & 1) != 0; /* chunks begin at even numbers */
+    for (std::size_t i = 0; i + 2 < chunk.vertices; i += L::kLanes) {
+      const auto load = [at = chunk.first + i] (const std::vector<float> &v, F (&values)[3]) {
+        for (std::size_t k = 0; k < 3; k++)
+          values[k] = L::at (&v[at + k]);
+      };
+      F x[3], y[3], nearness[3];
+      load (m_.vertices_.x, x);
+      load (m_.vertices_.y, y);
+      load (m_.vertices_.nearness, nearness);
+      const F area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
+      const I is_front = (area > 0) ^ is_odd ^ (I{} - int (mirrors_)), left = begin (least (x), 0),
+              right = end (most (x), float (covered_.width - 1)),
+              top = begin (least (y), float (to.top)), bottom = end (most (y), float (to.end - 1));
+      const I drawn = (area != 0) & (least (nearness) > 0) & (left <= right) & (top <= bottom) &
+                      (lanes < int (chunk.vertices - 2 - i)) &
+                      (is_front | (I{} - int (!picture_.culls ())));
+      if (!L::any (drawn))
+        continue;
+      for (int l = 0; l < L::kLanes; l++)
+        if (drawn[l])
+          draw_triangle<L> (to, chunk.first + i + std::size_t (l), area[l], is_front[l] != 0,
+              {left[l], top[l], right[l], bottom[l]});
+    }
+  }
+
   /* Draws the pixels whose centres lie in the triangle, or on one of its edges that no neighbour
    * draws: of an edge's two directions one counts. */
   template <typename L>
-  void draw_triangle (const Target &to, const Vertex *strip, bool is_odd) const
+  void draw_triangle (const Target &to, std::size_t at, float area, bool is_front, const Box &box)
   {
     using F = typename L::F;
     using I = typename L::I;
     using U = typename L::U;
-    const Vertex *a = strip, *b = strip + 1, *c = strip + 2;
-    float area = (b->x - a->x) * (c->y - a->y) - (c->x - a->x) * (b->y - a->y);
-    if (area == 0 || std::min ({a->nearness, b->nearness, c->nearness}) <= 0)
-      return;
-    const bool is_front = (area > 0) != (is_odd != mirrors_);
-    if (!is_front && picture_.culls ())
-      return;
-    if (area < 0) {
-      std::swap (b, c);
-      area = -area;
-    }
-    /* centres are at halves of a pixel, vertices at sixteenths */
-    constexpr float kCeil = 15 / 16.f;
-    const float left = std::max (std::min ({a->x, b->x, c->x}) - 0.5f, 0.f),
-                right = std::min (
-                    std::max ({a->x, b->x, c->x}) - 0.5f, static_cast<float> (covered_.width - 1)),
-                upper = std::max (std::min ({a->y, b->y, c->y}) - 0.5f, float (to.top)),
-                lower = std::min (std::max ({a->y, b->y, c->y}) - 0.5f, float (to.end - 1));
-    if (right < 0 || lower < 0)
-      return;
-    const int first = static_cast<int> (left + kCeil), last = static_cast<int> (right),
-              top = static_cast<int> (upper + kCeil), bottom = static_cast<int> (lower);
-    if (first > last || top > bottom)
-      return;
-    const float x = static_cast<float> (first) + 0.5f, y = static_cast<float> (top) + 0.5f;
+    const Vertex a = vertex (at), b = vertex (area < 0 ? at + 2 : at + 1),
+                 c = vertex (area < 0 ? at + 1 : at + 2);
+    const float x = static_cast<float> (box.first) + 0.5f, y = static_cast<float> (box.top) + 0.5f;
     /* twice the area between an edge and the pixel */
-    const auto edge = [x, y] (const Vertex *p, const Vertex *q) {
-      const float way_x = q->x - p->x, way_y = q->y - p->y;
-      return Plane<float>{way_x * (y - p->y) - way_y * (x - p->x), -way_y, way_x};
+    const auto edge = [x, y] (const Vertex &p, const Vertex &q) {
+      const float way_x = q.x - p.x, way_y = q.y - p.y;
+      return Plane<float>{way_x * (y - p.y) - way_y * (x - p.x), -way_y, way_x};
     };
     const Plane<float> of_a = edge (b, c), of_b = edge (c, a), of_c = edge (a, b);
     const auto least = [] (const Plane<float> &e) { /* steps are 1/256 */
       return e.right < 0 || (e.right == 0 && e.down > 0) ? 0 : 1 / 512.f;
     };
     const float least_a = least (of_a), least_b = least (of_b), least_c = least (of_c);
-    const float share = 1 / area;
+    const float share = 1 / std::abs (area);
     const auto plane = [&] (const auto &at_a, const auto &at_b, const auto &at_c) {
       const auto to_b = (at_b - at_a) * share, to_c = (at_c - at_a) * share;
       return Plane<std::decay_t<decltype (at_a)>>{at_a + of_b.begin * to_b + of_c.begin * to_c,
           of_b.right * to_b + of_c.right * to_c, of_b.down * to_b + of_c.down * to_c};
     };
-    const Plane<float> nearness = plane (a->nearness, b->nearness, c->nearness);
-    Plane<Vec4> colour = plane (channels (a->colour), channels (b->colour), channels (c->colour));
+    const Plane<float> nearness = plane (a.nearness, b.nearness, c.nearness);
+    Plane<Vec4> colour = plane (channels (a.colour), channels (b.colour), channels (c.colour));
     if (!is_front) {
       colour.begin[3] = kInside;
       colour.right[3] = colour.down[3] = 0;
     }
     const I lanes = count<L> ();
-    for (int row = top; row <= bottom; row++) {
-      const auto n = static_cast<float> (row - top);
+    for (int row = box.top; row <= box.bottom; row++) {
+      const auto n = static_cast<float> (row - box.top);
       const std::size_t line =
-          static_cast<std::size_t> (row - to.top) * stride_ + static_cast<std::size_t> (first);
+          static_cast<std::size_t> (row - to.top) * stride_ + static_cast<std::size_t> (box.first);
       const float edge_a = of_a.begin + n * of_a.down, edge_b = of_b.begin + n * of_b.down,
                   edge_c = of_c.begin + n * of_c.down,
                   near_line = nearness.begin + n * nearness.down;
-      for (int column = 0; column <= last - first; column += L::kLanes) {
+      for (int column = 0; column <= box.last - box.first; column += L::kLanes) {
         const F right_by = __builtin_convertvector(lanes + column, F);
         const I inside = (edge_a + of_a.right * right_by >= least_a) &
                          (edge_b + of_b.right * right_by >= least_b) &
                          (edge_c + of_c.right * right_by >= least_c) &
-                         (lanes + column <= last - first);
+                         (lanes + column <= box.last - box.first);
         const F here = near_line + nearness.right * right_by;
         F &nearest = L::at (to.nearness + line + column);
         const I drawn = inside & (here > nearest);

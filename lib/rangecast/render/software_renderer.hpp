@@ -35,10 +35,11 @@ public:
 
 private:
   friend class Drawing;
-  struct Vertex {
-    float x, y;     /* pixels of the covered part, in sixteenths */
-    float nearness; /* 1 / distance in metres; 0: cannot be drawn */
-    Rgbx colour;    /* x is the fourth root of the weight, 255 = 1 */
+  /* Arrays by vertex, so that lanes hold successive triangles of a strip. */
+  struct Vertices {
+    std::vector<float> x, y;     /* pixels of the covered part, in sixteenths */
+    std::vector<float> nearness; /* 1 / distance in metres; 0: cannot be drawn */
+    std::vector<Rgbx> colours;   /* x is the fourth root of the weight, 255 = 1 */
   };
   /* Successive triangles, or points, of a layer. Two vertices are also of the next chunk's. */
   struct Chunk {
@@ -52,8 +53,8 @@ private:
   };
 
   const int threads_;
-  std::vector<Vertex> vertices_; /* of all chunks */
-  std::vector<float> sizes_;     /* of points, pixels */
+  Vertices vertices_;        /* of all chunks */
+  std::vector<float> sizes_; /* of points, pixels */
   std::vector<Chunk> chunks_;
   std::vector<double> alignments_;
   std::vector<std::size_t> cell_of_; /* by number of the layer */

@@ -2,10 +2,14 @@
 #include "blend_planes.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 
 #include "../base/simd.hpp"
+
+/* What takes and returns vectors is inlined into functions for one processor. */
+#pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace rangecast {
 namespace {
@@ -39,11 +43,10 @@ public:
     const auto size = static_cast<std::size_t> (width_) * static_cast<std::size_t> (height_);
     to.colour.resize (size);
     to.weight.resize (size);
-    to.scratch.resize (size);
     to.copied.resize (size);
   }
 
-  void make ()
+  template <typename L> void make (const L &)
   {
     if (image_.depth.empty ())
       return;
@@ -52,7 +55,7 @@ public:
     for (int y = 0; y < height_; y++)
       begin_distances (y);
     measure_distances ();
-    smooth_copies ();
+    smooth_copies<L> ();
     for (int y = 0; y < height_; y++)
       weigh_row (y);
   }
@@ -168,15 +171,15 @@ private:
 
   /* Replaces copied pixels by the mean of the surrounding pixels within the code's threshold,
    * first along rows, then along columns. */
-  void smooth_copies ()
+  template <typename L> void smooth_copies ()
   {
     bool any = false;
     for (int y = 0; y < height_; y++)
       any = find_copies (y) || any;
     if (!any)
       return;
-    smooth (1, [this] (int x, int) { return std::pair (x, width_); });
-    smooth (width_, [this] (int, int y) { return std::pair (y, height_); });
+    smooth<L> (false);
+    smooth<L> (true);
   }
 
   /* Finds pixels that equal the left, upper-left, upper or upper-right one. @return whether any
@@ -215,30 +218,55 @@ private:
     return sum != 0;
   }
 
-  template <typename Along> void smooth (std::ptrdiff_t way, const Along &along)
+  template <typename L> void smooth (bool down)
   {
-    std::ranges::copy (to_.colour, to_.scratch.begin ());
+    constexpr std::size_t kSpace = kMaxLanes; /* lanes may go beyond the planes */
+    static_assert (kCopyReach <= kSpace);
+    to_.scratch.resize (to_.colour.size () + 2 * kSpace);
+    std::ranges::copy (to_.colour, to_.scratch.begin () + kSpace);
     for (int y = 0; y < height_; y++)
-      for (int x = 0; x < width_; x++)
-        if (const std::size_t at = place (x, y); to_.copied[at]) {
-          const auto [position, length] = along (x, y);
-          to_.colour[at] = mean_along (&to_.scratch[at], way, std::max (-kCopyReach, -position),
-              std::min (kCopyReach, length - 1 - position));
-        }
+      for (int x = 0; x < width_; x += L::kLanes)
+        smooth_pixels<L> (x, y, &to_.scratch[kSpace + place (x, y)], down);
   }
 
-  [[nodiscard]] static Rgbx mean_along (const Rgbx *at, std::ptrdiff_t way, int first, int last)
+  /* @param from  the planes' colour at (x, y) */
+  template <typename L> void smooth_pixels (int x, int y, const Rgbx *from, bool down)
   {
-    int n = 0, r = 0, g = 0, b = 0;
-    for (int k = first; k <= last; k++) {
-      const Rgbx c = at[k * way];
-      if (!(c.x & kValid) || std::abs (c.r - at->r) > kCopyRange ||
-          std::abs (c.g - at->g) > kCopyRange || std::abs (c.b - at->b) > kCopyRange)
+    using I = typename L::I;
+    const std::uint8_t *copied = &to_.copied[place (x, y)];
+    const int count = std::min (L::kLanes, width_ - x);
+    I lane, is_copy;
+    for (int l = 0; l < L::kLanes; l++)
+      lane[l] = x + l, is_copy[l] = l < count && copied[l] ? -1 : 0;
+    if (!L::any (is_copy))
+      return;
+    const auto pixels = [from] (std::ptrdiff_t by) -> I {
+      return L::at (reinterpret_cast<const std::int32_t *> (from + by));
+    };
+    const I own = pixels (0);
+    I n{}, r{}, g{}, b{};
+    for (int k = -kCopyReach; k <= kCopyReach; k++) {
+      if (down && (y + k < 0 || y + k >= height_))
         continue;
-      n++, r += c.r, g += c.g, b += c.b;
+      const I other = pixels (k * (down ? width_ : 1)), at = lane + (down ? 0 : k);
+      I same = ((other & kValid << 24) != 0) & (at >= 0) & (at < width_);
+      for (int c = 0; c < 24; c += 8) {
+        const I step = (other >> c & 255) - (own >> c & 255);
+        same &= (step <= kCopyRange) & (step >= -kCopyRange);
+      }
+      const I counted = other & same;
+      n -= same, r += counted & 255, g += counted >> 8 & 255, b += counted >> 16 & 255;
     }
-    const auto mean = [n] (int sum) { return static_cast<std::uint8_t> ((sum + n / 2) / n); };
-    return {mean (r), mean (g), mean (b), at->x};
+    const auto mean = [&n] (const I &sum) -> I { /* exact in floats */
+      using F = typename L::F;
+      return __builtin_convertvector(
+          __builtin_convertvector(sum + n / 2, F) / __builtin_convertvector(n, F), I);
+    };
+    const I means = mean (r) | mean (g) << 8 | mean (b) << 16 | (own & 0xff << 24);
+    Rgbx *to = &to_.colour[place (x, y)];
+    for (int l = 0; l < count; l++)
+      if (is_copy[l])
+        to[l] = std::bit_cast<Rgbx> (means[l]);
   }
 
   /* From a pixel to its two neighbours along one axis. */
@@ -318,7 +346,7 @@ void
 make_blend_planes (
     std::span<const SurfaceView> views, std::size_t which, double depth_step, BlendPlanes &to)
 {
-  for_this_cpu ([&] { PlaneBuilder (views, which, depth_step, to).make (); });
+  for_this_cpu ([&] (auto lanes) { PlaneBuilder (views, which, depth_step, to).make (lanes); });
 }
 
 } // namespace rangecast
