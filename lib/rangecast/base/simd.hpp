@@ -43,12 +43,16 @@ template <int kNumbers> struct Lanes {
   static void make_root (F &v)
   {
 #if defined __x86_64__
+    /* not by way of memory: halves written there are not ready when the whole is read */
     typedef float Four __attribute__ ((vector_size (16)));
-    Four parts[kLanes / 4];
-    std::memcpy (parts, &v, sizeof parts);
-    for (Four &part : parts)
-      part = __builtin_ia32_sqrtps (part);
-    std::memcpy (&v, parts, sizeof parts);
+    typedef float Eight __attribute__ ((vector_size (32)));
+    if constexpr (kLanes == 8) {
+      const Eight all = (Eight)v;
+      const Four low = __builtin_ia32_sqrtps (__builtin_shufflevector (all, all, 0, 1, 2, 3)),
+                 high = __builtin_ia32_sqrtps (__builtin_shufflevector (all, all, 4, 5, 6, 7));
+      v = (F)__builtin_shufflevector (low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+    } else
+      v = (F)__builtin_ia32_sqrtps ((Four)v);
 #else
     for (int l = 0; l < kLanes; l++)
       v[l] = std::sqrt (v[l]);

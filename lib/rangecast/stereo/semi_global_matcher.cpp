@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -105,10 +104,18 @@ transpose (
   for (int y = 0; y < kSide; y += kBytes)
     for (int x = 0; x < kSide; x += kSquare) {
       B rows[kSquare], next[kSquare];
-      for (int i = 0; i < kSquare; i++)
-        for (int half = 0; half < kBytes; half += kSquare)
-          std::memcpy (reinterpret_cast<std::uint8_t *> (&rows[i]) + half,
-              from + (y + half + i) * from_step + x, kSquare);
+      for (int i = 0; i < kSquare; i++) {
+        const auto half = [&](int at) -> const auto &
+        {
+          return rangecast::Lanes<4>::at (from + (y + at + i) * from_step + x);
+        };
+        if constexpr (kBytes == kSquare)
+          rows[i] = half (0);
+        else /* not by way of memory: see Lanes::make_root() */
+          rows[i] = __builtin_shufflevector (half (0), half (kSquare), 0, 1, 2, 3, 4, 5, 6, 7, 8, 9,
+              10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30,
+              31);
+      }
 #pragma GCC unroll 2
       for (int round = 0; round < 2; round++) {
 #pragma GCC unroll 8
