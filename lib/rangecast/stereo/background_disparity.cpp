@@ -93,6 +93,16 @@ BackgroundDisparity::remember (const cv::Mat &grey, const cv::Mat &disparity, in
 }
 
 void
+BackgroundDisparity::find_still (const cv::Mat &left, const cv::Point &at, cv::Mat &still)
+{
+  const cv::Rect part (at, left.size ());
+  cv::absdiff (left, picture_ (part), still);
+  cv::compare (still, kNoise, still, cv::CMP_LE);
+  cv::compare (known_ (part), kUnknown, mask_, cv::CMP_GT);
+  cv::bitwise_and (still, mask_, still);
+}
+
+void
 BackgroundDisparity::extend (
     const cv::Point &at, int min, int far, const Tiles &tiles, cv::Mat &disparity) const
 {

@@ -100,8 +100,8 @@ StereoDepth::rectify (
   });
 }
 
-/* Records the depth range and coverage of the last ROI, without 0.5 % at both ends, which may be
- * wrong. */
+/* Records the depth range and coverage of the last ROI, without what may be background, and without
+ * 0.5 % at both ends, which may be wrong. */
 void
 StereoDepth::learn_range (const RangeImage &image)
 {
@@ -115,9 +115,10 @@ StereoDepth::learn_range (const RangeImage &image)
   int seen = 0;
   for (int y = part.y; y < part.y + part.height; y++) {
     const auto d = disparity.ptr<std::uint16_t> (y);
+    const auto doubtful = finder_.doubtful ().ptr<std::uint8_t> (y);
     const std::uint16_t *depth = image.depth.row (y);
     for (int x = part.x; x < part.x + part.width; x++)
-      if (depth[x]) {
+      if (depth[x] && !doubtful[x]) {
         histogram_[d[x] >> 4]++;
         seen++;
       }
@@ -144,10 +145,12 @@ StereoDepth::is_suspect (const RangeImage &image) const
   for_this_cpu ([&] {
     for (int y = 0; y < disparity.rows; y++) {
       const auto d = disparity.ptr<std::uint16_t> (y);
+      const auto doubtful = finder_.doubtful ().ptr<std::uint8_t> (y);
       const std::uint16_t *depth = image.depth.row (y);
       for (int x = 0; x < disparity.cols; x++) {
-        seen += depth[x] != 0;
-        crowd += (depth[x] != 0) & (d[x] > nearest);
+        const int counts = (depth[x] != 0) & (doubtful[x] == 0);
+        seen += counts;
+        crowd += counts & (d[x] > nearest);
       }
     }
   });
