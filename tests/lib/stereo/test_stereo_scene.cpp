@@ -247,6 +247,40 @@ TEST (StereoScene, part_of_picture_and_depths_is_as_good_as_the_whole)
   EXPECT_LT (of_part.judgement ().off, 0.003);
 }
 
+/* Beside the person is background that the right camera does not see: it may match anything. */
+TEST (StereoScene, depths_looked_at_stay_those_of_a_person_who_moves)
+{
+  SceneSettings settings;
+  settings.width = 640, settings.height = 480;
+  settings.views = 1;
+  settings.noise_sigma = 1.5;
+  std::unique_ptr<Scene> scene;
+  ASSERT_TRUE (Scene::create (settings, scene).ok ());
+  StereoDepth stereo;
+  ASSERT_TRUE (stereo.set (scene->rig ().views[0]).ok ());
+  Image<Rgbx> left{640, 480}, right{640, 480}, colour{640, 480};
+  Image<std::uint16_t> depth{640, 480};
+  int pixels = 0, nearer = 0;
+  for (int i = 0; i < 16; i++) {
+    for (auto [camera, picture] :
+        {std::pair{SceneCamera::kLeft, &left}, std::pair{SceneCamera::kRight, &right}})
+      ASSERT_TRUE (scene->render (0, camera, 0.1 * i, i == 0, picture->view (), {}, {}).ok ());
+    const Roi roi = i < 2 ? Roi{0, 0, 640, 480} : Roi{110, 40, 430, 440};
+    const auto found = depth.view ().crop (roi.x, roi.y, roi.width, roi.height);
+    ASSERT_TRUE (
+        stereo
+            .process (left.view (), right.view (),
+                {0, roi, found, colour.view ().crop (roi.x, roi.y, roi.width, roi.height), 0})
+            .ok ());
+    for (int y = 0; y < roi.height; y++)
+      for (int x = 0; x < roi.width; x++) {
+        pixels += found.at (x, y) > 0;
+        nearer += found.at (x, y) > 0 && found.at (x, y) < 6000;
+      }
+  }
+  EXPECT_LT (nearer, pixels / 500);
+}
+
 TEST (StereoScene, who_steps_nearer_than_the_depths_looked_at_is_seen_at_once)
 {
   const auto far = make_scene (0, 1.1), near = make_scene (0, 0.7);
