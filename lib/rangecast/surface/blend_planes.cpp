@@ -220,8 +220,7 @@ private:
 
   template <typename L> void smooth (bool down)
   {
-    constexpr std::size_t kSpace = kMaxLanes; /* lanes may go beyond the planes */
-    static_assert (kCopyReach <= kSpace);
+    constexpr std::size_t kSpace = kMaxLanes + kCopyReach; /* lanes may go beyond the planes */
     to_.scratch.resize (to_.colour.size () + 2 * kSpace);
     std::ranges::copy (to_.colour, to_.scratch.begin () + kSpace);
     for (int y = 0; y < height_; y++)
