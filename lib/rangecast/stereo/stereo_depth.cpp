@@ -17,18 +17,18 @@ struct BinRange {
   int low = 0, high = 0;
 };
 
-/* The range of bins without the lowest and highest 0.5 % of all counts, of which there is one at
+/* The range of bins without the lowest and highest 0.2 % of all counts, of which there is one at
  * least. */
 BinRange
-without_half_a_per_cent (const std::vector<int> &histogram)
+without_outliers (const std::vector<int> &histogram)
 {
-  std::int64_t total = 0; /* 200 times as many pixels may exceed an int */
+  std::int64_t total = 0; /* 500 times as many pixels may exceed an int */
   for (int n : histogram)
     total += n;
   BinRange range = {0, int (histogram.size ()) - 1};
-  for (std::int64_t n = 0; (n += histogram[std::size_t (range.low)]) * 200 < total;)
+  for (std::int64_t n = 0; (n += histogram[std::size_t (range.low)]) * 500 < total;)
     range.low++;
-  for (std::int64_t n = 0; (n += histogram[std::size_t (range.high)]) * 200 < total;)
+  for (std::int64_t n = 0; (n += histogram[std::size_t (range.high)]) * 500 < total;)
     range.high--;
   return range;
 }
@@ -101,7 +101,7 @@ StereoDepth::rectify (
 }
 
 /* Records the depth range and coverage of the last ROI, without what may be background, and without
- * 0.5 % at both ends, which may be wrong. */
+ * 0.2 % at both ends, which may be wrong. */
 void
 StereoDepth::learn_range (const RangeImage &image)
 {
@@ -127,11 +127,11 @@ StereoDepth::learn_range (const RangeImage &image)
   near_now_m_ = far_now_m_ = 0;
   if (seen < 64)
     return;
-  const auto [low, high] = without_half_a_per_cent (histogram_);
+  const auto [low, high] = without_outliers (histogram_);
   /* Walking at 1.5 m/s is 6 cm per frame at 25 Hz: 7 % at 0.85 m. */
-  const double margin = 1 + 0.07 * high;
-  near_now_m_ = finder_.disparity_at (1) / 16 / (high + 1 + margin);
-  far_now_m_ = finder_.disparity_at (1) / 16 / std::max (0.5, low - 1 - 0.03 * low);
+  constexpr double kStep = 0.07;
+  near_now_m_ = finder_.disparity_at (1) / 16 / (high + 2 + kStep * high);
+  far_now_m_ = finder_.disparity_at (1) / 16 / std::max (0.5, low - 1 - kStep * low);
 }
 
 /* Whether the result of a limited depth range suggests that something is outside of it: pixels are
