@@ -10,7 +10,8 @@ namespace {
 
 constexpr std::int16_t kUnknown = -32768, kHidden = -32767;
 constexpr int kRadius = 2, kArea = 25; /* of a patch, pixels */
-/* Mean difference of a patch that is noise, grey levels; the same as a sum over the patch. */
+/* Difference of a pixel that is noise, or of a patch in the mean, grey levels; as a sum over one.
+ */
 constexpr int kNoise = 3, kNoiseSum = kNoise * kArea + kArea / 2;
 
 /* Fills unknown pixels of a row with the farther one of the neighbouring disparities. */
@@ -93,13 +94,12 @@ BackgroundDisparity::remember (const cv::Mat &grey, const cv::Mat &disparity, in
 }
 
 void
-BackgroundDisparity::find_still (const cv::Mat &left, const cv::Point &at, cv::Mat &still)
+BackgroundDisparity::find_still (const cv::Mat &left, const cv::Point &at, cv::Mat &still) const
 {
   const cv::Rect part (at, left.size ());
   cv::absdiff (left, picture_ (part), still);
   cv::compare (still, kNoise, still, cv::CMP_LE);
-  cv::compare (known_ (part), kUnknown, mask_, cv::CMP_GT);
-  cv::bitwise_and (still, mask_, still);
+  still.setTo (0, known_ (part) == kUnknown);
 }
 
 void

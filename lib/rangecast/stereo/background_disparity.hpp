@@ -35,9 +35,10 @@ public:
   void restore (const cv::Mat &left, const cv::Mat &right, int right_x, const cv::Point &at,
       int min, int none, const Tiles &tiles, const cv::Mat &disparity, cv::Mat &to);
 
-  /** Finds pixels that look as the background did, or what is hidden beside it.
+  /** Finds pixels that look as the background did, or as what the right camera did not see beside
+   * it.
    *  @param left, at  as for restore(); @param[out] still  CV_8U of its size: 255 or 0 */
-  void find_still (const cv::Mat &left, const cv::Point &at, cv::Mat &still);
+  void find_still (const cv::Mat &left, const cv::Point &at, cv::Mat &still) const;
 
   /** Sets the farthest disparity, `min`, for pixels without disparity next to the background in
    * their row: one camera does not see them. */
@@ -71,7 +72,6 @@ private:
   cv::Mat known_;   /* CV_16S; kUnknown; kHidden: had no disparity */
   cv::Mat likely_;  /* the same with guesses from the row */
   cv::Mat picture_; /* CV_8U: left image where something is known */
-  cv::Mat mask_;
   WorkerMemory<Memory> memory_;
 };
 

@@ -225,12 +225,6 @@ DisparityFinder::write_disparity (const Roi &roi)
   const int offset = static_cast<int> (std::lround (16 * pair_.offset));
   const int border = 16 * (pair_.width - 1);
   disparity_.create (roi.height, roi.width, CV_16U);
-  doubtful_.create (roi.height, roi.width, CV_8U);
-  if (limited_ && !background_.empty ())
-    background_.find_still (window_[0](cv::Rect (range_.reach () + x0, y0, roi.width, roi.height)),
-        {roi.x, roi.y}, doubtful_);
-  else
-    doubtful_.setTo (0);
   for_this_cpu ([&] {
     for (int y = 0; y < roi.height; y++) {
       const std::int16_t *__restrict from = core_.ptr<std::int16_t> (y0 + y) + x0;
@@ -243,6 +237,18 @@ DisparityFinder::write_disparity (const Roi &roi)
       }
     }
   });
+}
+
+void
+DisparityFinder::find_doubtful (const Roi &roi, cv::Mat &doubtful) const
+{
+  const cv::Rect part (roi.x, roi.y, roi.width, roi.height);
+  doubtful.create (part.size (), CV_8U);
+  if (limited_ && !background_.empty ())
+    background_.find_still (
+        window_[0](part - core_at_.tl () + cv::Point (range_.reach (), 0)), part.tl (), doubtful);
+  else
+    doubtful.setTo (0);
 }
 
 void

@@ -51,10 +51,11 @@ public:
   /** CV_16U of the ROI, 1/16 pixel with equal principal points, 0 = none. */
   [[nodiscard]] const cv::Mat &disparity () const { return disparity_; }
   [[nodiscard]] cv::Mat &disparity () { return disparity_; }
+  /** Finds where the left image of the last find() looks like remembered background beyond the
+   * range that was searched, so that a disparity there may be a false match.
+   *  @param[out] doubtful  CV_8U of the ROI: 255 there, else 0 */
+  void find_doubtful (const Roi &roi, cv::Mat &doubtful) const;
   /** Disparity 1/16 pixel with equal principal points at that depth. */
-  /** Where disparities may be those of the background, which the range does not contain: CV_8U of
-   * the ROI, 255 or 0. */
-  [[nodiscard]] const cv::Mat &doubtful () const { return doubtful_; }
   [[nodiscard]] double disparity_at (double depth_m) const
   {
     return 16 * pair_.focal_baseline / depth_m;
@@ -95,8 +96,7 @@ private:
   Tiles tiles_;                  /* in core_: where to match */
   int missing_[2] = {0, 0};      /* columns of the window outside of the image, left and right */
   std::vector<cv::Rect> parts_;
-  cv::Mat grey_, window_[2], scaled_, raw_, disparity_,
-      doubtful_;        /* scaled_: window_[1], as bright as left */
+  cv::Mat grey_, window_[2], scaled_, raw_, disparity_; /* scaled_: window_[1], as bright as left */
   cv::Mat whole_[2];    /* of the size of the image: memory for the others */
   cv::Mat core_, next_; /* CV_16S of core_at_: disparities, and output of the next filter */
 };

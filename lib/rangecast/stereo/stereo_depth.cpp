@@ -100,8 +100,8 @@ StereoDepth::rectify (
   });
 }
 
-/* Records the depth range and coverage of the last ROI, without what may be background, and without
- * 0.2 % at both ends, which may be wrong. */
+/* Records the coverage of the last ROI, and its depth range without what may be background, and
+ * without 0.2 % at both ends, which may be wrong. */
 void
 StereoDepth::learn_range (const RangeImage &image)
 {
@@ -115,12 +115,12 @@ StereoDepth::learn_range (const RangeImage &image)
   int seen = 0;
   for (int y = part.y; y < part.y + part.height; y++) {
     const auto d = disparity.ptr<std::uint16_t> (y);
-    const auto doubtful = finder_.doubtful ().ptr<std::uint8_t> (y);
+    const auto doubtful = doubtful_.ptr<std::uint8_t> (y);
     const std::uint16_t *depth = image.depth.row (y);
     for (int x = part.x; x < part.x + part.width; x++)
-      if (depth[x] && !doubtful[x]) {
-        histogram_[d[x] >> 4]++;
+      if (depth[x]) {
         seen++;
+        histogram_[d[x] >> 4] += !doubtful[x];
       }
   }
   seen_share_ = double (seen) / (double (part.width) * part.height);
@@ -135,7 +135,7 @@ StereoDepth::learn_range (const RangeImage &image)
 }
 
 /* Whether the result of a limited depth range suggests that something is outside of it: pixels are
- * missing, or accumulate at the near end. */
+ * missing, or those that are not background accumulate at the near end. */
 bool
 StereoDepth::is_suspect (const RangeImage &image) const
 {
@@ -145,12 +145,12 @@ StereoDepth::is_suspect (const RangeImage &image) const
   for_this_cpu ([&] {
     for (int y = 0; y < disparity.rows; y++) {
       const auto d = disparity.ptr<std::uint16_t> (y);
-      const auto doubtful = finder_.doubtful ().ptr<std::uint8_t> (y);
+      const auto doubtful = doubtful_.ptr<std::uint8_t> (y);
       const std::uint16_t *depth = image.depth.row (y);
       for (int x = 0; x < disparity.cols; x++) {
-        const int counts = (depth[x] != 0) & (doubtful[x] == 0);
-        seen += counts;
-        crowd += counts & (d[x] > nearest);
+        const bool has_depth = depth[x] != 0;
+        seen += has_depth;
+        crowd += has_depth & (doubtful[x] == 0) & (d[x] > nearest);
       }
     }
   });
@@ -163,6 +163,7 @@ StereoDepth::find (const RangeImage &image, bool everywhere)
   const double near_m = everywhere ? 0 : near_now_m_, far_m = everywhere ? 0 : far_now_m_;
   const auto parts = everywhere ? nullptr : blocks_.find (image.roi);
   finder_.find (matched_[0], matched_[1], image.roi, near_m, far_m, parts);
+  finder_.find_doubtful (image.roi, doubtful_);
   if (has_third_) {
     third_.find (image.roi, near_m, far_m);
     fuse_disparities (

@@ -92,6 +92,7 @@ private:
   cv::Mat matched_[2];  /* the same with less noise */
   StillAverage still_[2];
   cv::Mat rectified_[2], before_fusion_;
+  cv::Mat doubtful_; /* DisparityFinder::find_doubtful() of the last image */
   TemporalFilter temporal_;
   std::vector<int> histogram_;            /* of the last depths, by pixels of disparity */
   double near_now_m_ = 0, far_now_m_ = 0; /* where the ROI's surfaces were; 0 = not known */

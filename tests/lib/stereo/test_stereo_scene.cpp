@@ -3,6 +3,7 @@
 #include "../test-support.hpp"
 
 #include <opencv2/core.hpp>
+#include <random>
 #include <rangecast/base/cpu.hpp>
 #include <rangecast/scene/scene.hpp>
 #include <rangecast/stereo/stereo_depth.hpp>
@@ -279,6 +280,43 @@ TEST (StereoScene, depths_looked_at_stay_those_of_a_person_who_moves)
       }
   }
   EXPECT_LT (nearer, pixels / 500);
+}
+
+/* Little contrast everywhere: many of the person's pixels look like the remembered background.
+ * Something far away that comes beside them is found only if all depths are searched. */
+TEST (StereoScene, clothes_like_the_background_do_not_widen_the_search)
+{
+  SceneSettings settings;
+  settings.views = 1;
+  std::unique_ptr<Scene> scene;
+  ASSERT_TRUE (Scene::create (settings, scene).ok ());
+  StereoDepth stereo;
+  ASSERT_TRUE (stereo.set (scene->rig ().views[0]).ok ());
+  Depth depth;
+  std::minstd_rand random;
+  const auto disparity_of_far_thing = [&] (int i, const Roi &roi) {
+    Shot shot (*scene, 0, i == 0);
+    for (Image<Rgbx> *picture : {&shot.left, &shot.right})
+      for (int y = 0; y < kHeight; y++)
+        for (int x = 0; x < kWidth; x++) {
+          Rgbx &p = picture->view ().at (x, y);
+          p.r = p.g = p.b = std::uint8_t (60 + p.g / 8);
+        }
+    for (int y = 24; y < 40 && i > 3; y++)
+      for (int x = 67; x < 83; x++) {
+        Rgbx &p = shot.left.view ().at (x, y);
+        p.r = p.g = p.b = std::uint8_t (random () % 256);
+        shot.right.view ().at (x - 1, y) = p;
+      }
+    EXPECT_TRUE (depth.match (stereo, shot, roi).ok ());
+    return stereo.disparity ().at (75 - roi.x, 32 - roi.y);
+  };
+  const Roi part = {50, 10, 220, 220};
+  for (int i = 0; i < 4; i++)
+    disparity_of_far_thing (i, i < 2 ? kWhole : part);
+  for (int i = 4; i < 6; i++)
+    EXPECT_NE (disparity_of_far_thing (i, part) / 16, 1);
+  EXPECT_EQ (disparity_of_far_thing (6, kWhole) / 16, 1);
 }
 
 TEST (StereoScene, who_steps_nearer_than_the_depths_looked_at_is_seen_at_once)
