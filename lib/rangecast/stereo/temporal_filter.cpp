@@ -15,7 +15,6 @@ namespace {
 
 constexpr int kBlock = BlockGrid::kBlock;
 constexpr int kAround = 4, kWindow = kBlock + 2 * kAround; /* pixels that are compared */
-constexpr int kSame = kWindow * kWindow;                   /* difference(): 2 grey levels each */
 constexpr int kMaxRounds = 16;                             /* of the search */
 constexpr int kMinImages = 6; /* until a block is still: slow motion is seen late */
 constexpr int kSlight = 16;   /* change on one surface, 1/16 pixel */
@@ -107,9 +106,11 @@ TemporalFilter::find_motion (int bx, int by, const cv::Rect &window) const
   attempt (before_.motions[grid_.at (bx, by)]);
   if (bx + 1 < grid_.columns && by + 1 < grid_.rows)
     attempt (before_.motions[grid_.at (bx + 1, by + 1)]);
+  /* half the rows are compared: 2 grey levels per pixel are noise */
   int rounds = 0; /* along a plain gradient, a change of light looks like motion without end */
   for (const int step : {2, 1})
-    for (bool is_better = true; is_better && least > kSame && rounds < kMaxRounds; rounds++) {
+    for (bool is_better = true; is_better && least > window.area () && rounds < kMaxRounds;
+         rounds++) {
       const cv::Point from = best;
       is_better = attempt ({from.x - step, from.y}) || attempt ({from.x + step, from.y});
       const int x = best.x;

@@ -11,7 +11,8 @@ namespace rangecast {
  *  one image do not show.
  *
  *  Finds the motion of each moving block since the previous image, starting from the motions of
- * neighbouring blocks and of the previous image (G. de Haan and others, "True-motion estimation
+ * neighbouring blocks and of the previous image, and searching only if these leave more than 2 grey
+ * levels per pixel (G. de Haan and others, "True-motion estimation
  * with 3-D recursive search block matching", IEEE Trans. CSVT 3, 1993). The disparities that were
  * matched and output there, plus the mean change around the block, then vote with the new one:
  *  - A pixel has a disparity if two of the three do.
