@@ -12,6 +12,9 @@
 
 #include "cpu.hpp"
 
+/* What takes and returns vectors is inlined into functions for one processor. */
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 /* The instructions that CpuLevel::kAvx2 stands for. */
 #define RANGECAST_TARGET_AVX2 gnu::target ("avx2,bmi,bmi2,popcnt")
 
@@ -43,7 +46,7 @@ template <int kNumbers> struct Lanes {
   static void make_root (F &v)
   {
 #if defined __x86_64__
-    /* not by way of memory: halves written there are not ready when the whole is read */
+    /* in registers: reading a vector just written as two halves defeats store forwarding */
     typedef float Four __attribute__ ((vector_size (16)));
     typedef float Eight __attribute__ ((vector_size (32)));
     if constexpr (kLanes == 8) {

@@ -9,9 +9,6 @@
 
 #include "../base/simd.hpp"
 
-/* What takes and returns vectors is inlined into functions for one processor. */
-#pragma GCC diagnostic ignored "-Wpsabi"
-
 namespace rangecast {
 namespace {
 
@@ -144,12 +141,12 @@ private:
       const std::size_t size = layers_[i].vertices.size ();
       for (std::size_t at = 0; at + shared < size; at += kChunkVertices) {
         m_.chunks_.push_back ({i, at, first, std::min (kChunkVertices + shared, size - at), 0, 0});
-        /* no two chunks share a vector */
+        /* chunks are projected in parallel: padding keeps one from writing into the next */
         first += (m_.chunks_.back ().vertices + kMaxLanes - 1) / kMaxLanes * kMaxLanes;
       }
     }
     for (auto *values : {&m_.vertices_.x, &m_.vertices_.y, &m_.vertices_.nearness})
-      values->resize (first + kMaxLanes); /* triangles of the last one look beyond it */
+      values->resize (first + kMaxLanes); /* the last one's vectors are read beyond it */
     m_.vertices_.colours.resize (first);
     m_.sizes_.resize (is_points_ ? first : 0);
     const std::size_t pixels = stride_ * static_cast<std::size_t> (covered_.height + 2);
@@ -305,7 +302,7 @@ private:
     int first, top, last, bottom;
   };
 
-  /* Draws a chunk's triangles that are to be seen and have pixels. */
+  /* Draws a chunk's triangles that face the viewer, or do not hide, and contain pixel centres. */
   template <typename L> void draw_strip (const Target &to, const Chunk &chunk)
   {
     using F = typename L::F;

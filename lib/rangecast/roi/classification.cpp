@@ -8,9 +8,6 @@
 
 #include "../base/simd.hpp"
 
-/* Functions that return vectors are all inlined, into code for the processor. */
-#pragma GCC diagnostic ignored "-Wpsabi"
-
 namespace rangecast {
 namespace {
 

@@ -7,9 +7,6 @@
 
 #include "../base/simd.hpp"
 
-/* luma_of() is always inlined. */
-#pragma GCC diagnostic ignored "-Wpsabi"
-
 namespace rangecast {
 namespace {
 

@@ -100,21 +100,19 @@ transpose (
     const std::uint8_t *from, std::ptrdiff_t from_step, std::uint8_t *to, std::ptrdiff_t to_step)
 {
   using B = typename Lanes::B;
+  using Half = rangecast::Lanes<4>;
   constexpr int kBytes = sizeof (B), kSquare = 16;
   for (int y = 0; y < kSide; y += kBytes)
     for (int x = 0; x < kSide; x += kSquare) {
       B rows[kSquare], next[kSquare];
       for (int i = 0; i < kSquare; i++) {
-        const auto half = [&](int at) -> const auto &
-        {
-          return rangecast::Lanes<4>::at (from + (y + at + i) * from_step + x);
-        };
+        const std::uint8_t *row = from + (y + i) * from_step + x;
         if constexpr (kBytes == kSquare)
-          rows[i] = half (0);
+          rows[i] = Lanes::at (row);
         else /* not by way of memory: see Lanes::make_root() */
-          rows[i] = __builtin_shufflevector (half (0), half (kSquare), 0, 1, 2, 3, 4, 5, 6, 7, 8, 9,
-              10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30,
-              31);
+          rows[i] = __builtin_shufflevector (Half::at (row), Half::at (row + kSquare * from_step),
+              0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23,
+              24, 25, 26, 27, 28, 29, 30, 31);
       }
 #pragma GCC unroll 2
       for (int round = 0; round < 2; round++) {

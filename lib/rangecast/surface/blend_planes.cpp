@@ -8,9 +8,6 @@
 
 #include "../base/simd.hpp"
 
-/* What takes and returns vectors is inlined into functions for one processor. */
-#pragma GCC diagnostic ignored "-Wpsabi"
-
 namespace rangecast {
 namespace {
 
@@ -228,7 +225,7 @@ private:
         smooth_pixels<L> (x, y, &to_.scratch[kSpace + place (x, y)], down);
   }
 
-  /* @param from  the planes' colour at (x, y) */
+  /* @param from  in scratch: the colours before this pass, at (x, y) */
   template <typename L> void smooth_pixels (int x, int y, const Rgbx *from, bool down)
   {
     using I = typename L::I;
@@ -256,7 +253,7 @@ private:
       const I counted = other & same;
       n -= same, r += counted & 255, g += counted >> 8 & 255, b += counted >> 16 & 255;
     }
-    const auto mean = [&n] (const I &sum) -> I { /* exact in floats */
+    const auto mean = [&n] (const I &sum) -> I { /* the integer part is exact in floats */
       using F = typename L::F;
       return __builtin_convertvector(
           __builtin_convertvector(sum + n / 2, F) / __builtin_convertvector(n, F), I);

@@ -2,6 +2,8 @@
 #include "../test-support.hpp"
 
 #include <cmath>
+#include <cstring>
+#include <rangecast/base/cpu.hpp>
 #include <rangecast/surface/blend_planes.hpp>
 #include <rangecast/surface/strips.hpp>
 
@@ -123,6 +125,11 @@ TEST (BlendPlanes, copies_take_the_mean_of_what_is_near_and_other_pixels_keep_th
   EXPECT_EQ (scene.colours[0].view ().at (34, 24).r, 132);
   EXPECT_GT (planes.colour_plane ().at (35, 24).r, 132);
   EXPECT_LT (planes.colour_plane ().at (36, 24).r, 136);
+  limit_cpu (CpuLevel::kScalar);
+  const BlendPlanes scalar = scene.planes (0);
+  limit_cpu (cpu_supports ());
+  EXPECT_EQ (
+      std::memcmp (scalar.colour.data (), planes.colour.data (), 4 * planes.colour.size ()), 0);
 
   for (int y = 0; y < kHeight; y++)
     for (int x = 0; x < kWidth; x++) {
@@ -138,7 +145,8 @@ TEST (BlendPlanes, copies_take_the_mean_of_what_is_near_and_other_pixels_keep_th
 
 TEST (BlendPlanes, images_of_any_size_are_taken)
 {
-  for (const auto &[width, height] : {std::pair{1, 1}, {1, 5}, {5, 1}, {2, 2}, {3, 3}}) {
+  for (const auto &[width, height] :
+      {std::pair{1, 1}, {1, 5}, {5, 1}, {2, 2}, {3, 3}, {9, 3}, {13, 2}}) {
     Image<std::uint16_t> depth (width, height);
     Image<Rgbx> colour (width, height);
     for (int y = 0; y < height; y++)
