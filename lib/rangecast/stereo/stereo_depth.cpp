@@ -50,6 +50,7 @@ StereoDepth::set (const View &view, int n_threads, bool with_third)
     if (Status s = third_.set (view, range, pair.focal_baseline, n_threads); !s.ok ())
       return s;
   view_ = view;
+  n_threads_ = n_threads;
   blocks_.set ({view.width, view.height});
   temporal_.set ({view.width, view.height}, n_threads);
   reset ();
@@ -205,6 +206,9 @@ StereoDepth::match (const RangeImage &image)
     if (!everywhere && is_suspect (image))
       find (image, true);
     learn_range (image);
+    edges_.apply (
+        static_cast<int> (std::ceil (finder_.disparity_at (rectifier_.range_view ().far_m))),
+        n_threads_, finder_.disparity ());
     temporal_.apply (
         pictures_[0], {roi.x, roi.y, roi.width, roi.height}, still_[0], finder_.disparity ());
     write_depth (image);

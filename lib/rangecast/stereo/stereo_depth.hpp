@@ -6,6 +6,7 @@
 #include "../geometry/range_image.hpp"
 #include "../geometry/rig.hpp"
 #include "disparity_finder.hpp"
+#include "edge_filter.hpp"
 #include "moving_blocks.hpp"
 #include "rectification.hpp"
 #include "temporal_filter.hpp"
@@ -93,6 +94,8 @@ private:
   StillAverage still_[2];
   cv::Mat rectified_[2], before_fusion_;
   cv::Mat doubtful_; /* DisparityFinder::find_doubtful() of the last image */
+  int n_threads_ = 0;
+  EdgeFilter edges_;
   TemporalFilter temporal_;
   std::vector<int> histogram_;            /* of the last depths, by pixels of disparity */
   double near_now_m_ = 0, far_now_m_ = 0; /* where the ROI's surfaces were; 0 = not known */

@@ -4,6 +4,7 @@
 
 #include <opencv2/core.hpp>
 #include <rangecast/stereo/disparity_filter.hpp>
+#include <rangecast/stereo/edge_filter.hpp>
 #include <rangecast/stereo/silhouette_filter.hpp>
 
 using namespace rangecast;
@@ -71,4 +72,49 @@ TEST (StereoFilters, what_the_right_camera_cannot_see_goes)
   /* What stands 10 pixels of disparity before the wall hides the 10 pixels left of it. */
   for (int x = 0; x < 64; x++)
     EXPECT_EQ (disparity.at<std::int16_t> (0, x) == kNone, x >= 30 && x < 40) << x;
+}
+
+/* A slanted wall before another one, whose edge runs down with noise of up to half a pixel. */
+static cv::Mat
+noisy_edge ()
+{
+  cv::Mat disparity (40, 60, CV_16U);
+  for (int y = 0; y < 40; y++)
+    for (int x = 0; x < 60; x++) {
+      const int noise = x == 30 || x == 29 ? (y * 7 % 5 - 2) * 4 : 0;
+      disparity.at<std::uint16_t> (y, x) =
+          static_cast<std::uint16_t> (x < 30 ? 160 + noise / 2 : 640 + 2 * y + noise);
+    }
+  return disparity;
+}
+
+TEST (StereoFilters, noise_along_a_depth_edge_is_smoothed_and_nothing_else_changes)
+{
+  const cv::Mat before = noisy_edge ();
+  cv::Mat after = before.clone ();
+  EdgeFilter ().apply (16, 1, after);
+  for (int y = 0; y < 40; y++)
+    for (int x = 0; x < 60; x++) {
+      const int d = after.at<std::uint16_t> (y, x);
+      if (x == 29 || x == 30)
+        EXPECT_NEAR (d, x < 30 ? 160 : 640 + 2 * y, x < 30 ? 2 : 4) << x << " " << y;
+      else
+        EXPECT_EQ (d, before.at<std::uint16_t> (y, x)) << x << " " << y;
+    }
+}
+
+TEST (StereoFilters, smoothed_edges_do_not_depend_on_threads_and_none_crosses_the_least_disparity)
+{
+  const cv::Mat before = noisy_edge ();
+  cv::Mat one = before.clone (), four = before.clone ();
+  EdgeFilter ().apply (158, 1, one);
+  EdgeFilter ().apply (158, 4, four);
+  EXPECT_EQ (cv::countNonZero (one != four), 0);
+  for (int y = 0; y < 40; y++) {
+    const int d = before.at<std::uint16_t> (y, 29), now = one.at<std::uint16_t> (y, 29);
+    if (d < 158)
+      EXPECT_EQ (now, d) << y;
+    else
+      EXPECT_GE (now, 158) << y;
+  }
 }
