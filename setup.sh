@@ -32,7 +32,7 @@ esac
 packages=(
   # build
   gcc g++ dpkg-dev meson ninja-build pkg-config git ca-certificates python3
-  libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libopencv-dev libtinygltf-dev libtinyobjloader-dev libyaml-dev
+  libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libopencv-dev libtinygltf-dev libyaml-dev
   # run: launch strings, RTP, image and video files, software OpenGL without a display
   gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-base-apps gstreamer1.0-plugins-good gstreamer1.0-plugins-bad
   gstreamer1.0-libav glib-networking python3-yaml gstreamer1.0-gl libgl1-mesa-dri libegl1 libegl-mesa0 libgles2 libgl1

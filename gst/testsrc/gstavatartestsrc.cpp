@@ -4,7 +4,7 @@
  * @title: avatartestsrc
  *
  * Renders a moving head and shoulders in a textured room, as seen by a rig of stereo cameras. The
- * figure is built in, or a glTF or OBJ model
+ * figure is built in, or a glTF model
  * (#GstAvatarTestSrc:location, #GstAvatarTestSrc:model-top).
  *
  * Request pads `left`, `right` and `third` output the cameras of one view, `src` outputs exact

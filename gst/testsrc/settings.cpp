@@ -50,7 +50,7 @@ avatar_properties ()
           "clock",
           kMutableReady),
       P::text<&S::scene, &Scene::model> ("location", "Location",
-          "glTF or OBJ file with the model to show (unset = built-in figure)", kMutableReady),
+          "glTF file with the model to show (unset = built-in figure)", kMutableReady),
       P::number<&S::scene, &Scene::model_top_m> ("model-top", "Model top",
           "Part of the model to keep, in metres below the crown after scaling it to a person 1.8 m "
           "tall (0 = the whole model scaled to 0.5 m, -1 = 0.5 for models of a standing person, "

@@ -18,7 +18,7 @@ def size_caps(size, fps=None, media="video/x-raw"):
 # ---- camera ----
 
 INPUT_HELP = f"""what the camera is (default %(default)s):
-avatar: the built-in figure; avatar=MODEL: a glTF or OBJ model;
+avatar: the built-in figure; avatar=MODEL: a glTF model;
 range: its exact range images, without cameras and stereo matching;
 DIR: recorded pairs DIR/viewN-left.* and -right.*, videos or images viewN-left-%%05d.png from 0, which begin with the empty scene;
 side-by-side=SOURCE, top-bottom=SOURCE: a stereo camera that packs both images into one, in gst-launch-1.0 syntax;

@@ -71,7 +71,7 @@ test_media_types_that_do_not_fit_are_named () {
 test_model_that_is_not_one_is_named () {
   echo "no model" >bad.glb
   expect_error "bad.glb" run avatartestsrc location=bad.glb num-buffers=1 ! fakesink
-  expect_error "nowhere.obj" run avatartestsrc location=nowhere.obj num-buffers=1 ! fakesink
+  expect_error "nowhere.glb" run avatartestsrc location=nowhere.glb num-buffers=1 ! fakesink
 }
 
 test_file_that_is_no_recording_is_refused () {

@@ -74,7 +74,7 @@ FakeCameraOptions::read (int *argc, char ***argv)
       {"log", 0, 0, G_OPTION_ARG_FILENAME, &log_file,
           "write a line for each exposure: camera, frame number, time of day in ns", "FILE"},
       {"model", 0, 0, G_OPTION_ARG_FILENAME, &model,
-          "glTF or OBJ model instead of the built-in figure", "FILE"},
+          "glTF model instead of the built-in figure", "FILE"},
       {"empty-frames", 0, 0, G_OPTION_ARG_INT, &empty_frames,
           "the person appears after N frame periods, and not before N pictures (default 25)", "N"},
       {"loop", 0, 0, G_OPTION_ARG_INT, &loop,

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <span>
 #include <tiny_gltf.h>
 
@@ -261,7 +260,7 @@ bool
 Reader::load_document ()
 {
   std::vector<std::uint8_t> bytes;
-  if (status_ = read_file (path_, kMaxFile, "a model (glTF or OBJ)", bytes); !status_.ok ())
+  if (status_ = read_file (path_, kMaxFile, "a model (glTF)", bytes); !status_.ok ())
     return false;
   const auto size = unsigned (bytes.size ());
   bytes.resize (bytes.size () + 8); /* tinygltf 2.7 ignores a chunk's header when it checks ends */
@@ -633,17 +632,6 @@ Reader::read_triangles (const Primitive &primitive, bool mirrored, Mesh &mesh)
 }
 
 } // namespace
-
-bool
-is_gltf (const std::string &path)
-{
-  std::string ending = fs::path (path).extension ().string ();
-  std::ranges::transform (
-      ending, ending.begin (), [] (unsigned char c) { return std::tolower (c); });
-  char magic[4] = {};
-  std::ifstream (path, std::ios::binary).read (magic, sizeof magic);
-  return ending == ".gltf" || ending == ".glb" || std::string_view (magic, 4) == kMagic;
-}
 
 Status
 read_gltf (const std::string &path, Model &model)

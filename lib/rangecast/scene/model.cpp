@@ -100,7 +100,7 @@ public:
       /* A colour map that lies beside a glTF file which does not name it was usually made for the
        * scan's first format, where v counts from the bottom; exporters copy v unchanged. */
       for (MeshVertex &vertex : mesh.vertices)
-        vertex.v = is_gltf (settings_.path) ? 1 - vertex.v : vertex.v;
+        vertex.v = 1 - vertex.v;
       return from_file (beside_, mesh);
     }
     if (m.picture >= 0)
@@ -241,17 +241,17 @@ load_model (const ModelSettings &settings, Figure &figure)
   const std::string &path = settings.path;
   std::error_code error;
   if (!fs::is_regular_file (path, error))
-    return {StatusCode::kNotFound, path + ": no such model file (glTF or OBJ)"};
+    return {StatusCode::kNotFound, path + ": no such model file (glTF)"};
   Figure loaded;
   try {
     Model model;
-    Status status = is_gltf (path) ? read_gltf (path, model) : read_obj (path, model);
+    Status status = read_gltf (path, model);
     if (status.ok ())
       status = make_figure (settings, model, loaded);
     if (!status.ok ())
       return status;
   } catch (const std::exception &) { /* of the readers, and of allocations */
-    return {StatusCode::kBadData, path + ": cannot be read as a model (glTF or OBJ)"};
+    return {StatusCode::kBadData, path + ": cannot be read as a model (glTF)"};
   }
   if (!fit_figure (loaded, settings.top_m))
     return {StatusCode::kBadValue,

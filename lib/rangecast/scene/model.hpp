@@ -12,7 +12,7 @@
 namespace rangecast {
 
 struct ModelSettings {
-  std::string path;             ///< glTF (.glb, .gltf) or OBJ
+  std::string path;             ///< glTF 2.0
   double top_m = kTopAutomatic; ///< see fit_figure()
 };
 
@@ -53,16 +53,10 @@ struct Model {
 /** More than any scan that a software rasteriser could draw live. */
 inline constexpr std::size_t kMaxModelVertices = 4'000'000, kMaxModelTriangles = 8'000'000;
 
-/** Whether a file is glTF, by its name or first bytes. */
-bool is_gltf (const std::string &path);
-
 /** Reads a glTF 2.0 file, JSON or binary: all meshes of its scene with their nodes' transforms, and
  *  skins in the pose of the joints' nodes. Indices, offsets and lengths are checked here: tinygltf
  *  copies them from the file.
  *  @return kBadData or kTruncated for what is not glTF; kUnsupported naming the extension */
 Status read_gltf (const std::string &path, Model &model);
-
-/** Reads a Wavefront OBJ file and its materials. */
-Status read_obj (const std::string &path, Model &model);
 
 } // namespace rangecast

@@ -32,7 +32,7 @@ struct SceneSettings {
   double noise_sigma = 1;  ///< sensor noise, grey levels, 0 .. 20
   double motion = 1;       ///< of the figure: 0 = still, 1 = as of a person who talks, up to 2
   std::uint32_t seed = 1;  ///< of all patterns and of the noise
-  std::string model;       ///< glTF or OBJ file; empty: the built-in figure
+  std::string model;       ///< glTF file; empty: the built-in figure
   double model_top_m = -1; ///< of a model of 1.8 m, kept from the crown down, 0.1 .. 1.8; 0: all
                            ///< of it, 0.5 m large; -1: 0.5 m of a standing person, else all
 

@@ -36,7 +36,7 @@ const char *const kUsage =
     "preference:\n"
     "                     depth-bits=16 depth-threshold=0 colour-threshold=0\n"
     "  --skip N           frame sets at its beginning to leave out (default 0)\n"
-    "  --model FILE       glTF or OBJ model to render (default: the built-in figure)\n"
+    "  --model FILE       glTF model to render (default: the built-in figure)\n"
     "  --size WxH         of each of its four views (default 320x240)\n"
     "  --noise LEVELS     of its colours, standard deviation in grey levels (default 1.5)\n"
     "  --depth-noise MM   of its depth, standard deviation (default 0)\n"

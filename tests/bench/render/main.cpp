@@ -47,7 +47,7 @@ const char *const kUsage =
     "  seam    gradients inside that the truth has not, over those that it has\n"
     "  bad     share of the pixels inside that are more than 40 levels off\n"
     "  spill   pixels drawn beside the figure, as a share of the figure's\n"
-    "  --model FILE    glTF or OBJ model (default: the built-in figure)\n"
+    "  --model FILE    glTF model (default: the built-in figure)\n"
     "  --size WxH      of the range images (default 320x240)\n"
     "  --rounds N      times are medians of so many (default 15)\n"
     "  --overlap PIXELS  of the cylinder (default: the element's)\n"

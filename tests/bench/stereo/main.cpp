@@ -46,7 +46,7 @@ const char *const kUsage =
     "                       the true surface, and errors, beside OpenCV at the same settings\n"
     "  --plain              render a pair of plain surfaces, with texture below the noise, "
     "instead\n"
-    "  --model FILE         glTF or OBJ model to render (default: the built-in figure)\n"
+    "  --model FILE         glTF model to render (default: the built-in figure)\n"
     "  --size WxH           (default 320x240)\n"
     "  --distance M         from the cameras, 0.5 to 1.2 (default 0.8; at 1.1 the person's ROI is "
     "a\n"

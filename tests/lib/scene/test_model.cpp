@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* How much of a model is shown and how large; models in Wavefront OBJ. */
+/* How much of a model is shown and how large, textures that are files. */
 #include "../test-support.hpp"
 
 #ifdef RANGECAST_HAVE_MODELS
@@ -85,58 +85,53 @@ TEST (Model, test_model_top_with_nothing_in_it_is_an_error)
   EXPECT_NE (status.message ().find ("model-top"), std::string::npos) << status.message ();
 }
 
-TEST (Model, test_obj_file_gives_each_group_its_material)
-{
-  const Folder folder;
-  (void)folder.write ("paint.mtl", "newmtl a\nKd 1 1 1\nmap_Kd red.png\nnewmtl b\nKd 0 0 0.9\n");
-  const auto red = plain_png (kRed);
-  (void)folder.write ("red.png", std::string (red.begin (), red.end ()));
-  RenderedModel shown (folder.write ("two.obj",
-      "mtllib paint.mtl\nv -2 -1 0\nv 0 -1 0\nv 0 1 0\nv -2 1 0\nv 2 -1 0\nv 2 1 0\nvt 0 0\n"
-      "usemtl a\nf 1/1 2/1 3/1\nf 1/1 3/1 4/1\nusemtl b\nf 2/1 5/1 6/1\nf 2/1 6/1 3/1\n"));
-  EXPECT_EQ (shown.at (-0.12, 0), "red");
-  EXPECT_EQ (shown.at (0.12, 0), "blue");
-}
-
 static std::string
 halves_of (RenderedModel &&shown)
 {
   return shown.at (0, 0.12) + " over " + shown.at (0, -0.12);
 }
 
-/* v runs up in OBJ and down in glTF; a colour map beside a glTF file counts from its bottom. */
+/* v runs down in glTF, but up in a colour map that no material names. */
 TEST (Model, test_textures_stand_upright_and_are_found_beside_the_file)
 {
-  const Folder folder;
   const auto picture = png (1, 4, {kRed, kRed, kBlue, kBlue});
-  (void)folder.write ("paint.png", std::string (picture.begin (), picture.end ()));
-  (void)folder.write ("paint.mtl", "newmtl a\nmap_Kd C:\\work\\paint.png\n");
-  const std::string square = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n"
-                             "vt 0 1\nf 1/1 2/2 3/3 4/4\n";
-  EXPECT_EQ (halves_of (RenderedModel (
-                 folder.write ("square.obj", "mtllib paint.mtl\nusemtl a\n" + square))),
-      "red over blue");
   GlbWriter named, bare;
   named.add_mesh_node (
       named.add_square (0, 0, 0, 1, named.add_textured_material (named.add_texture (picture))));
   EXPECT_EQ (halves_of (rendered (named)), "red over blue");
   bare.add_mesh_node (bare.add_square (0, 0, 0, 1, -1));
-  const Folder another;
-  (void)another.write ("Map-COL.png", std::string (picture.begin (), picture.end ()));
-  EXPECT_EQ (halves_of (RenderedModel (another.write ("bare.glb", bare.glb ()))), "blue over red");
+  const Folder folder;
+  (void)folder.write ("Map-COL.png", std::string (picture.begin (), picture.end ()));
+  EXPECT_EQ (halves_of (RenderedModel (folder.write ("bare.glb", bare.glb ()))), "blue over red");
 }
 
 TEST (Model, test_texture_that_is_missing_is_named)
 {
-  const Folder folder;
-  (void)folder.write ("paint.mtl", "newmtl a\nmap_Kd gone.png\n");
+  GlbWriter glb;
+  glb.extra = R"("images":[{"uri":"gone.png"}],)";
+  glb.add_mesh_node (glb.add_square (
+      0, 0, 0, 1, glb.add_textured_material (glb.add_bare_texture (R"("source":0)"))));
   Figure figure;
-  const Status status =
-      load (folder.write ("one.obj", "mtllib paint.mtl\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\n"
-                                     "vt 0 0\nusemtl a\nf 1/1 2/1 3/1\n"),
-          figure);
+  const Status status = load (glb, figure);
   EXPECT_EQ (status.code (), StatusCode::kNotFound);
   EXPECT_NE (status.message ().find ("gone.png"), std::string::npos) << status.message ();
+}
+
+TEST (Model, test_numbers_out_of_range_are_refused_by_name)
+{
+  for (const float wild : {1e30f, -1e30f, std::nanf (""), HUGE_VALF})
+    for (const bool is_position : {false, true}) {
+      GlbWriter glb;
+      const int position =
+          glb.add_floats ({-9, -9, 0, is_position ? wild : 9, -9, 0, 9, 9, 0, -9, 9, 0}, "VEC3", 4);
+      const int place = glb.add_floats ({0, is_position ? 1 : wild, 1, 1, 1, 0, 0, 0}, "VEC2", 4);
+      glb.add_mesh_node (
+          glb.add_square_of (position, R"(,"TEXCOORD_0":)" + std::to_string (place), -1));
+      Figure figure;
+      const Status status = load (glb, figure);
+      EXPECT_EQ (status.code (), StatusCode::kBadData) << wild;
+      EXPECT_NE (status.message ().find ("model.glb"), std::string::npos) << status.message ();
+    }
 }
 
 TEST (Model, test_dressed_head_has_ten_meshes_in_their_own_colours)

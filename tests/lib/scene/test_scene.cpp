@@ -1,9 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "../test-support.hpp"
 
-#include <fstream>
-#include <unistd.h>
-
 #include <cstring>
 #include <rangecast/scene/scene.hpp>
 
@@ -120,48 +117,6 @@ TEST (Scene, test_model_that_cannot_be_read_is_named)
   const Status status = Scene::create (settings, scene);
   EXPECT_FALSE (status.ok ());
   EXPECT_NE (status.message ().find ("/nowhere/head.glb"), std::string::npos);
-}
-
-TEST (Scene, test_small_obj_is_fitted_and_drawn)
-{
-  const std::string path = ::testing::TempDir () + "small-" + std::to_string (getpid ()) + ".obj";
-  std::ofstream (path) << "v -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nf 1 2 3\nf 1 3 4\n";
-  SceneSettings settings;
-  settings.model = path;
-  settings.motion = 0;
-  std::unique_ptr<Scene> scene;
-  const Status status = Scene::create (settings, scene);
-  std::filesystem::remove (path);
-  ASSERT_TRUE (status.ok ()) << status.message ();
-  Image<Rgbx> colour (320, 240);
-  Image<std::uint16_t> depth (320, 240);
-  ASSERT_TRUE (
-      scene->render (0, SceneCamera::kLeft, 0, false, colour.view (), depth.view (), {}).ok ());
-  EXPECT_NEAR (depth.view ().at (160, 120), 8000, 40) << "a plane through the origin, 0.8 m away";
-}
-
-TEST (Scene, test_model_with_numbers_out_of_range_is_refused_by_name)
-{
-  const std::string path = ::testing::TempDir () + "wild-" + std::to_string (getpid ()) + ".obj";
-  for (const char *wild :
-      {"vt 1e30 0", "vt 0 -1e30", "vt nan 0", "vt 0 inf", "v 1e38 0 0", "v nan 0 0"}) {
-    std::ofstream (path) << "v -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nvt 0 0\nvt 1 1\n"
-                         << wild << "\nf 1/1 2/2 3/1\nf 1/1 3/2 4/1\nf -1/-1 2/2 3/-1\n";
-    SceneSettings settings;
-    settings.model = path;
-    std::unique_ptr<Scene> scene;
-    const Status status = Scene::create (settings, scene);
-    if (status.ok ()) { // the importer reads some of these words as 0
-      Image<Rgbx> colour (320, 240);
-      Image<std::uint16_t> depth (320, 240);
-      EXPECT_TRUE (
-          scene->render (0, SceneCamera::kLeft, 0, false, colour.view (), depth.view (), {}).ok ());
-      EXPECT_TRUE (std::string (wild).find ("1e") == std::string::npos) << wild;
-    } else {
-      EXPECT_TRUE (status.message ().starts_with (path)) << status.message ();
-    }
-  }
-  std::filesystem::remove (path);
 }
 
 TEST (Scene, test_scanned_head_faces_the_first_view)
