@@ -43,17 +43,17 @@ cut (RangeImage &image, const Roi &box)
 /* One stereo camera and what stands in front of it. */
 class CameraHost {
 public:
-  CameraHost (Scene &scene, const View &view)
-      : scene_ (scene), view_ (view),
+  CameraHost (Scene &scene, const View &view, bool with_third)
+      : scene_ (scene), view_ (view), with_third_ (with_third),
         left_ (static_cast<std::size_t> (view.width) * static_cast<std::size_t> (view.height)),
-        right_ (left_.size ())
+        right_ (left_.size ()), third_ (left_.size ())
   {
   }
 
   /* Before kMoment. */
   Status learn (const RangeImage &image)
   {
-    Status status = stereo_.set (view_, {});
+    Status status = stereo_.set (view_, {}, with_third_);
     background_.reset (view_.width, view_.height);
     for (int i = 0; i < kLearnt && status.ok (); i++) {
       status = match (kMoment - 0.1 * (kLearnt + 1 - i), true, image);
@@ -89,7 +89,12 @@ private:
     if (status.ok ())
       status =
           scene_.render (view_.id, SceneCamera::kRight, time_s, empty, picture (right_), {}, {});
-    return status.ok () ? stereo_.process (picture (left_), picture (right_), image) : status;
+    if (status.ok () && with_third_)
+      status =
+          scene_.render (view_.id, SceneCamera::kThird, time_s, empty, picture (third_), {}, {});
+    return status.ok () ? stereo_.process (picture (left_), picture (right_), image,
+                              with_third_ ? picture (third_) : ImageView<Rgbx>{})
+                        : status;
   }
 
   Scene &scene_;
@@ -97,7 +102,8 @@ private:
   StereoDepth stereo_;
   BackgroundModel background_;
   Segmenter segmenter_;
-  std::vector<Rgbx> left_, right_;
+  bool with_third_;
+  std::vector<Rgbx> left_, right_, third_;
 };
 
 Status
@@ -137,7 +143,7 @@ Film::Film () : hosts_ (std::make_unique<Hosts> ()) {}
 Film::~Film () = default;
 
 Status
-Film::start (const SceneSettings &settings)
+Film::start (const SceneSettings &settings, bool with_third)
 {
   if (Status status = Scene::create (settings, hosts_->scene); !status.ok ())
     return status;
@@ -146,7 +152,7 @@ Film::start (const SceneSettings &settings)
   make_room (set, settings.width, settings.height);
   Status status;
   for (std::size_t i = 0; i < set.images.size () && status.ok (); i++)
-    status = hosts_->all.emplace_back (*hosts_->scene, hosts_->scene->rig ().views[i])
+    status = hosts_->all.emplace_back (*hosts_->scene, hosts_->scene->rig ().views[i], with_third)
                  .learn (set.images[i]);
   return status;
 }

@@ -35,7 +35,8 @@ class Film {
 public:
   Film ();
   ~Film ();
-  rangecast::Status start (const rangecast::SceneSettings &settings);
+  /** @param with_third  cameras are triples, see ThirdPair */
+  rangecast::Status start (const rangecast::SceneSettings &settings, bool with_third = false);
   /** @param time_s  kMoment or later */
   rangecast::Status next (double time_s, FrameSet &set);
 

@@ -53,11 +53,11 @@ const char *const kUsage =
     "  --overlap PIXELS  of the cylinder (default: the element's)\n"
     "  --mode NAME     only that row of the table\n"
     "  --depth KIND    only that depth\n"
-    "  --motion        instead: films of the figure, still and in motion, from stereo depth, drawn "
-    "in\n"
-    "                  software: SSIM all; flicker, pixels inside that change by over 20 levels "
-    "more\n"
-    "                  than the truth; outline, pixels that come or go and in the truth do not\n"
+    "  --motion        instead: films of the figure, still and in motion, by two and three "
+    "cameras\n"
+    "                  a view, drawn in software: SSIM all; flicker, pixels inside that change by\n"
+    "                  over 20 levels more than the truth; outline, pixels that come or go and in\n"
+    "                  the truth do not\n"
     "  --json FILE     writes the rows (but noise) there\n"
     "  --pictures DIR  writes truth, picture and difference there, as PNG\n";
 
@@ -262,43 +262,54 @@ run (Job &job)
   return run_scene (job);
 }
 
-/* Films of still and moving figures. */
+/* A film of a still or moving figure, by two or three cameras a view. */
 Status
-run_films (SceneSettings settings)
+run_film (SceneSettings settings, bool moves, bool with_third)
 {
   constexpr int kBefore = 6, kPictures = 5;
-  std::printf ("%-7s %5s %9s %9s %9s\n", "film", "angle", "SSIM all", "flicker", "outline");
-  for (const bool moves : {false, true}) {
-    settings.motion = moves;
-    MotionScore scores[std::size (kAngles)];
-    std::vector<Shot> shots[std::size (kAngles)];
-    Film film;
-    Status status = film.start (settings);
-    for (int i = -kBefore; i < kPictures && status.ok (); i++) {
-      const double time_s = kMoment + (i + kBefore) / 15.0;
-      FrameSet set, cameras;
-      status = film.next (time_s, set);
-      for (std::size_t k = 0; k < std::size (kAngles) && i >= 0 && status.ok (); k++) {
-        if (i == 0 || moves) {
-          shots[k].clear ();
-          status = exact_frames (settings, cameras, time_s);
-          if (status.ok ())
-            status = make_truth (settings, cameras, kAngles[k], shots[k], time_s);
-        }
-        const auto way = make_strip_way ("blend", nullptr, set, {});
-        for (const Shot &shot : shots[k]) {
-          way->build (orbit_at (shot.azimuth_deg));
-          way->draw (make_picture (set, shot.azimuth_deg));
-          scores[k].add (int (shot.azimuth_deg), shot, *way->own_picture ());
-        }
+  settings.motion = moves;
+  MotionScore scores[std::size (kAngles)];
+  std::vector<Shot> shots[std::size (kAngles)];
+  Film film;
+  Status status = film.start (settings, with_third);
+  for (int i = -kBefore; i < kPictures && status.ok (); i++) {
+    const double time_s = kMoment + (i + kBefore) / 15.0;
+    FrameSet set, cameras;
+    status = film.next (time_s, set);
+    for (std::size_t k = 0; k < std::size (kAngles) && i >= 0 && status.ok (); k++) {
+      if (i == 0 || moves) {
+        shots[k].clear ();
+        status = exact_frames (settings, cameras, time_s);
+        if (status.ok ())
+          status = make_truth (settings, cameras, kAngles[k], shots[k], time_s);
+      }
+      const auto way = make_strip_way ("blend", nullptr, set, {});
+      for (const Shot &shot : shots[k]) {
+        way->build (orbit_at (shot.azimuth_deg));
+        way->draw (make_picture (set, shot.azimuth_deg));
+        scores[k].add (int (shot.azimuth_deg), shot, *way->own_picture ());
       }
     }
-    if (!status.ok ())
-      return status;
-    for (std::size_t k = 0; k < std::size (kAngles); k++)
-      std::printf ("%-7s %5d %9.4f %7.2f %% %7.2f %%\n", moves ? "moving" : "still", kAngles[k],
-          scores[k].ssim_all (), 100 * scores[k].flicker (), 100 * scores[k].outline ());
   }
+  if (!status.ok ())
+    return status;
+  for (std::size_t k = 0; k < std::size (kAngles); k++)
+    std::printf ("%-7s %7d %5d %9.4f %7.2f %% %7.2f %%\n", moves ? "moving" : "still",
+        with_third ? 3 : 2, kAngles[k], scores[k].ssim_all (), 100 * scores[k].flicker (),
+        100 * scores[k].outline ());
+  return {};
+}
+
+/* Films of still and moving figures. */
+Status
+run_films (const SceneSettings &settings)
+{
+  std::printf (
+      "%-7s %7s %5s %9s %9s %9s\n", "film", "cameras", "angle", "SSIM all", "flicker", "outline");
+  for (const bool moves : {false, true})
+    for (const bool with_third : {false, true})
+      if (Status status = run_film (settings, moves, with_third); !status.ok ())
+        return status;
   return {};
 }
 
